@@ -1,0 +1,145 @@
+//! Streaming rows into a triangular factor.
+
+use super::Factor;
+use crate::RegressorError;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, recommended_block_size};
+use faer::{Mat, Par};
+use phiw_dynamics::check_size;
+
+/// Collects rows of \[Φ f\] and folds them into R, a block at a time. Memory does not depend on the number of rows, and
+/// nothing is allocated after [`FactorBuilder::new`].
+pub struct FactorBuilder {
+    columns: usize,
+    rows: u64,
+    /// R in the first `columns` rows, then the rows that wait.
+    work: Mat<f64>,
+    waiting: usize,
+    householder: Mat<f64>,
+    stack: MemBuffer,
+}
+
+impl FactorBuilder {
+    /// For rows of `columns` numbers, the right-hand side included (as the last).
+    pub fn new(columns: usize) -> Self {
+        // Four triangles' worth of rows for each QR: the triangle that is factored again costs a fifth, and the block
+        // stays in the second-level cache.
+        let capacity = (4 * columns).max(64);
+        let size = columns + capacity;
+        let block = recommended_block_size::<f64>(size, columns.max(1)).max(1);
+        FactorBuilder {
+            columns,
+            rows: 0,
+            work: Mat::zeros(size, columns),
+            waiting: 0,
+            householder: Mat::zeros(block, columns),
+            stack: MemBuffer::new(qr_in_place_scratch::<f64>(size, columns, block, Par::Seq, Default::default())),
+        }
+    }
+
+    /// Numbers in a row.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Adds one row.
+    ///
+    /// # Errors
+    /// The row has the wrong length, or holds a number that is not finite.
+    pub fn push_row(&mut self, row: &[f64]) -> Result<(), RegressorError> {
+        self.push_scaled_row(row, 1.0)
+    }
+
+    /// Adds one row times `weight` (a row of standard deviation σ has the weight 1/σ).
+    ///
+    /// # Errors
+    /// The row has the wrong length, or holds a number that is not finite.
+    pub fn push_scaled_row(&mut self, row: &[f64], weight: f64) -> Result<(), RegressorError> {
+        check_size("row of the factor", row.len(), self.columns)?;
+        if !(weight.is_finite() && row.iter().all(|value| value.is_finite())) {
+            return Err(RegressorError::NotFinite { row: 0 });
+        }
+        if self.columns + self.waiting == self.work.nrows() {
+            self.fold();
+        }
+        let target = self.columns + self.waiting;
+        for (column, value) in row.iter().enumerate() {
+            self.work[(target, column)] = value * weight;
+        }
+        self.waiting += 1;
+        self.rows += 1;
+        Ok(())
+    }
+
+    /// Adds a block of rows, row-major.
+    ///
+    /// # Errors
+    /// The block is not whole rows, or holds a number that is not finite.
+    pub fn push_rows(&mut self, rows: &[f64]) -> Result<(), RegressorError> {
+        if self.columns == 0 {
+            return Ok(());
+        }
+        check_size("block of rows", rows.len() / self.columns * self.columns, rows.len())?;
+        for (index, row) in rows.chunks_exact(self.columns).enumerate() {
+            self.push_row(row).map_err(|error| match error {
+                RegressorError::NotFinite { .. } => RegressorError::NotFinite { row: index },
+                other => other,
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Adds all the rows that a factor stands for, each times `weight`; its column k becomes column `columns[k]` here.
+    ///
+    /// # Errors
+    /// `columns` does not name a column of this builder for each column of `factor`.
+    pub fn push_factor(&mut self, factor: &Factor, columns: &[usize], weight: f64) -> Result<(), RegressorError> {
+        check_size("columns of the merged factor", columns.len(), factor.columns())?;
+        let rows = self.rows + factor.rows();
+        let mut row = vec![0.0; self.columns];
+        for index in 0..factor.columns() {
+            row.fill(0.0);
+            for column in index..factor.columns() {
+                let target = columns[column];
+                check_size("column index", target.max(self.columns - 1) + 1, self.columns)?;
+                row[target] = factor.entry(index, column);
+            }
+            self.push_scaled_row(&row, weight)?;
+        }
+        self.rows = rows;
+        Ok(())
+    }
+
+    /// The factor of all the rows so far; the builder can go on.
+    pub fn factor(&mut self) -> Factor {
+        self.fold();
+        Factor::from_upper_triangle(&self.work, self.columns, self.rows)
+    }
+
+    /// Starts again with no rows.
+    pub fn clear(&mut self) {
+        self.work.fill(0.0);
+        self.waiting = 0;
+        self.rows = 0;
+    }
+
+    fn fold(&mut self) {
+        if self.waiting == 0 || self.columns == 0 {
+            return;
+        }
+        let rows = self.columns + self.waiting;
+        qr_in_place(
+            self.work.as_mut().subrows_mut(0, rows),
+            self.householder.as_mut(),
+            Par::Seq,
+            MemStack::new(&mut self.stack),
+            Default::default(),
+        );
+        for column in 0..self.columns {
+            for row in column + 1..self.columns {
+                self.work[(row, column)] = 0.0;
+            }
+        }
+        self.waiting = 0;
+    }
+}

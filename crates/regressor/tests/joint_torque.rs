@@ -1,0 +1,161 @@
+//! Φw = τ over random robots and states, and the base parameters of robots whose counts are published.
+
+use phiw_dynamics::random_tree::{RandomNumbers, RandomState, RandomTreeOptions, random_state, random_tree};
+use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
+use phiw_dynamics::{Lanes, Tree, Workspace};
+use phiw_regressor::factor::FactorBuilder;
+use phiw_regressor::{BaseParameters, BaseParametersOptions, JointTorqueRegressor};
+use proptest::prelude::*;
+use std::path::PathBuf;
+
+fn trees() -> impl Strategy<Value = (Tree, RandomState, RandomState)> {
+    (any::<u64>(), 5..=30_usize, any::<bool>(), any::<bool>(), any::<bool>()).prop_map(
+        |(seed, joints, floating_base, mimic, fixed_links)| {
+            let options = RandomTreeOptions { joints, floating_base, mimic, fixed_links };
+            let tree = random_tree(seed, &options).unwrap();
+            let mut random = RandomNumbers::new(seed ^ 0x9e37);
+            let states = (random_state(&tree, &mut random), random_state(&tree, &mut random));
+            (tree, states.0, states.1)
+        },
+    )
+}
+
+/// φ as a dense row-major matrix.
+fn dense_regressor(tree: &Tree, state: &RandomState) -> Vec<f64> {
+    let regressor = JointTorqueRegressor::new(tree);
+    let (mut scratch, mut pairs) = (regressor.scratch(), vec![0.0; regressor.buffer_size()]);
+    regressor.compute(tree, &state.q, &state.v, &state.a, &mut scratch, &mut pairs).unwrap();
+    let mut phi = vec![0.0; regressor.rows() * regressor.columns()];
+    regressor.scatter(&pairs, &mut phi).unwrap();
+    phi
+}
+
+fn times(phi: &[f64], parameters: &[f64]) -> Vec<f64> {
+    phi.chunks_exact(parameters.len()).map(|row| row.iter().zip(parameters).map(|(a, b)| a * b).sum()).collect()
+}
+
+fn inverse_dynamics(tree: &Tree, state: &RandomState) -> Vec<f64> {
+    let mut torque = vec![0.0; tree.velocity_size()];
+    tree.inverse_dynamics(&state.q, &state.v, &state.a, &mut Workspace::new(tree), &mut torque).unwrap();
+    torque
+}
+
+fn assert_relative(found: &[f64], expected: &[f64], tolerance: f64) {
+    let scale = expected.iter().fold(1e-3, |largest: f64, value| largest.max(value.abs()));
+    for (index, (left, right)) in found.iter().zip(expected).enumerate() {
+        assert!((left - right).abs() <= tolerance * scale, "row {index}: {left} against {right}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn regressor_times_parameters_is_inverse_dynamics((tree, state, _) in trees()) {
+        let torque = times(&dense_regressor(&tree, &state), &tree.inertial_parameters());
+        assert_relative(&torque, &inverse_dynamics(&tree, &state), 1e-10);
+    }
+
+    #[test]
+    fn lanes_are_single_samples_side_by_side((tree, first, second) in trees()) {
+        let regressor = JointTorqueRegressor::new(&tree);
+        let side_by_side = |pick: fn(&RandomState) -> &Vec<f64>| -> Vec<Lanes<4>> {
+            pick(&first).iter().zip(pick(&second)).map(|(a, b)| Lanes([*a, *b, *b, *a])).collect()
+        };
+        let mut pairs = vec![Lanes([0.0; 4]); regressor.buffer_size()];
+        regressor.compute_lanes(&tree, &side_by_side(|s| &s.q), &side_by_side(|s| &s.v), &side_by_side(|s| &s.a),
+            &mut regressor.scratch(), &mut pairs).unwrap();
+        for (lane, state) in [(0, &first), (1, &second), (2, &second), (3, &first)] {
+            let single: Vec<f64> = pairs.iter().map(|value| value.0[lane]).collect();
+            let mut phi = vec![0.0; regressor.rows() * regressor.columns()];
+            regressor.scatter(&single, &mut phi).unwrap();
+            assert_relative(&phi, &dense_regressor(&tree, state), 1e-12);
+        }
+    }
+
+    #[test]
+    fn base_parameters_say_all_that_standard_ones_say((tree, state, _) in trees()) {
+        let base = BaseParameters::of_tree(&tree, BaseParametersOptions::default()).unwrap();
+        prop_assert!(base.rank_gap() > 1e3, "rank gap {}", base.rank_gap());
+        let standard = tree.inertial_parameters();
+        let parameters = base.from_standard(&standard).unwrap();
+        let phi = dense_regressor(&tree, &state);
+        let reduced: Vec<f64> = phi.chunks_exact(standard.len())
+            .flat_map(|row| base.independent().iter().map(|&column| row[column]).collect::<Vec<_>>()).collect();
+        let torque = inverse_dynamics(&tree, &state);
+        assert_relative(&times(&reduced, &parameters), &torque, 1e-8);
+
+        // The way back: exact in the base parameters, and the reference itself when nothing has changed.
+        let changed: Vec<f64> = parameters.iter().map(|value| 1.1 * value + 0.01).collect();
+        let lifted = base.to_standard(&changed, &standard).unwrap();
+        assert_relative(&base.from_standard(&lifted).unwrap(), &changed, 1e-9);
+        assert_relative(&base.to_standard(&parameters, &standard).unwrap(), &standard, 1e-9);
+    }
+
+    #[test]
+    fn condition_number_is_that_of_the_svd_of_phi((tree, _, _) in trees(), seed in any::<u64>()) {
+        let base = BaseParameters::of_tree(&tree, BaseParametersOptions::default()).unwrap();
+        let columns = base.count();
+        let mut random = RandomNumbers::new(seed);
+        let mut rows = Vec::new();
+        while rows.len() < 3 * columns * columns {
+            let state = random_state(&tree, &mut random);
+            for row in dense_regressor(&tree, &state).chunks_exact(tree.bodies().len() * 10) {
+                rows.extend(base.independent().iter().map(|&column| row[column]));
+                rows.push(0.0);
+            }
+        }
+        let mut builder = FactorBuilder::new(columns + 1);
+        builder.push_rows(&rows).unwrap();
+        let matrix = nalgebra::DMatrix::from_row_slice(rows.len() / (columns + 1), columns + 1, &rows);
+        let values = matrix.columns(0, columns).into_owned().singular_values();
+        let expected = values.max() / values.min();
+        let found = builder.factor().condition_number().unwrap();
+        prop_assert!((found / expected - 1.0).abs() < 1e-6, "{} against {}", found, expected);
+    }
+}
+
+/// Base parameters of a robot file, or `None` where the file is absent.
+fn base_parameters_of(path: &str, held: &[&str]) -> Option<(Tree, BaseParameters)> {
+    let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..").join(path);
+    if !file.exists() {
+        println!("skipped: {path} is absent");
+        return None;
+    }
+    let held = held.iter().map(|joint| (joint.to_string(), 0.0)).collect();
+    let tree = read_urdf_file(&file, &UrdfOptions { held, ..Default::default() }).unwrap().tree;
+    let base = BaseParameters::of_tree(&tree, BaseParametersOptions::default()).unwrap();
+    println!("{path}: {} joints, {} base parameters, rank gap {:.1e}", tree.joint_count(), base.count(), base.rank_gap());
+    Some((tree, base))
+}
+
+fn check_count(path: &str, held: &[&str], joints: usize, expected: usize) {
+    if let Some((tree, base)) = base_parameters_of(path, held) {
+        assert_eq!((tree.joint_count(), base.count()), (joints, expected), "{path}");
+        assert!(base.rank_gap() > 1e3, "{path}: rank gap {}", base.rank_gap());
+    }
+}
+
+#[test]
+fn torobo_has_114_base_parameters() {
+    check_count("../shared/data/robots/torobo20/torobo20.urdf", &["torso/joint_3", "head/joint_1"], 18, 114);
+}
+
+#[test]
+fn talos_upper_body_has_120_base_parameters() {
+    let path = "../shared/data/robots/talos/talos_reduced.urdf";
+    let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..").join(path);
+    let Ok(xml) = std::fs::read_to_string(&file) else { return println!("skipped: {path} is absent") };
+    let upper_body = |joint: &str| {
+        joint.starts_with("torso_") || joint.starts_with("head_")
+            || ((joint.starts_with("arm_left_") || joint.starts_with("arm_right_")) && joint.ends_with("_joint"))
+    };
+    let all = phiw_dynamics::urdf::read_urdf(&xml, &UrdfOptions::default()).unwrap().tree;
+    let held: Vec<&str> = all.joint_names().filter(|joint| !upper_body(joint)).collect();
+    check_count(path, &held, 18, 120);
+}
+
+#[test]
+fn puma_560_has_36_base_parameters() {
+    check_count("models/puma560.urdf", &[], 6, 36);
+}
