@@ -1,2 +1,34 @@
-//! tasks
-fn main() {}
+//! Experiments and set-up of the workspace: `cargo xtask <task>`.
+
+mod environment;
+mod oracle;
+mod test;
+mod undeclared;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+#[derive(Parser)]
+#[command(name = "xtask", bin_name = "cargo xtask", about = "Experiments and set-up of phiw's workspace")]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// All checks of the workspace, and the count of tests.
+    Test(test::Arguments),
+    /// Compare with Pinocchio, installed from PyPI into a private environment.
+    Oracle(oracle::Arguments),
+    /// Robot logs with effects that nobody declared: generate, trace with `phiw explain`, score.
+    Undeclared(undeclared::Arguments),
+}
+
+fn main() -> anyhow::Result<ExitCode> {
+    match Arguments::parse().task {
+        Task::Test(arguments) => test::command(&arguments),
+        Task::Oracle(arguments) => oracle::command(&arguments),
+        Task::Undeclared(arguments) => undeclared::command(&arguments).map(|()| ExitCode::SUCCESS),
+    }
+}

@@ -1,16 +1,30 @@
 #![doc = include_str!("../README.md")]
 
+mod analytic;
+mod backend;
+mod configuration;
+mod forward_dynamics;
+mod inertia;
+mod inverse_dynamics;
+mod kinematics;
+mod ldl;
+mod mass_matrix;
 mod motion;
+pub mod random_tree;
 mod scalar;
 mod spatial;
 mod tree;
+pub mod urdf;
+mod workspace;
 
+pub use analytic::AnalyticBackend;
+pub use backend::{BackendError, DynamicsBackend};
+pub use inertia::Inertia;
 pub use motion::BodyMotion;
 pub use scalar::{Dual, Lanes, Scalar};
 pub use spatial::{Mat3, Placement, Spatial, Vec3};
-pub use tree::{
-    Body, InertialParameters, JointType, Limits, PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree,
-};
+pub use tree::{Body, InertialParameters, JointType, Limits, PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree};
+pub use workspace::Workspace;
 
 /// A slice whose length does not match the robot.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

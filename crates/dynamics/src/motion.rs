@@ -63,7 +63,14 @@ impl Tree {
     }
 
     #[inline(always)]
-    fn child_motion<T: Scalar>(&self, body: &Body, parent: &BodyMotion<T>, q: &[T], v: &[T], a: &[T]) -> BodyMotion<T> {
+    fn child_motion<T: Scalar>(
+        &self,
+        body: &Body,
+        parent: &BodyMotion<T>,
+        q: &[T],
+        v: &[T],
+        a: &[T],
+    ) -> BodyMotion<T> {
         let placement = body.placement(self.joint_position(body, q));
         let Spatial { linear, angular } = body.motion_axis::<T>();
         let (speed, acceleration) = (v[body.velocity_index], a[body.velocity_index]);

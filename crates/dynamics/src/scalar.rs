@@ -64,23 +64,23 @@ pub struct Dual {
 }
 
 macro_rules! lanes_operator {
-    ($operator:ident, $method:ident, $symbol:tt) => {
+    ($operator:ident, $method:ident, $assign:tt) => {
         impl<const N: usize> $operator for Lanes<N> {
             type Output = Self;
             #[inline(always)]
             fn $method(mut self, other: Self) -> Self {
                 for lane in 0..N {
-                    self.0[lane] = self.0[lane] $symbol other.0[lane];
+                    self.0[lane] $assign other.0[lane];
                 }
                 self
             }
         }
     };
 }
-lanes_operator!(Add, add, +);
-lanes_operator!(Sub, sub, -);
-lanes_operator!(Mul, mul, *);
-lanes_operator!(Div, div, /);
+lanes_operator!(Add, add, +=);
+lanes_operator!(Sub, sub, -=);
+lanes_operator!(Mul, mul, *=);
+lanes_operator!(Div, div, /=);
 
 impl<const N: usize> Neg for Lanes<N> {
     type Output = Self;

@@ -237,6 +237,22 @@ impl<T: Scalar> Spatial<T> {
     pub fn dot(self, other: Self) -> T {
         self.linear.dot(other.linear) + self.angular.dot(other.angular)
     }
+    /// This velocity × another motion: how that motion changes when it is carried along.
+    #[inline(always)]
+    pub fn cross_motion(self, motion: Self) -> Self {
+        Spatial {
+            linear: self.angular.cross(motion.linear) + self.linear.cross(motion.angular),
+            angular: self.angular.cross(motion.angular),
+        }
+    }
+    /// This velocity ×* a force (or momentum): how that force changes when it is carried along.
+    #[inline(always)]
+    pub fn cross_force(self, force: Self) -> Self {
+        Spatial {
+            linear: self.angular.cross(force.linear),
+            angular: self.angular.cross(force.angular) + self.linear.cross(force.linear),
+        }
+    }
     /// The motion times a scalar.
     #[inline(always)]
     pub fn scale(self, factor: T) -> Self {

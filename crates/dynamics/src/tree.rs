@@ -98,7 +98,10 @@ impl Body {
             JointType::Prismatic => {
                 let origin = self.origin.cast::<T>();
                 let along = Vec3::constant((self.origin.rotation * self.axis).0);
-                Placement { rotation: origin.rotation, translation: origin.translation + along.scale(position) }
+                Placement {
+                    rotation: origin.rotation,
+                    translation: origin.translation + along.scale(position),
+                }
             }
             _ => {
                 let (sine, cosine) = position.sin_cos();
@@ -107,8 +110,8 @@ impl Body {
                 let mut rotation = Mat3::constant(a.0);
                 for row in 0..3 {
                     for column in 0..3 {
-                        rotation.0[row][column] += T::constant(b.0[row][column]) * sine
-                            + T::constant(c.0[row][column]) * versine;
+                        rotation.0[row][column] +=
+                            T::constant(b.0[row][column]) * sine + T::constant(c.0[row][column]) * versine;
                     }
                 }
                 Placement { rotation, translation: Vec3::constant(self.origin.translation.0) }

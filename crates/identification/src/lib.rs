@@ -1,1 +1,29 @@
 #![doc = include_str!("../README.md")]
+
+mod accumulate;
+mod checks;
+mod design;
+mod effect;
+mod error;
+mod fit;
+mod identify;
+mod log_set;
+mod model;
+mod reference;
+mod sample;
+
+pub use accumulate::{BlockSource, Fold, accumulate};
+pub use checks::{InputError, check_logs};
+pub use design::{Design, DesignScratch, RowLayout};
+pub use effect::{
+    Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Entry, Evaluator,
+};
+pub use error::IdentificationError;
+pub use fit::{Fit, TorqueError, fit, merge, torque_error};
+pub use identify::{Data, Identified, Variants, identify};
+pub use log_set::{HELD_OUT_SHARE, LogFile, LogSet, Progress};
+pub use model::{
+    BodyParameters, EffectParameters, FactorRows, Model, NamedParameter, parameter_name, standard_unit,
+};
+pub use reference::ReferenceModel;
+pub use sample::{BlockReference, Needs, Sample};

@@ -1,1 +1,9 @@
 #![doc = include_str!("../README.md")]
+
+pub mod json;
+mod number;
+pub mod page;
+pub mod plot;
+
+pub use json::ReportJson;
+pub use page::IdentificationPage;

@@ -1,1 +1,40 @@
 #![doc = include_str!("../README.md")]
+
+mod block;
+mod blocks;
+mod clock;
+mod columns;
+mod conditioning;
+mod cutoff;
+mod differentiator;
+mod error;
+mod histogram;
+mod joint_survey;
+mod kernel;
+mod number;
+mod parallel_filter;
+mod plan;
+mod reader;
+mod recording;
+mod segments;
+mod spectrum;
+mod stream;
+mod survey;
+mod writer;
+
+pub use block::{Block, Signals};
+pub use clock::{Clock, ClockChoice};
+pub use columns::TorqueColumns;
+pub use conditioning::{Conditioning, ConditioningOptions};
+pub use cutoff::{Bound, CutoffSuggestion};
+pub use error::LogError;
+pub use joint_survey::{DerivativeSurvey, JointSurvey, TorqueSurvey};
+pub use kernel::{LowPass, SmoothingKernel};
+pub use parallel_filter::{FilterScratch, ParallelFilter};
+pub use plan::LogPlan;
+pub use recording::Recording;
+pub use segments::{GapCount, GapReason, Segment};
+pub use spectrum::Spectrum;
+pub use stream::{StreamSummary, stream};
+pub use survey::{Session, Survey, arrange_session, survey};
+pub use writer::{LogColumns, LogWriter};

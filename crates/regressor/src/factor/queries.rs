@@ -6,7 +6,7 @@ use faer::Mat;
 use phiw_dynamics::check_size;
 
 /// A column whose part orthogonal to the columns before it is smaller than this share of its norm is undetermined.
-const RANK_TOLERANCE: f64 = 1e-10;
+const RANK_TOLERANCE: f64 = 1e-7;
 
 /// A least-squares solution (paper, equation 4).
 #[derive(Clone, Debug, PartialEq)]

@@ -1,0 +1,125 @@
+//! The contract between algorithms that need a robot's dynamics and what provides it.
+
+use crate::DimensionError;
+
+/// Why a backend could not do what was asked.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BackendError {
+    /// A slice does not fit the robot.
+    #[error(transparent)]
+    Dimension(#[from] DimensionError),
+    /// A number given to the backend is NaN or infinite.
+    #[error("{what} has an element that is not a finite number")]
+    NotFinite {
+        /// Which argument.
+        what: &'static str,
+    },
+    /// A floating base's quaternion is not of unit length.
+    #[error("the base's quaternion has length {length}, not 1: normalise it")]
+    NotUnitQuaternion {
+        /// Its length.
+        length: f64,
+    },
+    /// The time step is not positive.
+    #[error("the time step is {dt} s: it must be positive")]
+    TimeStep {
+        /// The step \[s\].
+        dt: f64,
+    },
+    /// The robot's motion can not be computed.
+    #[error(
+        "the acceleration is not finite: the mass matrix is singular (a moving link without mass?) or the motion has diverged"
+    )]
+    Singular,
+    /// What the backend itself reports.
+    #[error("{backend}: {message}")]
+    Backend {
+        /// The backend's name.
+        backend: &'static str,
+        /// Its message.
+        message: String,
+    },
+}
+
+/// A robot's dynamics, whoever computes them: the analytic algorithms here, or a physics engine.
+///
+/// **Coordinates** are those of [`crate::Tree`]: the configuration `q` is `[x, y, z, qx, qy, qz, qw]` of a floating base
+/// (absent on a fixed one), then one position for each joint of [`joint_names`](Self::joint_names), in their order; the
+/// velocity `v` is the base's linear and angular velocity in its own frame, then one for each joint. Accelerations and
+/// generalised forces follow `v`. SI units throughout.
+///
+/// **The world** of a backend may hold a ground or noise; `inverse_dynamics` and `forward_dynamics` are the robot's own
+/// equation `M(q)·a + h(q, v) = force`, without contacts, friction or noise, and leave the state as it is.
+pub trait DynamicsBackend {
+    /// The backend's name, for messages.
+    fn name(&self) -> &str;
+
+    /// The joints that move by themselves, in the order of their coordinates.
+    fn joint_names(&self) -> &[String];
+
+    /// Elements of a velocity: one for each joint, six more for a floating base.
+    fn velocity_size(&self) -> usize;
+
+    /// Elements of a configuration: one for each joint, seven more for a floating base.
+    fn configuration_size(&self) -> usize;
+
+    /// Copies the present state into `q` and `v`.
+    ///
+    /// # Errors
+    /// A slice does not fit the robot.
+    fn state(&self, q: &mut [f64], v: &mut [f64]) -> Result<(), BackendError>;
+
+    /// Puts the robot into a state.
+    ///
+    /// # Errors
+    /// A slice does not fit the robot, a number is not finite, or a base's quaternion is not unit (to 1e-6).
+    fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), BackendError>;
+
+    /// The generalised force that the motion needs.
+    ///
+    /// # Errors
+    /// A slice does not fit the robot, or the backend fails.
+    fn inverse_dynamics(
+        &mut self,
+        q: &[f64],
+        v: &[f64],
+        a: &[f64],
+        force: &mut [f64],
+    ) -> Result<(), BackendError>;
+
+    /// The acceleration under a generalised force; for a floating base its first six elements push the base.
+    ///
+    /// # Errors
+    /// A slice does not fit the robot, the mass matrix is singular, or the backend fails.
+    fn forward_dynamics(
+        &mut self,
+        q: &[f64],
+        v: &[f64],
+        force: &[f64],
+        acceleration: &mut [f64],
+    ) -> Result<(), BackendError>;
+
+    /// Moves the state on by `dt` \[s\] under constant joint torques, one for each joint \[N·m, N\].
+    ///
+    /// A floating base is moved by gravity and by the contacts of the backend's world alone. After an error the state is
+    /// unchanged.
+    ///
+    /// # Errors
+    /// The slice does not fit the robot, a number is not finite, `dt` is not positive, or the motion diverges.
+    fn step(&mut self, torque: &[f64], dt: f64) -> Result<(), BackendError>;
+
+    /// The wrench that the world gives to the robot at its base, along the world's axes: force \[N\], then moment about
+    /// the world's origin \[N·m\]. The measured ZMP comes from it.
+    ///
+    /// It belongs to the motion of the last [`inverse_dynamics`](Self::inverse_dynamics) (what the base must be given),
+    /// or of the last [`step`](Self::step) at the instant at which the step began, whichever came later; zero before
+    /// either. Bodies that move are counted; the root link of a fixed base is not, as its inertia is not part of the
+    /// robot.
+    fn base_wrench(&self) -> [f64; 6];
+}
+
+/// An error if an element is NaN or infinite.
+pub(crate) fn check_finite(what: &'static str, values: &[f64]) -> Result<(), BackendError> {
+    if values.iter().all(|value| value.is_finite()) { Ok(()) } else { Err(BackendError::NotFinite { what }) }
+}

@@ -1,0 +1,283 @@
+//! Forward dynamics: the articulated body algorithm (ABA), or the mass matrix where mimic joints close loops.
+
+use crate::ldl::solve_in_place;
+use crate::{
+    DimensionError, Inertia, JointType, Mat3, Placement, Scalar, Spatial, Tree, Vec3, Workspace, check_size,
+};
+
+/// Inertia of a body whose joints behind it are free to move: `force = A·a + B·α`, `moment = Bᵀ·a + C·α`.
+#[derive(Clone, Copy, Debug)]
+struct ArticulatedInertia<T> {
+    linear: Mat3<T>,
+    coupling: Mat3<T>,
+    angular: Mat3<T>,
+}
+
+/// What the three passes hand on for one body.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ArticulatedBody<T> {
+    velocity: Spatial<T>,
+    /// Velocity-product acceleration v × S q̇.
+    bias_acceleration: Spatial<T>,
+    inertia: ArticulatedInertia<T>,
+    bias_force: Spatial<T>,
+    /// I·S.
+    axis_force: Spatial<T>,
+    /// SᵀIS, the inertia that the joint feels.
+    axis_inertia: T,
+    /// τ − Sᵀp.
+    joint_force: T,
+    /// Spatial acceleration less gravity.
+    acceleration: Spatial<T>,
+}
+
+impl<T: Scalar> Default for ArticulatedBody<T> {
+    fn default() -> Self {
+        ArticulatedBody {
+            velocity: Spatial::zero(),
+            bias_acceleration: Spatial::zero(),
+            inertia: ArticulatedInertia::rigid(Inertia::zero()),
+            bias_force: Spatial::zero(),
+            axis_force: Spatial::zero(),
+            axis_inertia: T::zero(),
+            joint_force: T::zero(),
+            acceleration: Spatial::zero(),
+        }
+    }
+}
+
+impl<T: Scalar> ArticulatedInertia<T> {
+    #[inline(always)]
+    fn rigid(inertia: Inertia<T>) -> Self {
+        ArticulatedInertia {
+            linear: Mat3::identity().scale(inertia.mass),
+            coupling: Mat3::skew(-inertia.moment),
+            angular: inertia.tensor,
+        }
+    }
+
+    #[inline(always)]
+    fn times(&self, motion: Spatial<T>) -> Spatial<T> {
+        Spatial {
+            linear: self.linear * motion.linear + self.coupling * motion.angular,
+            angular: self.coupling.transpose_mul(motion.linear) + self.angular * motion.angular,
+        }
+    }
+
+    /// Without what moves along the joint: `I − (I·S)(I·S)ᵀ / (SᵀIS)`.
+    #[inline(always)]
+    fn without_axis(&self, axis_force: Spatial<T>, axis_inertia: T) -> Self {
+        let Spatial { linear, angular } = axis_force;
+        let scaled = axis_force.scale(T::one() / axis_inertia);
+        ArticulatedInertia {
+            linear: self.linear - outer(linear, scaled.linear),
+            coupling: self.coupling - outer(linear, scaled.angular),
+            angular: self.angular - outer(angular, scaled.angular),
+        }
+    }
+
+    /// The same inertia seen from the outer frame.
+    #[inline(always)]
+    fn moved(&self, placement: Placement<T>) -> Self {
+        let Placement { rotation, translation } = placement;
+        let turned = |matrix: Mat3<T>| rotation * matrix * rotation.transpose();
+        let lever = Mat3::skew(translation);
+        let linear = turned(self.linear);
+        let coupling = turned(self.coupling);
+        let moved_coupling = coupling - linear * lever;
+        ArticulatedInertia {
+            linear,
+            coupling: moved_coupling,
+            angular: turned(self.angular) - coupling.transpose() * lever + lever * moved_coupling,
+        }
+    }
+}
+
+impl<T: Scalar> std::ops::Add for ArticulatedInertia<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        ArticulatedInertia {
+            linear: self.linear + other.linear,
+            coupling: self.coupling + other.coupling,
+            angular: self.angular + other.angular,
+        }
+    }
+}
+
+#[inline(always)]
+fn outer<T: Scalar>(column: Vec3<T>, row: Vec3<T>) -> Mat3<T> {
+    Mat3(column.0.map(|x| row.scale(x).0))
+}
+
+impl Tree {
+    /// Acceleration under the generalised force: `M(q)⁻¹·(force − h(q, v))`, the inverse of [`Tree::inverse_dynamics`].
+    ///
+    /// Where the robot is singular (a joint with nothing but massless links behind it) the result is not finite.
+    ///
+    /// Featherstone 1983, in body frames; with mimic joints, whose tree is no tree, by way of the mass matrix.
+    ///
+    /// # Errors
+    /// A slice or the workspace does not fit this robot.
+    #[inline(always)]
+    pub fn forward_dynamics<T: Scalar>(
+        &self,
+        q: &[T],
+        v: &[T],
+        force: &[T],
+        workspace: &mut Workspace<T>,
+        acceleration: &mut [T],
+    ) -> Result<(), DimensionError> {
+        self.check_state(q, v)?;
+        check_size("the generalised force", force.len(), self.velocity_size)?;
+        check_size("the acceleration", acceleration.len(), self.velocity_size)?;
+        workspace.check(self)?;
+        if self.has_mimic() {
+            self.solve_mass_matrix(q, v, force, workspace, acceleration);
+            return Ok(());
+        }
+        let Workspace { placements, articulated, .. } = workspace;
+        self.articulate_outward(q, v, placements, articulated);
+        self.articulate_inward(force, placements, articulated, acceleration);
+        self.accelerate_outward(q, placements, articulated, acceleration);
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn solve_mass_matrix<T: Scalar>(
+        &self,
+        q: &[T],
+        v: &[T],
+        force: &[T],
+        workspace: &mut Workspace<T>,
+        acceleration: &mut [T],
+    ) {
+        let Workspace { motions, forces, placements, composites, matrix, vector: bias, .. } = workspace;
+        acceleration.fill(T::zero());
+        self.newton_euler(q, v, acceleration, motions, forces, bias);
+        for index in 0..self.velocity_size {
+            acceleration[index] = force[index] - bias[index];
+        }
+        self.composite_rigid_bodies(q, placements, composites, matrix);
+        solve_in_place(matrix, acceleration, self.velocity_size);
+    }
+
+    /// Velocities, velocity-product terms and rigid inertias.
+    #[inline(always)]
+    fn articulate_outward<T: Scalar>(
+        &self,
+        q: &[T],
+        v: &[T],
+        placements: &mut [Placement<T>],
+        articulated: &mut [ArticulatedBody<T>],
+    ) {
+        for (index, body) in self.bodies.iter().enumerate() {
+            let (velocity, bias_acceleration) = if body.joint_type == JointType::Floating {
+                placements[index] = crate::motion::floating_placement(q);
+                (
+                    Spatial { linear: Vec3([v[0], v[1], v[2]]), angular: Vec3([v[3], v[4], v[5]]) },
+                    Spatial::zero(),
+                )
+            } else {
+                placements[index] = body.placement(self.joint_position(body, q));
+                let own = body.motion_axis().scale(v[body.velocity_index]);
+                let carried = match body.parent {
+                    Some(parent) => placements[index].motion_inverse(articulated[parent].velocity),
+                    None => Spatial::zero(),
+                };
+                (carried + own, carried.cross_motion(own))
+            };
+            let rigid = Inertia::from_parameters(&body.inertial);
+            let state = &mut articulated[index];
+            state.velocity = velocity;
+            state.bias_acceleration = bias_acceleration;
+            state.bias_force = velocity.cross_force(rigid.times(velocity));
+            state.inertia = ArticulatedInertia::rigid(rigid);
+        }
+    }
+
+    /// Articulated inertias and bias forces; the base's acceleration where it floats.
+    #[inline(always)]
+    fn articulate_inward<T: Scalar>(
+        &self,
+        force: &[T],
+        placements: &[Placement<T>],
+        articulated: &mut [ArticulatedBody<T>],
+        acceleration: &mut [T],
+    ) {
+        for (index, body) in self.bodies.iter().enumerate().rev() {
+            if body.joint_type == JointType::Floating {
+                solve_base(&mut articulated[index], force, acceleration);
+                continue;
+            }
+            let state = &mut articulated[index];
+            let axis = body.motion_axis();
+            state.axis_force = state.inertia.times(axis);
+            state.axis_inertia = axis.dot(state.axis_force);
+            state.joint_force = force[body.velocity_index] - axis.dot(state.bias_force);
+            let state = *state;
+            if let Some(parent) = body.parent {
+                let inertia = state.inertia.without_axis(state.axis_force, state.axis_inertia);
+                let bias = state.bias_force
+                    + inertia.times(state.bias_acceleration)
+                    + state.axis_force.scale(state.joint_force / state.axis_inertia);
+                let parent = &mut articulated[parent];
+                parent.inertia = parent.inertia + inertia.moved(placements[index]);
+                parent.bias_force = parent.bias_force + placements[index].force(bias);
+            }
+        }
+    }
+
+    /// Accelerations of the joints.
+    #[inline(always)]
+    fn accelerate_outward<T: Scalar>(
+        &self,
+        q: &[T],
+        placements: &[Placement<T>],
+        articulated: &mut [ArticulatedBody<T>],
+        acceleration: &mut [T],
+    ) {
+        let upward = Spatial { linear: -Vec3::constant(self.gravity), angular: Vec3::zero() };
+        for (index, body) in self.bodies.iter().enumerate() {
+            if body.joint_type == JointType::Floating {
+                // What the base feels is its acceleration less gravity; the coordinates want the acceleration itself.
+                let rotation = crate::motion::floating_placement(q).rotation;
+                let gravity = rotation.transpose_mul(Vec3::constant(self.gravity));
+                for axis in 0..3 {
+                    acceleration[axis] += gravity.0[axis];
+                }
+                continue;
+            }
+            let outer = body.parent.map_or(upward, |parent| articulated[parent].acceleration);
+            let state = &mut articulated[index];
+            let carried = placements[index].motion_inverse(outer) + state.bias_acceleration;
+            let own = (state.joint_force - state.axis_force.dot(carried)) / state.axis_inertia;
+            acceleration[body.velocity_index] = own;
+            state.acceleration = carried + body.motion_axis().scale(own);
+        }
+    }
+}
+
+/// Solves the six equations of a floating base; leaves its acceleration less gravity in `acceleration` and in the state.
+#[inline(always)]
+fn solve_base<T: Scalar>(state: &mut ArticulatedBody<T>, force: &[T], acceleration: &mut [T]) {
+    let ArticulatedInertia { linear, coupling, angular } = state.inertia;
+    let mut matrix = [T::zero(); 36];
+    for row in 0..3 {
+        for column in 0..3 {
+            matrix[6 * row + column] = linear.0[row][column];
+            matrix[6 * row + 3 + column] = coupling.0[row][column];
+            matrix[6 * (row + 3) + column] = coupling.0[column][row];
+            matrix[6 * (row + 3) + 3 + column] = angular.0[row][column];
+        }
+    }
+    for axis in 0..3 {
+        acceleration[axis] = force[axis] - state.bias_force.linear.0[axis];
+        acceleration[axis + 3] = force[axis + 3] - state.bias_force.angular.0[axis];
+    }
+    solve_in_place(&mut matrix, &mut acceleration[..6], 6);
+    state.acceleration = Spatial {
+        linear: Vec3([acceleration[0], acceleration[1], acceleration[2]]),
+        angular: Vec3([acceleration[3], acceleration[4], acceleration[5]]),
+    };
+}

@@ -1,0 +1,211 @@
+//! What makes a URDF unusable.
+
+/// Why a URDF cannot be read as a robot, or written.
+///
+/// What can be read but should not be trusted is a [`Finding`](super::Finding) instead.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum UrdfError {
+    /// The file cannot be read.
+    #[error("cannot read `{path}`: {source}")]
+    Unreadable {
+        /// The file.
+        path: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The text is not well-formed XML.
+    #[error("not a URDF: it is not XML: {0}")]
+    NotXml(#[from] roxmltree::Error),
+    /// The XML's root is not `<robot>`.
+    #[error("not a URDF: its outermost element is <{root}>, not <robot>")]
+    NotRobot {
+        /// The outermost element.
+        root: String,
+    },
+    /// The file is a xacro template.
+    #[error(
+        "this is a xacro template, not yet a URDF: expand it first (`xacro robot.urdf.xacro > robot.urdf`)"
+    )]
+    Xacro,
+    /// The XML is a `<robot>`, but something required is missing or is not a number.
+    #[error("not a valid URDF: {0}")]
+    Malformed(#[from] urdf_rs::UrdfError),
+    /// An element lacks a part without which it means nothing.
+    #[error("line {line}: {element} lacks {lacks}")]
+    Incomplete {
+        /// Where it starts.
+        line: u32,
+        /// The element, with its name.
+        element: String,
+        /// What it lacks.
+        lacks: &'static str,
+    },
+    /// An attribute that should hold one number, or three, does not.
+    #[error("line {line}, {element}: {attribute}=\"{value}\" is not {expected}")]
+    NotANumber {
+        /// Where the attribute's element starts.
+        line: u32,
+        /// The link or joint, with its name.
+        element: String,
+        /// The attribute.
+        attribute: &'static str,
+        /// Its value.
+        value: String,
+        /// `a number` or `three numbers`.
+        expected: &'static str,
+    },
+    /// Two links or two joints share a name.
+    #[error("two {kind}s are called `{name}`: rename one")]
+    Duplicate {
+        /// `link` or `joint`.
+        kind: &'static str,
+        /// The shared name.
+        name: String,
+    },
+    /// A joint names a link that the file does not define.
+    #[error(
+        "joint `{joint}` names the link `{link}`, which the URDF does not define{}",
+        did_you_mean(nearest)
+    )]
+    UnknownLink {
+        /// The joint.
+        joint: String,
+        /// The link it names.
+        link: String,
+        /// The nearest name that there is.
+        nearest: Option<String>,
+    },
+    /// A link is the child of two joints.
+    #[error(
+        "link `{link}` is the child of both joint `{first}` and joint `{second}`: only trees can be read, cut the loop at one of them"
+    )]
+    TwoParents {
+        /// The link.
+        link: String,
+        /// One joint.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// More than one link has no parent.
+    #[error("several links have no parent ({}): connect them by joints or remove all but one", quoted(links))]
+    SeveralRoots {
+        /// Those links.
+        links: Vec<String>,
+    },
+    /// Links that follow each other in a circle.
+    #[error("these links follow each other in a circle, so that no root reaches them: {}", quoted(links))]
+    Cycle {
+        /// Links that no root reaches.
+        links: Vec<String>,
+    },
+    /// There is no `<link>`.
+    #[error("the URDF has no link")]
+    NoLinks,
+    /// Nothing moves.
+    #[error("no joint of the URDF moves: all are fixed or held")]
+    NoMovingJoints,
+    /// A joint that is to be held is not in the URDF.
+    #[error("cannot hold the joint `{joint}`: the URDF has no joint of that name{}", did_you_mean(nearest))]
+    UnknownHeldJoint {
+        /// The name given.
+        joint: String,
+        /// The nearest name that there is.
+        nearest: Option<String>,
+    },
+    /// A `<mimic>` follows a joint that is not in the URDF.
+    #[error(
+        "joint `{joint}` mimics `{leader}`, but the URDF has no joint of that name{}",
+        did_you_mean(nearest)
+    )]
+    UnknownLeader {
+        /// The follower.
+        joint: String,
+        /// The joint that it names.
+        leader: String,
+        /// The nearest name that there is.
+        nearest: Option<String>,
+    },
+    /// A `<mimic>` follows a joint without a single position.
+    #[error("joint `{joint}` mimics `{leader}`, which is {kind} and has no single position to follow")]
+    LeaderWithoutPosition {
+        /// The follower.
+        joint: String,
+        /// The leader.
+        leader: String,
+        /// The leader's type.
+        kind: &'static str,
+    },
+    /// `<mimic>` joints follow each other in a circle.
+    #[error("joint `{joint}` mimics itself, directly or through others")]
+    MimicLoop {
+        /// A joint of the circle.
+        joint: String,
+    },
+    /// A joint type that cannot be modelled.
+    #[error(
+        "joint `{joint}` is of the type {kind}, which is not supported: hold it (`--hold {joint}`) or make it two or three simple joints"
+    )]
+    UnsupportedJoint {
+        /// The joint.
+        joint: String,
+        /// Its type.
+        kind: String,
+    },
+    /// A floating joint elsewhere than alone behind the root link.
+    #[error(
+        "joint `{joint}` is floating but not the only joint of the root link: only a base can float; hold it or make it fixed"
+    )]
+    FloatingNotAtRoot {
+        /// The joint.
+        joint: String,
+    },
+    /// A moving joint whose axis is zero.
+    #[error("the axis of joint `{joint}` is zero: give it a direction")]
+    ZeroAxis {
+        /// The joint.
+        joint: String,
+    },
+    /// NaN or infinity.
+    #[error("{kind} `{name}`: {field} is not a finite number")]
+    NotFinite {
+        /// `link` or `joint`.
+        kind: &'static str,
+        /// Its name.
+        name: String,
+        /// Which of its numbers.
+        field: &'static str,
+    },
+    /// Writing: the URDF is not the one that the tree was read from.
+    #[error("the URDF to write has no {kind} `{name}`: it is not the one that the robot was read from")]
+    OtherRobot {
+        /// `link` or `joint`.
+        kind: &'static str,
+        /// Its name.
+        name: String,
+    },
+    /// Writing: a first moment without mass has no centre of mass.
+    #[error("link `{link}` has a first moment but no mass, which URDF cannot express: give it some mass")]
+    MomentWithoutMass {
+        /// The link.
+        link: String,
+    },
+}
+
+/// The name among `names` that is most like `name`, if any is much like it.
+pub(super) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Option<String> {
+    names
+        .map(|candidate| (strsim::normalized_damerau_levenshtein(name, candidate), candidate))
+        .filter(|(similarity, _)| *similarity > 0.5)
+        .max_by(|(a, _), (b, _)| a.total_cmp(b))
+        .map(|(_, candidate)| candidate.to_owned())
+}
+
+fn did_you_mean(nearest: &Option<String>) -> String {
+    nearest.as_ref().map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
+}
+
+fn quoted(names: &[String]) -> String {
+    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,68 @@
+//! Robots from URDF files, and back.
+//!
+//! [`read_urdf`] builds the [`Tree`] and tells what in the file should not be trusted ([`Finding`]): a URDF without
+//! inertials, with massless links or impossible inertias is read all the same. [`write_identified_urdf`] writes the
+//! tree's parameters into the URDF that it came from.
+
+mod assemble;
+mod error;
+mod finding;
+mod inertial;
+mod joint;
+mod movement;
+mod source;
+mod splice;
+mod topology;
+mod write;
+
+pub use error::UrdfError;
+pub use finding::Finding;
+pub use write::{JointFriction, write_identified_urdf};
+
+use crate::Tree;
+use std::path::Path;
+
+/// How to read a URDF.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct UrdfOptions {
+    /// The root link floats: it becomes body 0 and keeps its inertia. A `floating` joint alone behind the root link
+    /// has the same effect.
+    pub floating_base: bool,
+    /// Joints that are fixed, and at which position \[rad, m\]; what they carry is merged into their parent.
+    pub held: Vec<(String, f64)>,
+}
+
+/// A robot, and what is to be said of its URDF.
+#[derive(Clone, Debug)]
+pub struct UrdfReading {
+    /// The robot.
+    pub tree: Tree,
+    /// What should not be trusted, in the order of the bodies.
+    pub findings: Vec<Finding>,
+}
+
+/// Reads a robot from the text of a URDF.
+///
+/// Joints are in depth-first order, children in the order of the file. Links behind fixed and held joints are merged
+/// into the moving link before them; on a fixed base what is fixed to the world is left out, since no joint feels it.
+///
+/// # Errors
+/// The text is not a URDF, its links are not a tree, a joint is of a type that is not supported, a name is unknown, a
+/// number is not finite, or nothing moves.
+pub fn read_urdf(xml: &str, options: &UrdfOptions) -> Result<UrdfReading, UrdfError> {
+    let (robot, declared) = source::read(xml)?;
+    let topology = topology::Topology::new(&robot)?;
+    let movements = movement::movements(&robot, options)?;
+    assemble::assemble(&robot, declared, &topology, &movements, options.floating_base)
+}
+
+/// [`read_urdf`] from a file.
+///
+/// # Errors
+/// As [`read_urdf`], or the file cannot be read.
+pub fn read_urdf_file(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<UrdfReading, UrdfError> {
+    let path = path.as_ref();
+    let xml = std::fs::read_to_string(path)
+        .map_err(|source| UrdfError::Unreadable { path: path.display().to_string(), source })?;
+    read_urdf(&xml, options)
+}

@@ -1,0 +1,103 @@
+//! Which joints move by themselves, which follow another, and which stand still.
+
+use super::error::nearest;
+use super::{UrdfError, UrdfOptions};
+use std::collections::HashMap;
+use urdf_rs::{Joint, JointType, Robot};
+
+/// How a joint gets its position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Movement {
+    /// It stands still at this position: fixed, held, or (`led`) following a joint that stands still.
+    Still { position: f64, led: bool },
+    /// It has a coordinate of its own.
+    Free,
+    /// Position = `ratio` · position of the joint with index `leader` + `offset`.
+    Follows { leader: usize, ratio: f64, offset: f64 },
+}
+
+/// The movement of every joint, in the order of the file.
+pub(super) fn movements(robot: &Robot, options: &UrdfOptions) -> Result<Vec<Movement>, UrdfError> {
+    let indices: HashMap<&str, usize> =
+        robot.joints.iter().enumerate().map(|(index, joint)| (joint.name.as_str(), index)).collect();
+    let mut held = HashMap::new();
+    for (name, position) in &options.held {
+        let Some(&index) = indices.get(name.as_str()) else {
+            return Err(UrdfError::UnknownHeldJoint {
+                joint: name.clone(),
+                nearest: nearest(name, indices.keys().copied()),
+            });
+        };
+        if !position.is_finite() {
+            return Err(UrdfError::NotFinite {
+                kind: "joint",
+                name: name.clone(),
+                field: "the held position",
+            });
+        }
+        held.insert(index, *position);
+    }
+    (0..robot.joints.len()).map(|joint| movement(robot, &indices, &held, joint)).collect()
+}
+
+/// Goes along the chain of leaders to one that is free or still.
+fn movement(
+    robot: &Robot,
+    indices: &HashMap<&str, usize>,
+    held: &HashMap<usize, f64>,
+    follower: usize,
+) -> Result<Movement, UrdfError> {
+    let (mut current, mut ratio, mut offset) = (follower, 1.0, 0.0);
+    for _ in 0..=robot.joints.len() {
+        let joint = &robot.joints[current];
+        if let Some(position) = still_at(joint, held.get(&current)) {
+            return Ok(Movement::Still { position: ratio * position + offset, led: current != follower });
+        }
+        match (unsingle(joint), current == follower) {
+            (Some("floating"), true) => return Ok(Movement::Free),
+            (Some(kind), true) => {
+                return Err(UrdfError::UnsupportedJoint { joint: joint.name.clone(), kind: kind.to_owned() });
+            }
+            (Some(kind), false) => {
+                return Err(UrdfError::LeaderWithoutPosition {
+                    joint: robot.joints[follower].name.clone(),
+                    leader: joint.name.clone(),
+                    kind,
+                });
+            }
+            (None, _) => {}
+        }
+        let Some(mimic) = &joint.mimic else {
+            return Ok(match (current == follower, ratio) {
+                (true, _) => Movement::Free,
+                (false, 0.0) => Movement::Still { position: offset, led: true },
+                (false, _) => Movement::Follows { leader: current, ratio, offset },
+            });
+        };
+        current = *indices.get(mimic.joint.as_str()).ok_or_else(|| UrdfError::UnknownLeader {
+            joint: joint.name.clone(),
+            leader: mimic.joint.clone(),
+            nearest: nearest(&mimic.joint, indices.keys().copied()),
+        })?;
+        offset += ratio * mimic.offset.unwrap_or(0.0);
+        ratio *= mimic.multiplier.unwrap_or(1.0);
+    }
+    Err(UrdfError::MimicLoop { joint: robot.joints[follower].name.clone() })
+}
+
+fn still_at(joint: &Joint, held: Option<&f64>) -> Option<f64> {
+    match joint.joint_type {
+        JointType::Fixed => Some(0.0),
+        _ => held.copied(),
+    }
+}
+
+/// The name of a joint type that is not described by a single position.
+fn unsingle(joint: &Joint) -> Option<&'static str> {
+    match joint.joint_type {
+        JointType::Floating => Some("floating"),
+        JointType::Planar => Some("planar"),
+        JointType::Spherical => Some("spherical"),
+        _ => None,
+    }
+}

@@ -1,0 +1,172 @@
+//! Blocks of conditioned samples into factors, one for each torque and fold, in parallel and in constant memory.
+
+use crate::{Design, IdentificationError};
+use phiw_regressor::RegressorError;
+use phiw_regressor::factor::{Factor, FactorBuilder};
+use phiw_regressor::least_squares::{Group, GroupedFactor};
+use phiw_telemetry::{Block, FilterScratch, LogError};
+use rayon::prelude::*;
+
+/// Where blocks come from: a log on disk, a recording in memory, a simulator. Each call brings the same blocks again.
+pub trait BlockSource: Sync {
+    /// Hands every block to `sink`, in order.
+    ///
+    /// # Errors
+    /// The log cannot be read.
+    fn blocks(&self, sink: &mut dyn FnMut(Block)) -> Result<(), LogError>;
+}
+
+/// A stretch of time of one log whose rows are kept apart: to be left out, or held out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fold {
+    /// Which log of the session.
+    pub log: usize,
+    /// Its first moment \[s\], in the log's own time.
+    pub start: f64,
+    /// Its end \[s\], not included.
+    pub end: f64,
+}
+
+impl Fold {
+    fn contains(&self, log: usize, t: f64) -> bool {
+        self.log == log && self.start <= t && t < self.end
+    }
+}
+
+/// Blocks that wait for the processors; more would cost memory only.
+const BLOCKS_PER_THREAD: usize = 2;
+
+/// The factors of `design` over each fold: \[Φ f\] of each torque, after the parallel filter.
+///
+/// Every block is reduced by itself and the results are merged in the order of the blocks, so the outcome does not depend on the
+/// number of threads.
+///
+/// # Errors
+/// A log cannot be read, or a block has not the robot's joints.
+pub fn accumulate(
+    design: &Design,
+    folds: &[Fold],
+    sources: &[&dyn BlockSource],
+) -> Result<Vec<GroupedFactor>, IdentificationError> {
+    let mut merged: Vec<Vec<Option<Factor>>> = vec![vec![None; design.rows().len()]; folds.len()];
+    let batch_size = BLOCKS_PER_THREAD * rayon::current_num_threads();
+    let mut failure = None;
+    for source in sources {
+        let mut batch = Vec::with_capacity(batch_size);
+        source.blocks(&mut |block| {
+            batch.push(block);
+            if batch.len() == batch_size && failure.is_none() {
+                failure = reduce(design, folds, std::mem::take(&mut batch), &mut merged).err();
+            }
+        })?;
+        if failure.is_none() {
+            failure = reduce(design, folds, batch, &mut merged).err();
+        }
+        if let Some(error) = failure {
+            return Err(error);
+        }
+    }
+    let group = |(factor, layout): (Option<Factor>, &crate::RowLayout)| Group {
+        factor: factor.unwrap_or_else(|| Factor::empty(layout.range.len())),
+        parameters: layout.parameters.clone(),
+    };
+    let grouped = |rows: Vec<Option<Factor>>| {
+        let groups = rows.into_iter().zip(design.rows()).map(group).collect();
+        Ok(GroupedFactor::new(design.parameter_count(), groups)?)
+    };
+    merged.into_iter().map(grouped).collect()
+}
+
+fn reduce(
+    design: &Design,
+    folds: &[Fold],
+    batch: Vec<Block>,
+    merged: &mut [Vec<Option<Factor>>],
+) -> Result<(), IdentificationError> {
+    let reduced: Result<Vec<Vec<Piece>>, RegressorError> =
+        batch.into_par_iter().map_init(|| Worker::new(design), |worker, block| worker.reduce(folds, block)).collect();
+    for piece in reduced?.into_iter().flatten() {
+        let targets = merged[piece.fold].par_iter_mut().zip(piece.factors);
+        targets.try_for_each(|(target, factor)| {
+            *target = Some(match target.take() {
+                Some(before) => before.merge(&factor)?,
+                None => factor,
+            });
+            Ok::<(), RegressorError>(())
+        })?;
+    }
+    Ok(())
+}
+
+/// What one block adds to one fold: a factor for each torque.
+struct Piece {
+    fold: usize,
+    factors: Vec<Factor>,
+}
+
+struct Worker<'a> {
+    design: &'a Design,
+    scratch: crate::DesignScratch<'a>,
+    filter: FilterScratch,
+    builders: Vec<FactorBuilder>,
+}
+
+impl<'a> Worker<'a> {
+    fn new(design: &'a Design) -> Self {
+        Worker {
+            design,
+            scratch: design.scratch(),
+            filter: FilterScratch::default(),
+            builders: design.rows().iter().map(|layout| FactorBuilder::new(layout.range.len())).collect(),
+        }
+    }
+
+    fn reduce(&mut self, folds: &[Fold], mut block: Block) -> Result<Vec<Piece>, RegressorError> {
+        self.design.correct(&mut block);
+        self.scratch.begin(&block)?;
+        let design = self.design;
+        let (scratch, builders, rows) = (&mut self.scratch, &mut self.builders, design.rows());
+        let mut pieces = Vec::new();
+        let mut current = None;
+        let mut failure = None;
+        let mut failed = |result: Result<(), RegressorError>| {
+            if let Err(error) = result {
+                failure.get_or_insert(error);
+            }
+        };
+        let mut evaluated = Ok(());
+        block.filter(
+            self.design.evaluation_width(),
+            &mut self.filter,
+            |sample, row| {
+                if evaluated.is_ok() {
+                    evaluated = scratch.evaluate(&block, sample, row);
+                }
+            },
+            |_, t, row| {
+                let fold = folds.iter().position(|fold| fold.contains(block.log, t));
+                if fold != current {
+                    finish(current, builders, &mut pieces);
+                    current = fold;
+                }
+                if fold.is_some() {
+                    for (joint, (builder, layout)) in builders.iter_mut().zip(rows).enumerate() {
+                        if design.counts(row, joint) {
+                            failed(builder.push_row(&row[layout.range.clone()]));
+                        }
+                    }
+                }
+            },
+        );
+        finish(current, builders, &mut pieces);
+        evaluated?;
+        failure.map_or(Ok(pieces), Err)
+    }
+}
+
+fn finish(fold: Option<usize>, builders: &mut [FactorBuilder], pieces: &mut Vec<Piece>) {
+    let Some(fold) = fold else { return };
+    let factors = builders.iter_mut().map(FactorBuilder::factor).collect();
+    builders.iter_mut().for_each(FactorBuilder::clear);
+    pieces.push(Piece { fold, factors });
+}

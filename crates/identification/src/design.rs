@@ -1,0 +1,247 @@
+//! The columns of a model: which parameter acts on which torque, and the numbers of one sample.
+
+use crate::effect::{Effect, EffectParameter, Evaluator};
+use crate::{BlockReference, Needs, ReferenceModel, Sample};
+use phiw_dynamics::{DimensionError, PARAMETERS_PER_BODY, Tree};
+use phiw_regressor::{BaseParameters, JointTorqueRegressor, RegressorScratch};
+use phiw_telemetry::Block;
+use std::ops::Range;
+
+/// The columns of one torque, in the order of its row.
+#[derive(Clone, Debug)]
+pub struct RowLayout {
+    /// The parameter of each column: base parameters first, then those of the effects.
+    pub parameters: Vec<usize>,
+    /// Where the row stands in the concatenation of all rows; its last number is the measured torque.
+    pub range: Range<usize>,
+    /// For the inertial columns, their place in the regressor's pairs.
+    gather: Vec<usize>,
+    /// For the effects' columns, their place in the concatenation of all effects' columns.
+    effects: Vec<usize>,
+}
+
+/// A robot's rigid body plus effects, as columns.
+pub struct Design {
+    tree: Tree,
+    base: BaseParameters,
+    regressor: JointTorqueRegressor,
+    effects: Vec<Box<dyn Effect>>,
+    /// First parameter of each effect, and one past the last.
+    effect_parameters: Vec<Range<usize>>,
+    effect_columns: Vec<Range<usize>>,
+    rows: Vec<RowLayout>,
+    width: usize,
+    needs: Needs,
+    reference: Option<ReferenceModel>,
+    rest_speeds: Vec<f64>,
+}
+
+/// Working memory to evaluate a design over one block.
+pub struct DesignScratch<'a> {
+    design: &'a Design,
+    evaluators: Vec<Box<dyn Evaluator + 'a>>,
+    regressor: RegressorScratch<f64>,
+    pairs: Vec<f64>,
+    /// The pairs at rest under unit gravity along x, y, z, where some effect needs them.
+    statics: Vec<f64>,
+    unit_gravity: Vec<Tree>,
+    rest: Vec<f64>,
+    columns: Vec<f64>,
+    reference: BlockReference,
+}
+
+impl Design {
+    /// The columns of the base parameters and of `effects`, in that order.
+    pub fn new(tree: Tree, base: BaseParameters, effects: Vec<Box<dyn Effect>>) -> Self {
+        let regressor = JointTorqueRegressor::new(&tree);
+        let (mut effect_parameters, mut effect_columns) = (Vec::new(), Vec::new());
+        let (mut parameter, mut column) = (base.count(), 0);
+        let mut columns_of_row = vec![Vec::new(); regressor.rows()];
+        for effect in &effects {
+            let entries = effect.entries();
+            for (index, entry) in entries.iter().enumerate() {
+                columns_of_row[entry.row].push((parameter + entry.parameter, column + index));
+            }
+            let count = effect.parameters().len();
+            effect_parameters.push(parameter..parameter + count);
+            effect_columns.push(column..column + entries.len());
+            parameter += count;
+            column += entries.len();
+        }
+        let mut rows = Vec::with_capacity(regressor.rows());
+        let mut start = 0;
+        for (row, effect_columns) in columns_of_row.into_iter().enumerate() {
+            let mut layout =
+                RowLayout { parameters: Vec::new(), range: 0..0, gather: Vec::new(), effects: Vec::new() };
+            let pairs = regressor.row_range(row).step_by(PARAMETERS_PER_BODY);
+            for (pair, &body) in pairs.zip(regressor.row_bodies(row)) {
+                let own = body * PARAMETERS_PER_BODY..(body + 1) * PARAMETERS_PER_BODY;
+                let first = base.independent().partition_point(|&column| column < own.start);
+                for (parameter, &column) in base.independent().iter().enumerate().skip(first) {
+                    if column >= own.end {
+                        break;
+                    }
+                    layout.parameters.push(parameter);
+                    layout.gather.push(pair + column - own.start);
+                }
+            }
+            for (parameter, column) in effect_columns {
+                layout.parameters.push(parameter);
+                layout.effects.push(column);
+            }
+            layout.range = start..start + layout.parameters.len() + 1;
+            start = layout.range.end;
+            rows.push(layout);
+        }
+        let needs = effects.iter().fold(Needs::default(), |needs, effect| needs.union(effect.needs()));
+        Design { tree, base, regressor, effects, effect_parameters, effect_columns, rows, width: start, needs, reference: None, rest_speeds: Vec::new() }
+    }
+
+    /// The same with the speed of each torque's joint below which it stands still \[rad/s, m/s\].
+    ///
+    /// A joint at rest may carry any torque within its static friction, whatever the model: a filtered row counts for a torque only if its joint
+    /// moves in at least half of the filter's window. Passing through zero at a reversal is no rest.
+    pub fn with_rest_speeds(mut self, rest_speeds: Vec<f64>) -> Self {
+        self.rest_speeds = rest_speeds;
+        self
+    }
+
+    /// Numbers that [`DesignScratch::evaluate`] writes: all rows, then for each torque one while its joint moves and zero while it rests.
+    pub fn evaluation_width(&self) -> usize {
+        self.width + self.rows.len()
+    }
+
+    /// Whether a filtered evaluation counts for the torque `row`.
+    pub fn counts(&self, evaluation: &[f64], row: usize) -> bool {
+        evaluation[self.width + row] >= 0.5
+    }
+
+    /// The same with a rigid-body model for the effects whose columns need torques.
+    pub fn with_reference(mut self, reference: ReferenceModel) -> Self {
+        self.reference = Some(reference);
+        self
+    }
+
+    /// The design with only the `chosen` effects, in that order.
+    pub fn keep(self, chosen: &[usize]) -> Self {
+        let mut effects: Vec<Option<Box<dyn Effect>>> = self.effects.into_iter().map(Some).collect();
+        let kept = chosen.iter().filter_map(|&effect| effects.get_mut(effect).and_then(Option::take)).collect();
+        Design { reference: self.reference, rest_speeds: self.rest_speeds, ..Design::new(self.tree, self.base, kept) }
+    }
+
+    /// The robot.
+    pub fn tree(&self) -> &Tree {
+        &self.tree
+    }
+    /// The base parameters.
+    pub fn base(&self) -> &BaseParameters {
+        &self.base
+    }
+    /// The effects beside the rigid body.
+    pub fn effects(&self) -> &[Box<dyn Effect>] {
+        &self.effects
+    }
+    /// The parameters of an effect, as indices into all parameters.
+    pub fn effect_parameters(&self, effect: usize) -> Range<usize> {
+        self.effect_parameters[effect].clone()
+    }
+    /// Number of parameters: base parameters, then those of each effect.
+    pub fn parameter_count(&self) -> usize {
+        self.effect_parameters.last().map_or(self.base.count(), |range| range.end)
+    }
+    /// The columns of each torque.
+    pub fn rows(&self) -> &[RowLayout] {
+        &self.rows
+    }
+    /// Numbers in the concatenation of all rows.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+    /// Names, units and joints of the effects' parameters, in order.
+    pub fn effect_parameter_info(&self) -> Vec<EffectParameter> {
+        self.effects.iter().flat_map(|effect| effect.parameters()).collect()
+    }
+
+    /// Applies the effects' corrections of the signals.
+    pub fn correct(&self, block: &mut Block) {
+        self.effects.iter().for_each(|effect| effect.correct(block));
+    }
+
+    /// Working memory for one block.
+    pub fn scratch(&self) -> DesignScratch<'_> {
+        let unit_gravity = |axis: usize| {
+            let mut tree = self.tree.clone();
+            tree.gravity = std::array::from_fn(|other| if other == axis { 1.0 } else { 0.0 });
+            tree
+        };
+        let axes = if self.needs.statics { 0..3 } else { 0..0 };
+        DesignScratch {
+            design: self,
+            statics: vec![0.0; axes.len() * self.regressor.buffer_size()],
+            unit_gravity: axes.map(unit_gravity).collect(),
+            rest: vec![0.0; self.tree.velocity_size()],
+            evaluators: self.effects.iter().map(|effect| effect.evaluator()).collect(),
+            regressor: self.regressor.scratch(),
+            pairs: vec![0.0; self.regressor.buffer_size()],
+            columns: vec![0.0; self.effect_columns.last().map_or(0, |range| range.end)],
+            reference: BlockReference::default(),
+        }
+    }
+}
+
+impl DesignScratch<'_> {
+    /// Makes ready for a block: the reference model's torques, and the memory of effects that have some.
+    ///
+    /// # Errors
+    /// The block has not the robot's joints.
+    pub fn begin(&mut self, block: &Block) -> Result<(), DimensionError> {
+        if let Some(reference) = &self.design.reference {
+            reference.evaluate(block, self.design.needs, &mut self.reference)?;
+        }
+        self.evaluators.iter_mut().for_each(|evaluator| evaluator.restart());
+        for sample in 0..block.warm_up {
+            self.evaluate_effects(block, sample);
+        }
+        Ok(())
+    }
+
+    /// All rows of one sample, side by side as [`RowLayout::range`] says: columns, then the measured torque. After them, which joints move.
+    ///
+    /// Samples must come in order, from the block's warm-up on.
+    ///
+    /// # Errors
+    /// The block has not the robot's joints.
+    pub fn evaluate(&mut self, block: &Block, sample: usize, out: &mut [f64]) -> Result<(), DimensionError> {
+        let design = self.design;
+        let row = block.row(sample);
+        let (q, v, a) = (&block.q[row.clone()], &block.qd[row.clone()], &block.qdd[row.clone()]);
+        design.regressor.compute(&design.tree, q, v, a, &mut self.regressor, &mut self.pairs)?;
+        let statics = self.statics.chunks_exact_mut(self.pairs.len().max(1));
+        for (tree, pairs) in self.unit_gravity.iter().zip(statics) {
+            design.regressor.compute(tree, q, &self.rest, &self.rest, &mut self.regressor, pairs)?;
+        }
+        self.evaluate_effects(block, sample);
+        for (joint, layout) in design.rows.iter().enumerate() {
+            let out = &mut out[layout.range.clone()];
+            let (inertial, rest) = out.split_at_mut(layout.gather.len());
+            inertial.iter_mut().zip(&layout.gather).for_each(|(value, &place)| *value = self.pairs[place]);
+            rest.iter_mut().zip(&layout.effects).for_each(|(value, &place)| *value = self.columns[place]);
+            if let Some(last) = rest.last_mut() {
+                *last = block.tau.get(row.start + joint).copied().unwrap_or_default();
+            }
+        }
+        for (joint, moves) in out[design.width..].iter_mut().enumerate() {
+            let rest_speed = design.rest_speeds.get(joint).copied().unwrap_or(-1.0);
+            *moves = f64::from(u8::from(v[joint].abs() > rest_speed));
+        }
+        Ok(())
+    }
+
+    fn evaluate_effects(&mut self, block: &Block, index: usize) {
+        let sample =
+            Sample { block, reference: &self.reference, index, regressor: &self.pairs, statics: &self.statics };
+        for (evaluator, range) in self.evaluators.iter_mut().zip(&self.design.effect_columns) {
+            evaluator.evaluate(&sample, &mut self.columns[range.clone()]);
+        }
+    }
+}

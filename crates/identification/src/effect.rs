@@ -1,0 +1,149 @@
+//! What an effect is to a fit: some columns beside the inertial ones.
+//!
+//! This crate knows no effect by name. A catalogue (`phiw-residual` has one) or a user brings them.
+
+use crate::{Needs, Sample};
+use phiw_dynamics::Tree;
+use phiw_telemetry::Block;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Names an effect: its kind, the joints that it acts on, and the constants in which it is not linear.
+///
+/// Enough to build the effect again, so it is what a model file holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EffectSpec {
+    /// Kind, as in the catalogue (`viscous_friction`, …).
+    pub kind: String,
+    /// Names of the joints that it acts on.
+    pub joints: Vec<String>,
+    /// Non-linear constants by name (SI units), such as the width of a smoothed sign \[rad/s\].
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub constants: BTreeMap<String, f64>,
+}
+
+impl EffectSpec {
+    /// An effect without constants.
+    pub fn new(kind: &str, joints: &[&str]) -> Self {
+        let joints = joints.iter().map(|joint| (*joint).to_owned()).collect();
+        EffectSpec { kind: kind.to_owned(), joints, constants: BTreeMap::new() }
+    }
+
+    /// The same with a constant set.
+    pub fn with(mut self, constant: &str, value: f64) -> Self {
+        self.constants.insert(constant.to_owned(), value);
+        self
+    }
+}
+
+/// A parameter that an effect adds to the fit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EffectParameter {
+    /// The joint that it is reported under.
+    pub joint: String,
+    /// Its name (`fv`, `fc`, …).
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Physical bounds: a friction is not negative.
+    pub bounds: (f64, f64),
+}
+
+/// One column of an effect: the numbers of `parameter` in the torque of coordinate `row`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Velocity coordinate of the tree.
+    pub row: usize,
+    /// Index into [`Effect::parameters`].
+    pub parameter: usize,
+}
+
+/// A physical effect beside the rigid body: linear in its parameters, once its constants are fixed.
+pub trait Effect: Send + Sync {
+    /// What builds the effect again.
+    fn spec(&self) -> EffectSpec;
+    /// The parameters that it adds.
+    fn parameters(&self) -> Vec<EffectParameter>;
+    /// Its columns; each (row, parameter) at most once.
+    fn entries(&self) -> Vec<Entry>;
+    /// What its columns need beside the signals.
+    fn needs(&self) -> Needs {
+        Needs::default()
+    }
+    /// A new evaluator of its columns.
+    fn evaluator(&self) -> Box<dyn Evaluator + '_>;
+    /// Corrects the signals before any column is evaluated: how an encoder offset or a delay, fitted by linearisation, comes
+    /// into force.
+    fn correct(&self, _block: &mut Block) {}
+    /// The effect linearised anew at fitted parameters; `None` where it is linear anyway.
+    fn relinearised(&self, _fitted: &[f64]) -> Option<Box<dyn Effect>> {
+        None
+    }
+    /// One sentence for the user, with the fitted values.
+    fn sentence(&self, fitted: &[f64]) -> String {
+        let spec = self.spec();
+        let values: Vec<String> = self
+            .parameters()
+            .iter()
+            .zip(fitted)
+            .map(|(parameter, value)| format!("{} = {value:.4} {}", parameter.name, parameter.unit))
+            .collect();
+        format!("{} on {}: {}", spec.kind.replace('_', " "), spec.joints.join(", "), values.join(", "))
+    }
+}
+
+/// Computes an effect's columns sample by sample, in order of time; may have memory.
+pub trait Evaluator {
+    /// Forgets: what comes next is not the continuation of what was before.
+    fn restart(&mut self) {}
+    /// Writes one number for each of [`Effect::entries`].
+    fn evaluate(&mut self, sample: &Sample<'_>, columns: &mut [f64]);
+}
+
+/// Builds effects by name.
+pub trait EffectCatalogue: Sync {
+    /// Builds an effect.
+    ///
+    /// # Errors
+    /// The kind, a joint or a constant is unknown.
+    fn build(&self, spec: &EffectSpec, tree: &Tree) -> Result<Box<dyn Effect>, EffectError>;
+}
+
+/// An effect that cannot be built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum EffectError {
+    /// No such kind.
+    #[error("there is no effect `{kind}`{}; known are: {}", nearest.as_ref().map(|name| format!(" (did you mean `{name}`?)")).unwrap_or_default(), known.join(", "))]
+    UnknownKind {
+        /// What was asked for.
+        kind: String,
+        /// The nearest known kind.
+        nearest: Option<String>,
+        /// All known kinds.
+        known: Vec<String>,
+    },
+    /// No such joint.
+    #[error("effect `{kind}` names the joint `{joint}`, which the robot does not have")]
+    UnknownJoint {
+        /// The effect.
+        kind: String,
+        /// The joint.
+        joint: String,
+    },
+    /// The wrong number of joints.
+    #[error("effect `{kind}` acts on {needed}, but {found} joints are named")]
+    WrongJoints {
+        /// The effect.
+        kind: String,
+        /// What it acts on, in words.
+        needed: &'static str,
+        /// How many joints were named.
+        found: usize,
+    },
+    /// The effect exists only as a correction found by tracing.
+    #[error("effect `{kind}` cannot be declared for all joints at once: it is found by `phiw explain`")]
+    NotDeclarable {
+        /// The effect.
+        kind: String,
+    },
+}

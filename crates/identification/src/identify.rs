@@ -1,0 +1,213 @@
+//! The declared model, identified: constants chosen, parameters fitted, error held out.
+
+use crate::{
+    BlockSource, Design, Effect, Fit, Fold, IdentificationError, TorqueError, accumulate, fit, merge, torque_error,
+};
+use phiw_dynamics::Tree;
+use phiw_regressor::factor::FactorBuilder;
+use phiw_regressor::least_squares::{GroupedFactor, WeightedSolution, weighted_least_squares};
+use phiw_regressor::{BaseParameters, BaseParametersOptions, RegressorError};
+
+/// The same effect with several values of its constants, one of which the data will choose; the first is the simplest.
+pub type Variants = Vec<Box<dyn Effect>>;
+
+/// What a model is fitted to and validated on.
+pub struct Data<'a> {
+    /// Stretches of time to fit.
+    pub train: Vec<Fold>,
+    /// Stretches of time to validate on.
+    pub held_out: Vec<Fold>,
+    /// Where the samples come from.
+    pub sources: Vec<&'a dyn BlockSource>,
+    /// For each joint the speed below which it stands still \[rad/s, m/s\] (see [`Design::with_rest_speeds`]).
+    pub rest_speeds: Vec<f64>,
+}
+
+/// A declared model and what the logs say of it.
+pub struct Identified {
+    /// The columns of the model.
+    pub design: Design,
+    /// Its parameters.
+    pub fit: Fit,
+    /// Error on the training folds.
+    pub train: TorqueError,
+    /// Error on the folds held out.
+    pub held_out: TorqueError,
+    /// Factors of the training folds.
+    pub train_folds: Vec<GroupedFactor>,
+    /// Factors of the folds held out.
+    pub held_out_folds: Vec<GroupedFactor>,
+}
+
+/// Identifies a rigid body with effects from the training folds.
+///
+/// One pass over the logs: all variants of all effects go into the factors, and choosing among them is choosing columns.
+///
+/// # Errors
+/// A log cannot be read or does not fit the robot, or holds too little.
+pub fn identify(
+    tree: &Tree,
+    effects: Vec<Variants>,
+    data: &Data<'_>,
+) -> Result<Identified, IdentificationError> {
+    let Data { train, held_out, sources, rest_speeds } = data;
+    let base = BaseParameters::of_tree(tree, BaseParametersOptions::default())?;
+    let mut slots = Vec::with_capacity(effects.len());
+    let mut all = Vec::new();
+    for variants in effects {
+        slots.push(all.len()..all.len() + variants.len());
+        all.extend(variants);
+    }
+    let design = Design::new(tree.clone(), base.clone(), all).with_rest_speeds(rest_speeds.clone());
+    let mut folds = accumulate(&design, &[train.as_slice(), held_out].concat(), sources)?;
+    let chosen = choose(&design, &slots, &merge(&folds[..train.len()])?)?;
+    let kept: Vec<usize> =
+        (0..base.count()).chain(chosen.iter().flat_map(|&effect| design.effect_parameters(effect))).collect();
+    for fold in &mut folds {
+        *fold = fold.select(&kept)?;
+    }
+    let design = design.keep(&chosen);
+    let held_out_folds = folds.split_off(train.len());
+    let fitted = fit(&design, &folds)?;
+    Ok(Identified {
+        train: torque_error(&folds, &fitted.parameters)?,
+        held_out: torque_error(&held_out_folds, &fitted.parameters)?,
+        fit: fitted,
+        design,
+        train_folds: folds,
+        held_out_folds,
+    })
+}
+
+/// Sweeps over the effects; more have never changed a choice.
+const SWEEPS: usize = 2;
+
+/// For each slot the variant with the smallest sum of the torques' log errors, found slot by slot.
+///
+/// The pooled error would let the torque that fits worst decide for all.
+fn choose(
+    design: &Design,
+    slots: &[std::ops::Range<usize>],
+    factors: &GroupedFactor,
+) -> Result<Vec<usize>, RegressorError> {
+    let mut chosen: Vec<usize> = slots.iter().map(|slot| slot.start).collect();
+    if slots.iter().all(|slot| slot.len() <= 1) {
+        return Ok(chosen);
+    }
+    let columns = |chosen: &[usize]| -> Vec<usize> {
+        (0..design.base().count()).chain(chosen.iter().flat_map(|&effect| design.effect_parameters(effect))).collect()
+    };
+    for _ in 0..SWEEPS {
+        let before = chosen.clone();
+        let solution = solve_determined(&factors.select(&columns(&chosen))?)?;
+        for (slot, variants) in slots.iter().enumerate() {
+            if variants.len() <= 1 {
+                continue;
+            }
+            let mut best = (f64::INFINITY, chosen[slot]);
+            let rest = Rest::new(design, factors, &solution, &chosen, slot)?;
+            for variant in variants.clone() {
+                let mut trial = chosen.clone();
+                trial[slot] = variant;
+                let merit = rest.log_error(factors, &columns(&trial))?;
+                if merit < best.0 {
+                    best = (merit, variant);
+                }
+            }
+            chosen[slot] = best.1;
+        }
+        if chosen == before {
+            break;
+        }
+    }
+    Ok(chosen)
+}
+
+/// A weighted fit of what the rows determine; the rest is zero.
+fn solve_determined(factors: &GroupedFactor) -> Result<WeightedSolution, RegressorError> {
+    match weighted_least_squares(factors) {
+        Err(RegressorError::RankDeficient { undetermined, .. }) => {
+            let kept: Vec<usize> =
+                (0..factors.parameter_count()).filter(|parameter| !undetermined.contains(parameter)).collect();
+            weighted_least_squares(&factors.select(&kept)?)
+        }
+        other => other,
+    }
+}
+
+/// The torques that a slot's effect does not act on, merged once for all its variants.
+struct Rest {
+    /// Torques that the effect acts on.
+    own: Vec<usize>,
+    others: phiw_regressor::factor::Factor,
+    weights: Vec<f64>,
+}
+
+impl Rest {
+    fn new(
+        design: &Design,
+        factors: &GroupedFactor,
+        solution: &WeightedSolution,
+        chosen: &[usize],
+        slot: usize,
+    ) -> Result<Self, RegressorError> {
+        let own: Vec<usize> = design.effects()[chosen[slot]].entries().iter().map(|entry| entry.row).collect();
+        let weights: Vec<f64> = solution.group_std.iter().map(|std| 1.0 / std).collect();
+        let kept: Vec<usize> = (0..design.base().count())
+            .chain(chosen.iter().flat_map(|&effect| design.effect_parameters(effect)))
+            .collect();
+        let selected = factors.select(&kept)?;
+        let mut builder = FactorBuilder::new(kept.len() + 1);
+        for (row, group) in selected.groups().iter().enumerate() {
+            if !own.contains(&row) {
+                let mut columns = group.parameters.clone();
+                columns.push(kept.len());
+                builder.push_factor(&group.factor, &columns, weights[row])?;
+            }
+        }
+        Ok(Rest { own, others: builder.factor(), weights })
+    }
+
+    /// Σ rows·log(RMSE) of the fit with `kept` columns, whose numbering is that of the slot's own variant.
+    fn log_error(&self, factors: &GroupedFactor, kept: &[usize]) -> Result<f64, RegressorError> {
+        let mut builder = FactorBuilder::new(kept.len() + 1);
+        let all: Vec<usize> = (0..=kept.len()).collect();
+        builder.push_factor(&self.others, &all, 1.0)?;
+        let mut renumbered = vec![None; factors.parameter_count()];
+        kept.iter().enumerate().for_each(|(new, &old)| renumbered[old] = Some(new));
+        let mut own = Vec::new();
+        for &row in &self.own {
+            let group = &factors.groups()[row];
+            let columns: Vec<(usize, usize)> = (0..group.parameters.len())
+                .filter_map(|column| renumbered[group.parameters[column]].map(|new| (column, new)))
+                .collect();
+            let named: Vec<usize> =
+                columns.iter().map(|&(column, _)| column).chain([group.factor.parameters()]).collect();
+            let mut targets: Vec<usize> = columns.iter().map(|&(_, new)| new).collect();
+            let factor = group.factor.select(&named)?;
+            own.push((factor.clone(), targets.clone()));
+            targets.push(kept.len());
+            builder.push_factor(&factor, &targets, self.weights[row])?;
+        }
+        let solution = match builder.factor().solve() {
+            Ok(solution) => solution.parameters,
+            Err(RegressorError::RankDeficient { undetermined, .. }) => {
+                let determined: Vec<usize> = (0..kept.len()).filter(|column| !undetermined.contains(column)).collect();
+                let named: Vec<usize> = determined.iter().copied().chain([kept.len()]).collect();
+                let part = builder.factor().select(&named)?.solve()?;
+                let mut parameters = vec![0.0; kept.len()];
+                determined.iter().zip(part.parameters).for_each(|(&column, value)| parameters[column] = value);
+                parameters
+            }
+            Err(error) => return Err(error),
+        };
+        let others = self.others.residual_sum_of_squares(&solution)?;
+        let mut total = 0.5 * self.others.rows() as f64 * others.max(f64::MIN_POSITIVE).ln();
+        for (factor, targets) in &own {
+            let parameters: Vec<f64> = targets.iter().map(|&column| solution[column]).collect();
+            let squares = factor.residual_sum_of_squares(&parameters)?;
+            total += 0.5 * factor.rows() as f64 * squares.max(f64::MIN_POSITIVE).ln();
+        }
+        Ok(total)
+    }
+}

@@ -1,0 +1,149 @@
+//! The logs of a session: which train, which are held out, and how they are conditioned.
+
+use crate::{BlockSource, Fold, IdentificationError, check_logs};
+use phiw_dynamics::Tree;
+use phiw_telemetry::{Block, Conditioning, ConditioningOptions, LogError, Survey, TorqueColumns};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+/// Share of each training log that is held out when no log is given for validation.
+pub const HELD_OUT_SHARE: f64 = 0.3;
+/// Stretches of time that the training logs are cut into: long against the residual's correlation, enough for a standard deviation.
+const TRAINING_FOLDS: usize = 12;
+const HELD_OUT_FOLDS: usize = 10;
+/// Speed of a joint at rest over its RMS speed.
+const REST_SHARE: f64 = 0.01;
+
+/// Tells how far a pass over the logs is: what is being done, bytes done, bytes in total.
+pub type Progress<'a> = &'a (dyn Fn(&str, u64, u64) + Sync);
+
+/// Logs, surveyed and with their conditioning chosen.
+pub struct LogSet {
+    surveys: Vec<Survey>,
+    train: usize,
+    conditioning: Conditioning,
+}
+
+impl LogSet {
+    /// Surveys the logs, checks them against the robot, and chooses how to condition them.
+    ///
+    /// # Errors
+    /// A log that cannot be read or does not fit the robot.
+    pub fn open(
+        tree: &Tree,
+        train: &[PathBuf],
+        validate: &[PathBuf],
+        options: &ConditioningOptions,
+        progress: Progress<'_>,
+    ) -> Result<Self, IdentificationError> {
+        let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
+        let survey = |path: &PathBuf| {
+            let mut report = |done: u64, total: u64| progress(&reading("surveying", path), done, total);
+            phiw_telemetry::survey(path, &joints, TorqueColumns::Required, &mut report)
+        };
+        let mut surveys = train.iter().chain(validate).map(survey).collect::<Result<Vec<Survey>, LogError>>()?;
+        phiw_telemetry::arrange_session(&mut surveys);
+        let (training, held_out) = surveys.split_at(train.len());
+        check_logs(tree, training, held_out)?;
+        let conditioning = Conditioning::choose(&surveys, options)?;
+        Ok(LogSet { train: train.len(), conditioning, surveys })
+    }
+
+    /// All surveys: training logs, then those for validation.
+    pub fn surveys(&self) -> &[Survey] {
+        &self.surveys
+    }
+    /// The training logs' surveys.
+    pub fn training(&self) -> &[Survey] {
+        &self.surveys[..self.train]
+    }
+    /// How the logs are conditioned.
+    pub fn conditioning(&self) -> &Conditioning {
+        &self.conditioning
+    }
+    /// Whether the end of each training log is held out, since no other log is given.
+    pub fn splits_training_logs(&self) -> bool {
+        self.train == self.surveys.len()
+    }
+    /// Logs given for training and for validation that have the same content.
+    pub fn same_files(&self) -> Vec<(&Path, &Path)> {
+        let (training, held_out) = self.surveys.split_at(self.train);
+        let pairs = training.iter().flat_map(|a| held_out.iter().map(move |b| (a, b)));
+        pairs.filter(|(a, b)| a.content_hash == b.content_hash).map(|(a, b)| (a.path.as_path(), b.path.as_path())).collect()
+    }
+
+    /// For each joint the speed below which it stands still: a hundredth of its RMS velocity in the training logs \[rad/s, m/s\].
+    pub fn rest_speeds(&self) -> Vec<f64> {
+        let joints = self.surveys.first().map_or(0, |survey| survey.joints.len());
+        let rms = |joint: usize| self.training().iter().map(|survey| survey.joints[joint].velocity_rms).fold(0.0, f64::max);
+        (0..joints).map(|joint| REST_SHARE * rms(joint)).collect()
+    }
+
+    /// Stretches of time to fit.
+    pub fn training_folds(&self) -> Vec<Fold> {
+        let share = if self.splits_training_logs() { 1.0 - HELD_OUT_SHARE } else { 1.0 };
+        cut(self.training().iter().enumerate().map(|(log, survey)| (log, survey, 0.0, share)), TRAINING_FOLDS)
+    }
+
+    /// Stretches of time to validate on.
+    pub fn held_out_folds(&self) -> Vec<Fold> {
+        if self.splits_training_logs() {
+            let ends = self.training().iter().enumerate().map(|(log, survey)| (log, survey, 1.0 - HELD_OUT_SHARE, 1.0));
+            cut(ends, HELD_OUT_FOLDS)
+        } else {
+            let logs = self.surveys.iter().enumerate().skip(self.train);
+            cut(logs.map(|(log, survey)| (log, survey, 0.0, 1.0)), HELD_OUT_FOLDS)
+        }
+    }
+
+    /// The logs as sources of blocks.
+    pub fn sources<'a>(&'a self, progress: Progress<'a>) -> Vec<LogFile<'a>> {
+        self.surveys.iter().map(|survey| LogFile { survey, conditioning: &self.conditioning, progress }).collect()
+    }
+}
+
+fn reading(what: &str, path: &Path) -> String {
+    format!("{what} {}", path.file_name().unwrap_or(path.as_os_str()).to_string_lossy())
+}
+
+/// Cuts a part of each log into stretches of about equal length, `count` or a few more in all.
+fn cut<'a>(parts: impl Iterator<Item = (usize, &'a Survey, f64, f64)>, count: usize) -> Vec<Fold> {
+    let spans: Vec<(usize, f64, f64)> = parts
+        .map(|(log, survey, from, to)| {
+            let (first, last) = survey.time_range();
+            (log, first + from * (last - first), first + to * (last - first))
+        })
+        .collect();
+    let total: f64 = spans.iter().map(|(_, start, end)| end - start).sum();
+    let pieces = |start: f64, end: f64| ((count as f64 * (end - start) / total).round() as usize).max(1);
+    let mut folds = Vec::new();
+    for (log, start, end) in spans {
+        let pieces = pieces(start, end);
+        let edge = |piece: usize| start + (end - start) * piece as f64 / pieces as f64;
+        folds.extend((0..pieces).map(|piece| Fold { log, start: edge(piece), end: edge(piece + 1) }));
+        // The last moment belongs to the last stretch.
+        if let Some(last) = folds.last_mut() {
+            last.end = end + 1e-9 * end.abs().max(1.0);
+        }
+    }
+    folds
+}
+
+/// A log on disk.
+pub struct LogFile<'a> {
+    survey: &'a Survey,
+    conditioning: &'a Conditioning,
+    progress: Progress<'a>,
+}
+
+impl BlockSource for LogFile<'_> {
+    fn blocks(&self, sink: &mut dyn FnMut(Block)) -> Result<(), LogError> {
+        let what = reading("reading", &self.survey.path);
+        let mut report = |done: u64, total: u64| (self.progress)(&what, done, total);
+        phiw_telemetry::stream(self.survey, self.conditioning, &mut report, &mut |block| {
+            sink(block);
+            ControlFlow::Continue(())
+        })?;
+        Ok(())
+    }
+}

@@ -1,0 +1,232 @@
+//! An identified model as one thing: rigid body, effects, what it was fitted to; written to `model.json` and read back.
+
+use crate::{Design, Effect, EffectCatalogue, EffectSpec, Fit, IdentificationError};
+use phiw_dynamics::{PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree};
+use phiw_regressor::BaseParameters;
+use phiw_regressor::factor::Factor;
+use serde::{Deserialize, Serialize};
+
+/// Version of the file's form.
+const SCHEMA: u32 = 1;
+
+/// A fitted model, ready to be written, read, and used again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Model {
+    /// Version of this form.
+    pub schema: u32,
+    /// The robot's name.
+    pub robot: String,
+    /// Its joints, in the order of the torques.
+    pub joints: Vec<String>,
+    /// Joints of the URDF that were held, and where \[rad, m\].
+    pub held: Vec<(String, f64)>,
+    /// Kinds that were declared, `rigid_body` first.
+    pub declared: Vec<String>,
+    /// The base parameters.
+    pub base_parameters: Vec<NamedParameter>,
+    /// Standard parameters of each body: those nearest to the URDF's that have the base parameters.
+    pub bodies: Vec<BodyParameters>,
+    /// The effects beside the rigid body.
+    pub effects: Vec<EffectParameters>,
+    /// Standard deviation of each torque's residual on the training logs \[N·m, N\].
+    pub residual_std: Vec<f64>,
+    /// What the fit knew, error included: the weighted factor R of \[Φ f\] over the parameters that were determined.
+    pub factor: FactorRows,
+    /// Cut-offs of the low-pass over positions and of the parallel filter \[Hz\].
+    pub cutoff_hz: (f64, f64),
+}
+
+/// A parameter with its standard deviation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NamedParameter {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+    /// Its standard deviation; `null` where the logs were too short to tell.
+    pub std: Option<f64>,
+    /// Its unit.
+    pub unit: String,
+}
+
+/// The standard parameters of a body, in the order of [`PARAMETER_NAMES`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BodyParameters {
+    /// The joint that moves the body.
+    pub joint: String,
+    /// Mass, first moment, inertia about the joint frame's origin.
+    pub inertial: [f64; PARAMETERS_PER_BODY],
+}
+
+/// An effect and its parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EffectParameters {
+    /// What builds it again.
+    #[serde(flatten)]
+    pub spec: EffectSpec,
+    /// Its parameters, in the effect's order.
+    pub parameters: Vec<NamedParameter>,
+    /// Whether the user declared it; else it was found.
+    pub declared: bool,
+}
+
+/// An upper triangular factor, row by row from the diagonal on.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FactorRows {
+    /// The parameters that its columns stand for; the right-hand side follows them.
+    pub parameters: Vec<usize>,
+    /// Number of rows of Φ.
+    pub rows: u64,
+    /// The entries.
+    pub entries: Vec<f64>,
+}
+
+impl FactorRows {
+    fn of(factor: &Factor, parameters: Vec<usize>) -> Self {
+        let size = factor.columns();
+        let entries = (0..size).flat_map(|row| (row..size).map(move |column| factor.entry(row, column))).collect();
+        FactorRows { parameters, rows: factor.rows(), entries }
+    }
+
+    /// The factor itself.
+    ///
+    /// # Errors
+    /// The number of entries is not that of a triangle.
+    pub fn factor(&self) -> Result<Factor, IdentificationError> {
+        let size = self.parameters.len() + 1;
+        if self.entries.len() != size * (size + 1) / 2 {
+            let message = format!("the model's factor has {} entries, but {} columns", self.entries.len(), size);
+            return Err(IdentificationError::Model(message));
+        }
+        let mut entries = self.entries.iter();
+        let mut rows = vec![0.0; size * size];
+        for row in 0..size {
+            rows[row * size + row..(row + 1) * size].iter_mut().zip(&mut entries).for_each(|(to, from)| *to = *from);
+        }
+        Ok(Factor::of_rows(size, &rows)?)
+    }
+}
+
+/// Standard deviations that the logs could not tell are `null`.
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+impl Model {
+    /// The model of a fit. `declared` are the kinds that the user declared; `held` the joints that were held.
+    ///
+    /// # Errors
+    /// The fit is not of this design.
+    pub fn of_fit(
+        design: &Design,
+        fit: &Fit,
+        declared: &[String],
+        held: &[(String, f64)],
+        cutoff_hz: (f64, f64),
+    ) -> Result<Self, IdentificationError> {
+        let base = design.base();
+        let standard = base.to_standard(&fit.parameters[..base.count()], &design.tree().inertial_parameters())?;
+        let body = |(body, values): (&phiw_dynamics::Body, &[f64])| BodyParameters {
+            joint: body.joint.clone(),
+            inertial: std::array::from_fn(|parameter| values[parameter]),
+        };
+        let named = |parameter: usize, name: String, unit: String| NamedParameter {
+            name,
+            value: fit.parameters[parameter],
+            std: finite(fit.standard_deviations[parameter]),
+            unit,
+        };
+        let base_parameter = |index: usize| {
+            let leading = base.independent()[index];
+            let unit = standard_unit(leading % PARAMETERS_PER_BODY);
+            named(index, parameter_name(design.tree(), leading), unit.to_owned())
+        };
+        let effect = |(index, effect): (usize, &Box<dyn Effect>)| {
+            let spec = effect.spec();
+            let parameters = design.effect_parameters(index).zip(effect.parameters());
+            let parameters = parameters.map(|(parameter, info)| named(parameter, info.name, info.unit)).collect();
+            EffectParameters { declared: declared.contains(&spec.kind), spec, parameters }
+        };
+        Ok(Model {
+            schema: SCHEMA,
+            robot: design.tree().name().to_owned(),
+            joints: design.tree().joint_names().map(str::to_owned).collect(),
+            held: held.to_vec(),
+            declared: std::iter::once("rigid_body".to_owned()).chain(declared.iter().cloned()).collect(),
+            base_parameters: (0..base.count()).map(base_parameter).collect(),
+            bodies: design.tree().bodies().iter().zip(standard.chunks_exact(PARAMETERS_PER_BODY)).map(body).collect(),
+            effects: design.effects().iter().enumerate().map(effect).collect(),
+            residual_std: fit.residual_std.clone(),
+            factor: FactorRows::of(&fit.factor, fit.determined()),
+            cutoff_hz,
+        })
+    }
+
+    /// The design and its parameters, on a tree that must be the same robot with the same joints held.
+    ///
+    /// # Errors
+    /// The tree has other joints, or an effect is unknown to the catalogue.
+    pub fn design(
+        &self,
+        tree: &Tree,
+        catalogue: &dyn EffectCatalogue,
+    ) -> Result<(Design, Vec<f64>), IdentificationError> {
+        let joints: Vec<&str> = tree.joint_names().collect();
+        if self.schema != SCHEMA {
+            let message = format!("model.json has schema {}, this phiw reads {SCHEMA}", self.schema);
+            return Err(IdentificationError::Model(message));
+        }
+        if joints != self.joints {
+            let message = format!(
+                "the model is of the joints {}, but the URDF with its held joints has {}: use the URDF and --hold that it was made with",
+                self.joints.join(", "),
+                joints.join(", ")
+            );
+            return Err(IdentificationError::Model(message));
+        }
+        let base = BaseParameters::of_tree(tree, Default::default())?;
+        if base.count() != self.base_parameters.len() {
+            let message = format!(
+                "the model has {} base parameters, but the URDF {}: the kinematics differ",
+                self.base_parameters.len(),
+                base.count()
+            );
+            return Err(IdentificationError::Model(message));
+        }
+        let effects = self.effects.iter().map(|effect| catalogue.build(&effect.spec, tree));
+        let design = Design::new(tree.clone(), base, effects.collect::<Result<_, _>>()?);
+        let values = self.base_parameters.iter().chain(self.effects.iter().flat_map(|effect| &effect.parameters));
+        let parameters: Vec<f64> = values.map(|parameter| parameter.value).collect();
+        if parameters.len() != design.parameter_count() {
+            let message = "an effect of the model has not the parameters that its kind has".to_owned();
+            return Err(IdentificationError::Model(message));
+        }
+        Ok((design, parameters))
+    }
+
+    /// The tree with the model's standard parameters.
+    ///
+    /// # Errors
+    /// The tree has other bodies.
+    pub fn identified_tree(&self, tree: &Tree) -> Result<Tree, IdentificationError> {
+        let parameters: Vec<f64> = self.bodies.iter().flat_map(|body| body.inertial).collect();
+        let mut identified = tree.clone();
+        identified.set_inertial_parameters(&parameters)?;
+        Ok(identified)
+    }
+}
+
+/// Name of a standard parameter: joint, then parameter.
+pub fn parameter_name(tree: &Tree, standard: usize) -> String {
+    let body = &tree.bodies()[standard / PARAMETERS_PER_BODY];
+    format!("{}.{}", body.joint, PARAMETER_NAMES[standard % PARAMETERS_PER_BODY])
+}
+
+/// Unit of the k-th standard parameter of a body.
+pub fn standard_unit(parameter: usize) -> &'static str {
+    match parameter {
+        0 => "kg",
+        1..4 => "kg·m",
+        _ => "kg·m²",
+    }
+}

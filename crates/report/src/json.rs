@@ -1,0 +1,173 @@
+//! `report.json`, schema 1: what other programs read of an identification.
+
+use indexmap::IndexMap;
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// The number that `schema` carries: it grows when a reader of the old form would go wrong.
+pub const SCHEMA: u32 = 1;
+
+/// A map keyed by joint that keeps the robot's order.
+pub type JointMap<T> = IndexMap<String, T>;
+
+/// The whole of `report.json`.
+///
+/// A number that is not finite is written as `null` and read back as NaN.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ReportJson {
+    /// Version of the form, [`SCHEMA`].
+    pub schema: u32,
+    /// The robot's name, from its URDF.
+    pub robot: String,
+    /// The moving joints, in the robot's order.
+    pub joints: Vec<String>,
+    /// What the model contained before anything was sought: `rigid_body` and declared effects.
+    pub declared: Vec<String>,
+    /// The answer in one word.
+    pub verdict: Verdict,
+    /// RMS of the part of each joint's torque that no model can explain (N·m or N).
+    #[serde(deserialize_with = "numbers_or_nan")]
+    pub noise_floor: JointMap<f64>,
+    /// The declared model's errors.
+    pub before: TorqueErrors,
+    /// The effects in the order in which they were added.
+    pub effects: Vec<EffectJson>,
+    /// The errors once all effects are in.
+    pub after: TorqueErrors,
+    /// What is left.
+    pub remaining: RemainingJson,
+    /// What only this program writes; a reader may ignore it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub phiw: Option<ProgramJson>,
+}
+
+/// What became of the residual.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The declared model leaves noise only.
+    Sufficient,
+    /// Effects were added and what remains is noise.
+    Explained,
+    /// Effects were added and structure remains.
+    PartlyExplained,
+    /// There is structure and no effect of the catalogue accounts for it.
+    Unexplained,
+}
+
+/// One model's errors on the motion that it was fitted to and on motion that it was not.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct TorqueErrors {
+    /// On the motion that the model was fitted to.
+    pub train: TorqueError,
+    /// On held-out motion; empty where there is none.
+    pub validate: TorqueError,
+}
+
+/// Torque errors over one set of logs.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct TorqueError {
+    /// RMS error of each joint (N·m or N).
+    #[serde(default, deserialize_with = "numbers_or_nan", skip_serializing_if = "IndexMap::is_empty")]
+    pub rmse: JointMap<f64>,
+    /// RMS of the error over RMS of the torque, all joints and samples pooled.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative: Option<f64>,
+}
+
+/// An effect that was added to the declared model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectJson {
+    /// The effect's name in the catalogue.
+    pub kind: String,
+    /// The joints that it acts on.
+    pub joints: Vec<String>,
+    /// Fitted parameters: joint → name → value.
+    pub parameters: JointMap<IndexMap<String, ParameterJson>>,
+    /// Pooled held-out error once it and all before it are in.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub validate_relative: f64,
+    /// Share of the residual's variance above the noise floor that it took away, on data it was not fitted to.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub explains: f64,
+    /// Probability of this effect against its rivals, 0 to 1.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub confidence: f64,
+    /// The effects that the data could not tell from it.
+    pub rivals: Vec<RivalJson>,
+}
+
+/// A fitted parameter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ParameterJson {
+    /// Its value.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub value: f64,
+    /// Its standard deviation.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub std: f64,
+    /// The unit of both.
+    pub unit: String,
+}
+
+/// An effect that the data could not tell from the chosen one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RivalJson {
+    /// The effect's name in the catalogue.
+    pub kind: String,
+    /// The joints that it would act on.
+    pub joints: Vec<String>,
+    /// Its probability, 0 to 1.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub confidence: f64,
+}
+
+/// What the final model does not explain.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct RemainingJson {
+    /// Whether the residual is more than noise.
+    pub structured: bool,
+    /// The joints on which it is.
+    pub joints: Vec<String>,
+    /// The signals that it follows: `q`, `qd`, `qdd`, `tau`, `t`, or another joint's.
+    pub depends_on: Vec<String>,
+}
+
+/// Additions of this program to the fixed form.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ProgramJson {
+    /// Version of the program that wrote the file.
+    pub version: String,
+    /// Everything that a reader should know before trusting a number.
+    #[serde(default)]
+    pub warnings: Vec<String>,
+    /// How the logs were conditioned: cut-off, decimation, segments, samples skipped.
+    #[serde(default)]
+    pub conditioning: IndexMap<String, serde_json::Value>,
+}
+
+impl ReportJson {
+    /// The file's text: indented, with a newline at its end.
+    ///
+    /// # Errors
+    /// None is known; serde's signature allows one.
+    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string_pretty(self).map(|text| text + "\n")
+    }
+
+    /// Reads the file's text.
+    ///
+    /// # Errors
+    /// Text that is not JSON, or lacks a field, with its line and column.
+    pub fn from_json(text: &str) -> Result<Self, serde_json::Error> {
+        serde_json::from_str(text)
+    }
+}
+
+fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
+}
+
+fn numbers_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<JointMap<f64>, D::Error> {
+    let numbers = JointMap::<Option<f64>>::deserialize(deserializer)?;
+    Ok(numbers.into_iter().map(|(joint, number)| (joint, number.unwrap_or(f64::NAN))).collect())
+}

@@ -1,0 +1,197 @@
+//! The report: one HTML page with everything in it.
+//!
+//! [`IdentificationPage`] is plain data; what is empty or `None` does not appear. All text is escaped. The
+//! page loads nothing, reads in light and dark, and prints.
+
+mod conditioning;
+mod effects;
+mod errors;
+mod joints;
+mod parameters;
+
+pub use conditioning::Conditioning;
+pub use effects::{CandidateRow, EffectParameter, EffectSection, Remaining, Rival};
+pub use errors::{ErrorRow, ErrorTable, PooledError};
+pub use joints::{JointSection, TorqueTrace};
+pub use parameters::{BaseParameter, ParameterRow, Parameters};
+
+use crate::json::Verdict;
+use crate::plot::{self, Svg};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+/// Everything that the report shows, from top to bottom.
+#[derive(Debug, Clone, Default)]
+pub struct IdentificationPage {
+    /// The robot's name.
+    pub robot: String,
+    /// The files that went in.
+    pub inputs: Vec<InputFile>,
+    /// When the report was made, as it shall be written.
+    pub date: String,
+    /// The result in one to three sentences.
+    pub headline: Vec<String>,
+    /// The answer in one word, where the residual was traced.
+    pub verdict: Option<Verdict>,
+    /// What a reader should know before trusting a number.
+    pub warnings: Vec<String>,
+    /// Torque errors per joint and pooled.
+    pub errors: ErrorTable,
+    /// The effects that were added, in order.
+    pub effects: Vec<EffectSection>,
+    /// What the final model leaves, where the residual was traced.
+    pub remaining: Option<Remaining>,
+    /// Measured against predicted torque, joint by joint.
+    pub joints: Vec<JointSection>,
+    /// What was done to the logs before the fit.
+    pub conditioning: Conditioning,
+    /// The identified parameters.
+    pub parameters: Parameters,
+    /// Which standard parameters each base parameter regroups.
+    pub base_parameters: Vec<BaseParameter>,
+    /// What these logs cannot tell, a line each.
+    pub not_identified: Vec<String>,
+    /// What was wrong or remarkable in the URDF, a line each.
+    pub urdf_findings: Vec<String>,
+    /// Name and version of the program.
+    pub version: String,
+    /// The command line that made the report.
+    pub command_line: String,
+}
+
+/// A file that went in.
+#[derive(Debug, Clone, Default)]
+pub struct InputFile {
+    /// What it served as: `URDF`, `train`, `validate`.
+    pub role: String,
+    /// Its name.
+    pub name: String,
+    /// What is in it: `60.1 s, 12 020 samples, 2 segments`.
+    pub content: String,
+}
+
+/// A picture with what is to be said about it.
+#[derive(Debug, Clone)]
+pub struct Picture {
+    /// A sentence or less; may be empty.
+    pub caption: String,
+    /// The picture.
+    pub svg: Svg,
+}
+
+impl Picture {
+    fn markup(&self) -> Markup {
+        html! {
+            figure {
+                (PreEscaped(self.svg.inline()))
+                @if !self.caption.is_empty() { figcaption { (self.caption) } }
+            }
+        }
+    }
+}
+
+impl IdentificationPage {
+    /// The whole page.
+    pub fn render(&self) -> String {
+        let sections: Vec<(&str, &str, Markup)> = [
+            ("errors", "Torque error", self.errors.markup(&self.joints)),
+            ("effects", "Effects added", effects::markup(&self.effects)),
+            ("remaining", "What remains", self.remaining.as_ref().map_or(html! {}, Remaining::markup)),
+            ("torques", "Measured and predicted torque", joints::markup(&self.joints)),
+            ("conditioning", "Conditioning of the logs", self.conditioning.markup()),
+            ("parameters", "Parameters", self.parameters.markup()),
+            ("base-parameters", "Base parameters", parameters::base_markup(&self.base_parameters)),
+            ("not-identified", "What could not be identified", list(&self.not_identified)),
+            ("urdf", "Findings about the URDF", list(&self.urdf_findings)),
+        ]
+        .into_iter()
+        .filter(|(_, _, markup)| !markup.0.is_empty())
+        .collect();
+        let page = html! {
+            (DOCTYPE)
+            html lang="en" {
+                head {
+                    meta charset="utf-8";
+                    meta name="viewport" content="width=device-width, initial-scale=1";
+                    meta name="color-scheme" content="light dark";
+                    title { (self.robot) " – identification" }
+                    style { (PreEscaped(plot::palette_css())) (PreEscaped(include_str!("page/style.css"))) }
+                }
+                body {
+                    main {
+                        (self.header())
+                        nav {
+                            @for (id, title, _) in &sections { a href={ "#" (id) } { (title) } }
+                        }
+                        @for (id, title, markup) in &sections {
+                            section id=(id) { h2 { (title) } (markup) }
+                        }
+                        footer {
+                            @if !self.version.is_empty() { p { (self.version) } }
+                            @if !self.command_line.is_empty() { pre { (self.command_line) } }
+                        }
+                    }
+                }
+            }
+        };
+        page.into_string()
+    }
+
+    fn header(&self) -> Markup {
+        html! {
+            header {
+                div.title {
+                    h1 { (self.robot) }
+                    @if let Some(verdict) = self.verdict { (badge(verdict)) }
+                    time { (self.date) }
+                }
+                @for (index, sentence) in self.headline.iter().enumerate() {
+                    p.headline.more[index > 0] { (sentence) }
+                }
+                @if !self.inputs.is_empty() {
+                    table.inputs {
+                        @for file in &self.inputs {
+                            tr { th { (file.role) } td { code { (file.name) } } td.muted { (file.content) } }
+                        }
+                    }
+                }
+                @if !self.warnings.is_empty() {
+                    aside.warnings {
+                        strong { (self.warnings.len()) @if self.warnings.len() == 1 { " warning" } @else { " warnings" } }
+                        (list(&self.warnings))
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn badge(verdict: Verdict) -> Markup {
+    let (class, word, meaning) = match verdict {
+        Verdict::Sufficient => ("good", "sufficient", "the declared model leaves noise only"),
+        Verdict::Explained => ("good", "explained", "effects were added and what remains is noise"),
+        Verdict::PartlyExplained => {
+            ("partly", "partly explained", "effects were added and structure remains")
+        }
+        Verdict::Unexplained => {
+            ("open", "unexplained", "there is structure and no effect of the catalogue accounts for it")
+        }
+    };
+    html! { span class={ "badge " (class) } title=(meaning) { (word) } }
+}
+
+fn list(lines: &[String]) -> Markup {
+    html! { @if !lines.is_empty() { ul { @for line in lines { li { (line) } } } } }
+}
+
+/// A row of the kind "name, share as a bar, number".
+fn share_bar(share: f64, scale: f64, before: Option<f64>, noise_floor: Option<f64>) -> Markup {
+    let width = |share: f64| format!("{:.1}%", (100.0 * share / scale).clamp(0.0, 100.0));
+    let known = |share: Option<f64>| share.filter(|share| share.is_finite());
+    html! {
+        span.bar {
+            @if let Some(before) = known(before) { i.before style={ "width:" (width(before)) } {} }
+            @if let Some(share) = known(Some(share)) { i.after style={ "width:" (width(share)) } {} }
+            @if let Some(floor) = known(noise_floor) { i.floor style={ "left:" (width(floor)) } {} }
+        }
+    }
+}

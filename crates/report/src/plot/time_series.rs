@@ -1,0 +1,74 @@
+//! Torque over time: measured against predicted, and what is left between them.
+
+use super::axis::Axis;
+use super::canvas::{Svg, WIDTH, picture};
+use super::decimation::{LINE_POINTS, decimate};
+use super::palette::{MEASURED, NOISE, PREDICTED, RESIDUAL};
+use super::panel::{Legend, Mark, line, panel, stroke};
+use super::{Line, drawable};
+use plotters::element::Rectangle;
+use plotters::style::Color;
+
+/// What [`torque_panel`] shows.
+#[derive(Debug, Clone, Copy)]
+pub struct TorquePanel<'a> {
+    /// Measured torque over time (s).
+    pub measured: Line<'a>,
+    /// The model's torque over time (s).
+    pub predicted: Line<'a>,
+    /// Unit of the torque, `N·m` or `N`.
+    pub unit: &'a str,
+}
+
+/// Measured and predicted torque of one joint over time, thinned to what the eye can tell apart.
+pub fn torque_panel(input: &TorquePanel<'_>) -> Svg {
+    let TorquePanel { measured, predicted, unit } = *input;
+    let both = || measured.points().chain(predicted.points());
+    let x = Axis::linear("t [s]", both().map(|point| point.0), false, 9);
+    let y = Axis::linear(format!("torque [{unit}]"), both().map(|point| point.1), true, 5);
+    let legend = [Legend("measured", Mark::Line, MEASURED), Legend("predicted", Mark::Line, PREDICTED)];
+    picture(WIDTH, 200, "measured and predicted torque over time", |sheet| {
+        let plot = panel(sheet, &x, &y, &legend)?;
+        for (samples, colour, width) in [(measured, MEASURED, 14), (predicted, PREDICTED, 11)] {
+            let thinned = decimate(samples.x, samples.y, LINE_POINTS);
+            line(&plot, Line::from(&thinned).points(), stroke(colour, width))?;
+        }
+        Ok(())
+    })
+}
+
+/// What [`residual_panel`] shows.
+#[derive(Debug, Clone, Copy)]
+pub struct ResidualPanel<'a> {
+    /// Measured minus predicted torque over time (s).
+    pub residual: Line<'a>,
+    /// RMS of the noise, drawn as a band of ± this; none is drawn where it is not known.
+    pub noise_floor: Option<f64>,
+    /// Unit of the torque.
+    pub unit: &'a str,
+}
+
+/// The residual of one joint over time with its noise floor, to stand under a [`torque_panel`].
+pub fn residual_panel(input: &ResidualPanel<'_>) -> Svg {
+    let ResidualPanel { residual, noise_floor, unit } = *input;
+    let floor = noise_floor.filter(|&floor| drawable(floor) && floor > 0.0);
+    let x = Axis::linear("t [s]", residual.points().map(|point| point.0), false, 9);
+    let band = floor.into_iter().flat_map(|floor| [-floor, floor]);
+    let y = Axis::linear(
+        format!("residual [{unit}]"),
+        residual.points().map(|point| point.1).chain(band).chain([0.0]),
+        true,
+        3,
+    );
+    let legend = [Legend("residual", Mark::Line, RESIDUAL), Legend("± noise floor", Mark::Area, NOISE)];
+    let legend = if floor.is_some() { &legend[..] } else { &legend[..1] };
+    picture(WIDTH, 130, "residual torque over time", |sheet| {
+        let plot = panel(sheet, &x, &y, legend)?;
+        if let Some(floor) = floor {
+            let corners = [(x.range.0, -floor), (x.range.1, floor)];
+            plot.draw(&Rectangle::new(corners, NOISE.rgb().mix(0.28).filled()))?;
+        }
+        let thinned = decimate(residual.x, residual.y, LINE_POINTS);
+        line(&plot, Line::from(&thinned).points(), stroke(RESIDUAL, 10))
+    })
+}

@@ -1,0 +1,65 @@
+//! What the motor and its measurement add: rotor inertia, offset, gain.
+
+use super::columns::{OwnTorque, ParameterKind};
+use super::kind::{Constants, EffectKind};
+use phiw_dynamics::Tree;
+use phiw_identification::{Effect, Needs, Sample};
+
+/// Ia·q̈.
+pub struct RotorInertia;
+
+impl EffectKind for RotorInertia {
+    fn name(&self) -> &str {
+        "rotor_inertia"
+    }
+    fn telling_motion(&self) -> &'static str {
+        "quick accelerations in several poses of the joints behind"
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let joint = site[0];
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = sample.qdd()[joint];
+        let parameters = [("Ia", ParameterKind::Inertia, 0.0)];
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+    }
+}
+
+/// A constant torque.
+pub struct TorqueOffset;
+
+impl EffectKind for TorqueOffset {
+    fn name(&self) -> &str {
+        "torque_offset"
+    }
+    fn telling_motion(&self) -> &'static str {
+        "rests in several poses"
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let columns = move |_: &Sample<'_>, out: &mut [f64]| out[0] = 1.0;
+        let parameters = [("offset", ParameterKind::Torque, f64::NEG_INFINITY)];
+        Box::new(OwnTorque::new(self.name(), tree, site[0], constants, &parameters, columns))
+    }
+}
+
+/// (1 + ε) on the measured torque: the column is the torque of the rigid body; the scaled friction is the friction's matter.
+pub struct TorqueGain;
+
+impl EffectKind for TorqueGain {
+    fn name(&self) -> &str {
+        "torque_gain"
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        None
+    }
+    fn telling_motion(&self) -> &'static str {
+        "a known load on the joint"
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let joint = site[0];
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            out[0] = sample.reference_torque().get(joint).copied().unwrap_or_default();
+        };
+        let parameters = [("gain_error", ParameterKind::Ratio, -1.0)];
+        let needs = Needs { torque: true, ..Needs::default() };
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns).needing(needs))
+    }
+}

@@ -1,0 +1,95 @@
+//! A flexible transmission between motor and link.
+
+use super::kind::{Constants, EffectKind};
+use phiw_dynamics::{JointType, Tree};
+use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
+
+/// The encoder sits on the motor: the link lags behind it by τ/k. Linear in the compliance 1/k, about the stiff joint:
+/// the link's position, velocity and acceleration differ by −τ/k, −τ̇/k, −τ̈/k.
+///
+/// τ is the torque of the reference model, which is smooth: the measured one has noise that its second rate would blow up.
+pub struct JointElasticity;
+
+impl EffectKind for JointElasticity {
+    fn name(&self) -> &str {
+        "joint_elasticity"
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        None
+    }
+    fn telling_motion(&self) -> &'static str {
+        "quick reversals, so that the torque changes fast"
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let joint = site[0];
+        let unit = match tree.joint(joint).joint_type {
+            JointType::Prismatic => "m/N",
+            _ => "rad/(N·m)",
+        };
+        Box::new(Elastic {
+            joint,
+            name: tree.joint(joint).joint.clone(),
+            unit,
+            joints: tree.joint_count(),
+            constants: constants.clone(),
+        })
+    }
+}
+
+struct Elastic {
+    joint: usize,
+    name: String,
+    unit: &'static str,
+    joints: usize,
+    constants: Constants,
+}
+
+impl Effect for Elastic {
+    fn spec(&self) -> EffectSpec {
+        EffectSpec {
+            kind: "joint_elasticity".to_owned(),
+            joints: vec![self.name.clone()],
+            constants: self.constants.clone(),
+        }
+    }
+    fn parameters(&self) -> Vec<EffectParameter> {
+        vec![EffectParameter {
+            joint: self.name.clone(),
+            name: "compliance".to_owned(),
+            unit: self.unit.to_owned(),
+            bounds: (0.0, f64::INFINITY),
+        }]
+    }
+    fn entries(&self) -> Vec<Entry> {
+        (0..self.joints).map(|row| Entry { row, parameter: 0 }).collect()
+    }
+    fn needs(&self) -> Needs {
+        Needs { torque: true, derivatives: true, ..Needs::default() }
+    }
+    fn evaluator(&self) -> Box<dyn Evaluator + '_> {
+        Box::new(ElasticColumns { joint: self.joint, joints: self.joints })
+    }
+}
+
+struct ElasticColumns {
+    joint: usize,
+    joints: usize,
+}
+
+impl Evaluator for ElasticColumns {
+    fn evaluate(&mut self, sample: &Sample<'_>, columns: &mut [f64]) {
+        let (Some(torque), Some(rate), Some(second)) = (
+            sample.reference_torque().get(self.joint),
+            sample.reference_torque_rate().get(self.joint),
+            sample.reference_torque_second_rate().get(self.joint),
+        ) else {
+            return columns.fill(0.0);
+        };
+        let (position, velocity, acceleration) =
+            (sample.torque_by_position(), sample.torque_by_velocity(), sample.torque_by_acceleration());
+        for (row, column) in columns.iter_mut().enumerate() {
+            let at = row * self.joints + self.joint;
+            *column = -(position[at] * torque + velocity[at] * rate + acceleration[at] * second);
+        }
+    }
+}

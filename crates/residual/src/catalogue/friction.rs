@@ -1,0 +1,198 @@
+//! Friction that depends on the velocity alone, or on the load.
+
+use super::columns::{OwnTorque, ParameterKind, smooth_sign};
+use super::kind::{Constants, EffectKind, SignalRanges, around, constant, product, values};
+use phiw_dynamics::Tree;
+use phiw_identification::{Effect, Needs, Sample};
+
+/// The constant of every smoothed sign: the speed over which it turns \[rad/s, m/s\].
+pub(super) const WIDTH: &str = "sign_width";
+
+/// Speeds over which a sign may turn, from the plain sign up to a tenth of the joint's speed.
+pub(super) fn sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
+    let largest = 0.02 * ranges.joints[joint].velocity_rms;
+    values(WIDTH, [0.0].into_iter().chain((0..6).map(|halvings| largest * 0.5_f64.powi(halvings))))
+}
+
+fn width_of(constants: &Constants) -> f64 {
+    constant(constants, WIDTH, 0.0)
+}
+
+/// fv·q̇.
+pub struct Viscous;
+
+impl EffectKind for Viscous {
+    fn name(&self) -> &str {
+        "viscous_friction"
+    }
+    fn telling_motion(&self) -> &'static str {
+        "a motion at several constant speeds"
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let joint = site[0];
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = sample.qd()[joint];
+        let parameters = [("fv", ParameterKind::PerVelocity, 0.0)];
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+    }
+}
+
+/// fc·sign(q̇).
+pub struct Coulomb;
+
+impl EffectKind for Coulomb {
+    fn name(&self) -> &str {
+        "coulomb_friction"
+    }
+    fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
+        sign_widths(site[0], ranges)
+    }
+    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+        around(found, WIDTH, step)
+    }
+    fn telling_motion(&self) -> &'static str {
+        "a motion that reverses often, at low and at high speed"
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let (joint, width) = (site[0], width_of(constants));
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = smooth_sign(sample.qd()[joint], width);
+        let parameters = [("fc", ParameterKind::Torque, 0.0)];
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+    }
+}
+
+/// Half the difference between the two directions, of the viscous part, the Coulomb part, or both (`part` 0, 1, 2).
+pub struct Asymmetric;
+
+impl EffectKind for Asymmetric {
+    fn name(&self) -> &str {
+        "asymmetric_friction"
+    }
+    fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
+        let widths: Vec<Constants> = sign_widths(site[0], ranges).into_iter().step_by(3).collect();
+        let mut variants = values("part", [0.0]);
+        variants.extend(product(&values("part", [1.0, 2.0]), &widths));
+        variants
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        Some(Constants::from([("part".to_owned(), 2.0)]))
+    }
+    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+        around(found, WIDTH, step)
+    }
+    fn telling_motion(&self) -> &'static str {
+        "the same path forth and back at several speeds, with rests"
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let (joint, width) = (site[0], width_of(constants));
+        let viscous = ("fv_difference", ParameterKind::PerVelocity, f64::NEG_INFINITY);
+        let coulomb = ("fc_difference", ParameterKind::Torque, f64::NEG_INFINITY);
+        let part = constant(constants, "part", 2.0);
+        let viscous_column = move |sample: &Sample<'_>| sample.qd()[joint].abs();
+        let coulomb_column = move |sample: &Sample<'_>| smooth_sign(sample.qd()[joint], width).abs();
+        let kind = self.name();
+        if part == 0.0 {
+            let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = viscous_column(sample);
+            Box::new(OwnTorque::new(kind, tree, joint, constants, &[viscous], columns))
+        } else if part == 1.0 {
+            let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = coulomb_column(sample);
+            Box::new(OwnTorque::new(kind, tree, joint, constants, &[coulomb], columns))
+        } else {
+            let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+                out[0] = viscous_column(sample);
+                out[1] = coulomb_column(sample);
+            };
+            Box::new(OwnTorque::new(kind, tree, joint, constants, &[viscous, coulomb], columns))
+        }
+    }
+}
+
+/// f2·q̇·|q̇|.
+pub struct Quadratic;
+
+impl EffectKind for Quadratic {
+    fn name(&self) -> &str {
+        "quadratic_friction"
+    }
+    fn telling_motion(&self) -> &'static str {
+        "a fast motion beside a slow one"
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let joint = site[0];
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            let velocity = sample.qd()[joint];
+            out[0] = velocity * velocity.abs();
+        };
+        let parameters = [("f2", ParameterKind::PerSquaredVelocity, f64::NEG_INFINITY)];
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+    }
+}
+
+/// fs·exp(−|q̇/vs|^δ)·sign(q̇), on top of Coulomb friction.
+pub struct Stribeck;
+
+const STRIBECK_VELOCITY: &str = "stribeck_velocity";
+const EXPONENT: &str = "exponent";
+
+impl EffectKind for Stribeck {
+    fn name(&self) -> &str {
+        "stribeck_friction"
+    }
+    fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
+        let speed = ranges.joints[site[0]].velocity_rms;
+        let speeds = values(STRIBECK_VELOCITY, (0..6).map(|halvings| speed * 0.5_f64.powi(halvings)));
+        let shapes = product(&speeds, &values(EXPONENT, [1.0, 2.0]));
+        let widths = values(WIDTH, [0.0, 0.02 * speed]);
+        product(&shapes, &widths)
+    }
+    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+        let mut near = around(found, STRIBECK_VELOCITY, step);
+        near.extend(around(found, WIDTH, step));
+        near.extend(around(found, EXPONENT, step));
+        near
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        None
+    }
+    fn telling_motion(&self) -> &'static str {
+        "a slow motion, well below the speed at which friction is lowest"
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let (joint, width) = (site[0], width_of(constants));
+        let speed = constant(constants, STRIBECK_VELOCITY, 0.1);
+        let exponent = constant(constants, EXPONENT, 2.0);
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            let velocity = sample.qd()[joint];
+            out[0] = (-(velocity / speed).abs().powf(exponent)).exp() * smooth_sign(velocity, width);
+        };
+        let parameters = [("fs", ParameterKind::Torque, 0.0)];
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+    }
+}
+
+/// μ·|τ of the rigid body|·sign(q̇).
+pub struct LoadDependent;
+
+impl EffectKind for LoadDependent {
+    fn name(&self) -> &str {
+        "load_dependent_friction"
+    }
+    fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
+        sign_widths(site[0], ranges).into_iter().step_by(3).collect()
+    }
+    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+        around(found, WIDTH, step)
+    }
+    fn telling_motion(&self) -> &'static str {
+        "the same motion with the arm stretched out and folded, or with a load"
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let (joint, width) = (site[0], width_of(constants));
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            let load = sample.reference_torque().get(joint).copied().unwrap_or_default();
+            out[0] = load.abs() * smooth_sign(sample.qd()[joint], width);
+        };
+        let parameters = [("mu", ParameterKind::Ratio, 0.0)];
+        let needs = Needs { torque: true, ..Needs::default() };
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns).needing(needs))
+    }
+}

@@ -1,0 +1,144 @@
+//! What the catalogue knows of a kind of effect.
+
+use phiw_dynamics::Tree;
+use phiw_identification::Effect;
+use phiw_telemetry::Survey;
+use std::collections::BTreeMap;
+
+/// Non-linear constants of an effect by name, SI units.
+pub type Constants = BTreeMap<String, f64>;
+
+/// A kind of effect: where it can act, which constants to try, and how to build it.
+///
+/// Implement it for an effect of your own and add it with [`crate::Catalogue::with`].
+pub trait EffectKind: Send + Sync {
+    /// Its name, as in `report.json`.
+    fn name(&self) -> &str;
+
+    /// The joints, or groups of joints, that it can act on: each joint by default.
+    fn sites(&self, tree: &Tree) -> Vec<Vec<usize>> {
+        (0..tree.joint_count()).map(|joint| vec![joint]).collect()
+    }
+
+    /// In words, what it acts on, for error messages.
+    fn acts_on(&self) -> &'static str {
+        "one joint"
+    }
+
+    /// Whether it can act on these joints.
+    fn accepts(&self, tree: &Tree, site: &[usize]) -> bool {
+        self.sites(tree).iter().any(|known| known == site)
+    }
+
+    /// Constants to try on a site, given the ranges of the signals; one empty set where it has none.
+    fn scan(&self, _site: &[usize], _ranges: &SignalRanges) -> Vec<Constants> {
+        vec![Constants::new()]
+    }
+
+    /// Constants near `found`, closer together than the scan's; `step` counts the refinements so far.
+    fn refine(&self, _found: &Constants, _step: usize) -> Vec<Constants> {
+        Vec::new()
+    }
+
+    /// Constants to use when the kind is declared for all joints; `None` if that makes no sense.
+    fn declared_constants(&self) -> Option<Constants> {
+        Some(Constants::new())
+    }
+
+    /// Whether a free rigid body takes the effect up entirely, so that it can only be seen against a held model.
+    fn needs_held_model(&self) -> bool {
+        false
+    }
+
+    /// The motion, or the signal, that would tell it from its rivals.
+    fn telling_motion(&self) -> &'static str;
+
+    /// Builds it. `site` is one that it accepts; constants that are missing take their defaults.
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect>;
+}
+
+/// Ranges of the signals of one joint over the training logs.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointRange {
+    /// Lowest and highest position \[rad, m\].
+    pub position: (f64, f64),
+    /// RMS of the velocity \[rad/s, m/s\].
+    pub velocity_rms: f64,
+    /// RMS of the torque \[N·m, N\].
+    pub torque_rms: f64,
+    /// Largest torque \[N·m, N\].
+    pub torque_peak: f64,
+}
+
+/// What the training logs cover: bounds for the constants to try.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SignalRanges {
+    /// One for each joint.
+    pub joints: Vec<JointRange>,
+    /// First and last moment of the session \[s\].
+    pub session: (f64, f64),
+    /// Time between samples \[s\].
+    pub period: f64,
+    /// For each joint, spatial frequencies N \[1/rad\] at which its residual has peaks.
+    pub ripple_frequencies: Vec<Vec<f64>>,
+    /// Whether any joint has a temperature.
+    pub temperature: bool,
+}
+
+impl SignalRanges {
+    /// Ranges as the surveys of the training logs tell them.
+    pub fn of_surveys(surveys: &[Survey]) -> Self {
+        let count = surveys.first().map_or(0, |survey| survey.joints.len());
+        let joint = |index: usize| {
+            let mut range = JointRange { position: (f64::INFINITY, f64::NEG_INFINITY), ..JointRange::default() };
+            for joint in surveys.iter().map(|survey| &survey.joints[index]) {
+                range.position = (range.position.0.min(joint.q_min), range.position.1.max(joint.q_max));
+                range.velocity_rms = range.velocity_rms.max(joint.velocity_rms);
+                if let Some(torque) = joint.torque {
+                    range.torque_rms = range.torque_rms.max(torque.rms);
+                    range.torque_peak = range.torque_peak.max(torque.max).max(-torque.min);
+                }
+            }
+            range
+        };
+        let moment = |pick: fn((f64, f64)) -> f64, fold: fn(f64, f64) -> f64| {
+            surveys.iter().map(|survey| pick(survey.time_range()) + survey.session.offset).fold(f64::NAN, fold)
+        };
+        SignalRanges {
+            joints: (0..count).map(joint).collect(),
+            session: (moment(|range| range.0, f64::min), moment(|range| range.1, f64::max)),
+            period: surveys.first().map_or(0.0, |survey| survey.period),
+            ripple_frequencies: vec![Vec::new(); count],
+            temperature: surveys.iter().any(|survey| survey.joints.iter().any(|joint| joint.temperature)),
+        }
+    }
+}
+
+/// One set for each value of one constant.
+pub(super) fn values(name: &str, values: impl IntoIterator<Item = f64>) -> Vec<Constants> {
+    values.into_iter().map(|value| Constants::from([(name.to_owned(), value)])).collect()
+}
+
+/// Every pair of a set of each.
+pub(super) fn product(left: &[Constants], right: &[Constants]) -> Vec<Constants> {
+    let join = |a: &Constants, b: &Constants| a.clone().into_iter().chain(b.clone()).collect();
+    left.iter().flat_map(|a| right.iter().map(move |b| join(a, b))).collect()
+}
+
+/// `found` with one constant times each factor, `spread` shrinking with every step.
+pub(super) fn around(found: &Constants, name: &str, step: usize) -> Vec<Constants> {
+    let Some(&value) = found.get(name) else { return Vec::new() };
+    let spread = 1.5_f64.powf(0.5_f64.powi(step as i32));
+    [1.0 / spread, spread]
+        .map(|factor| {
+            let mut near = found.clone();
+            near.insert(name.to_owned(), value * factor);
+            near
+        })
+        .to_vec()
+}
+
+/// A constant, or its default.
+pub(super) fn constant(constants: &Constants, name: &str, default: f64) -> f64 {
+    constants.get(name).copied().unwrap_or(default)
+}

@@ -1,0 +1,123 @@
+//! How logs are conditioned: chosen once for a session, applied to each log.
+
+use crate::cutoff::{self, BANDWIDTHS, CutoffSuggestion};
+use crate::{ClockChoice, LogError, LogPlan, Survey};
+use std::fmt;
+
+/// What the user fixes; what is left `None` is chosen from the data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConditioningOptions {
+    /// Cut-off of the positions' low-pass, in Hz.
+    pub cutoff_hz: Option<f64>,
+    /// Cut-off of the parallel filter over columns and torque, in Hz; by default the motion's bandwidth, a fifth of the positions' cut-off, but at
+    /// least 10 Hz.
+    pub parallel_cutoff_hz: Option<f64>,
+    /// Samples from one output to the next; by default the output rate is about four times the parallel
+    /// cut-off.
+    pub decimation: Option<usize>,
+    /// How stamps that jitter are read.
+    pub clock: ClockChoice,
+    /// Whether the columns `qd.<joint>`, `qdd.<joint>` are used where there are plausible ones, instead of
+    /// differentiating.
+    pub use_measured_derivatives: bool,
+    /// Leading samples of a block that no output covers, in seconds.
+    pub warm_up: f64,
+    /// About how many samples a block has.
+    pub block_samples: usize,
+}
+
+impl Default for ConditioningOptions {
+    fn default() -> Self {
+        ConditioningOptions {
+            cutoff_hz: None,
+            parallel_cutoff_hz: None,
+            decimation: None,
+            clock: ClockChoice::Auto,
+            use_measured_derivatives: true,
+            warm_up: 0.0,
+            block_samples: 1 << 13,
+        }
+    }
+}
+
+/// How the logs of a session are conditioned.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conditioning {
+    /// Cut-off of the positions' low-pass (−6 dB), in Hz.
+    pub cutoff_hz: f64,
+    /// Whether the data chose it, not the user.
+    pub cutoff_from_data: bool,
+    /// Cut-off of the parallel filter (−6 dB), in Hz.
+    pub parallel_cutoff_hz: f64,
+    /// What each joint of each log suggests as the positions' cut-off; the largest is taken. Joints that
+    /// never move suggest none.
+    pub suggestions: Vec<CutoffSuggestion>,
+    /// What was asked for.
+    pub options: ConditioningOptions,
+}
+
+impl Conditioning {
+    /// Chooses one conditioning for the logs of a session: the same cut-offs for all.
+    ///
+    /// # Errors
+    /// [`LogError::Cutoff`] for a cut-off that some log's sample rate can't carry.
+    pub fn choose(surveys: &[Survey], options: &ConditioningOptions) -> Result<Self, LogError> {
+        let suggestions: Vec<_> =
+            surveys.iter().enumerate().flat_map(|(log, survey)| cutoff::suggest(survey, log)).collect();
+        let highest = surveys
+            .iter()
+            .map(|survey| cutoff::HIGHEST_SHARE * survey.rate_hz())
+            .fold(f64::INFINITY, f64::min);
+        let suggested = suggestions.iter().map(|suggestion| suggestion.cutoff_hz).fold(0.0, f64::max);
+        let from_data = if suggested > 0.0 { suggested.min(highest) } else { highest };
+        let cutoff_hz = options.cutoff_hz.unwrap_or(from_data);
+        // The positions' filter must bend no acceleration; the parallel filter bends columns and torque alike and may stop where the motion ends.
+        let parallel = (cutoff_hz / BANDWIDTHS).max(LEAST_PARALLEL_HZ).min(cutoff_hz);
+        let conditioning = Conditioning {
+            cutoff_hz,
+            cutoff_from_data: options.cutoff_hz.is_none(),
+            parallel_cutoff_hz: options.parallel_cutoff_hz.unwrap_or(parallel),
+            suggestions,
+            options: options.clone(),
+        };
+        for survey in surveys {
+            conditioning.check(survey)?;
+        }
+        Ok(conditioning)
+    }
+
+    /// What the conditioning comes to for one log: kernels for its sample rate, its clock, its measured
+    /// derivatives.
+    ///
+    /// # Errors
+    /// [`LogError::Cutoff`] for a cut-off that the log's sample rate can't carry.
+    pub fn plan(&self, survey: &Survey) -> Result<LogPlan, LogError> {
+        self.check(survey)?;
+        Ok(LogPlan::new(self, survey))
+    }
+
+    fn check(&self, survey: &Survey) -> Result<(), LogError> {
+        let highest_hz = HIGHEST_SHARE_BY_HAND * survey.rate_hz();
+        for cutoff_hz in [self.cutoff_hz, self.parallel_cutoff_hz] {
+            if !(cutoff_hz > 0.0 && cutoff_hz <= highest_hz) {
+                let rate_hz = survey.rate_hz();
+                return Err(LogError::Cutoff { path: survey.path.clone(), cutoff_hz, rate_hz, highest_hz });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What friction does at a reversal lies below this, however slow the motion is otherwise.
+const LEAST_PARALLEL_HZ: f64 = 10.0;
+
+/// The low-pass ends at 1.4 times the cut-off; that must stay below half the sample rate.
+const HIGHEST_SHARE_BY_HAND: f64 = 0.35;
+
+impl fmt::Display for Conditioning {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let origin = if self.cutoff_from_data { "chosen from the spectra" } else { "as told" };
+        write!(f, "positions low-passed at {:.2} Hz ({origin}), ", self.cutoff_hz)?;
+        write!(f, "columns and torque at {:.2} Hz", self.parallel_cutoff_hz)
+    }
+}

@@ -1,0 +1,182 @@
+//! What can be wrong with a log.
+
+use std::io;
+use std::path::PathBuf;
+
+/// What is wrong with a log, where, and how to mend it.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    /// There is no such file.
+    #[error("{}: no such file; check the path", path.display())]
+    NotFound {
+        /// The path as it was given.
+        path: PathBuf,
+    },
+    /// The file exists but can't be read.
+    #[error("{}: can't be read: {source}", path.display())]
+    Unreadable {
+        /// The path as it was given.
+        path: PathBuf,
+        /// What the operating system said.
+        source: io::Error,
+    },
+    /// The file can't be written.
+    #[error("{}: can't be written: {source}", path.display())]
+    Unwritable {
+        /// The path as it was given.
+        path: PathBuf,
+        /// What the operating system said.
+        source: io::Error,
+    },
+    /// The file holds nothing, or a header only.
+    #[error("{}: the log is empty; expected a header line such as `t,q.joint_1,tau.joint_1` and rows of numbers", path.display())]
+    Empty {
+        /// The log.
+        path: PathBuf,
+    },
+    /// The header has no column `t`.
+    #[error("{}, line 1: no column `t` (time in seconds); {hint}", path.display())]
+    NoTimeColumn {
+        /// The log.
+        path: PathBuf,
+        /// What the header looks like instead.
+        hint: String,
+    },
+    /// Columns that the joints need are missing.
+    #[error("{}, line 1: no column `{}`{}; {}", path.display(), missing[0], others(missing), nearest_hint(nearest))]
+    MissingColumn {
+        /// The log.
+        path: PathBuf,
+        /// The columns looked for and not found; at least one.
+        missing: Vec<String>,
+        /// The header's columns nearest in name to the first missing one, best first.
+        nearest: Vec<String>,
+    },
+    /// Two columns have the same name.
+    #[error("{}, line 1: two columns are named `{column}`; rename or remove one", path.display())]
+    DuplicateColumn {
+        /// The log.
+        path: PathBuf,
+        /// Their name.
+        column: String,
+    },
+    /// A cell of a used column is not a number.
+    #[error("{}, line {line}, column `{column}`: `{cell}` is not a number; leave the cell empty to mark a gap", path.display())]
+    NotANumber {
+        /// The log.
+        path: PathBuf,
+        /// Line in the file, counted from 1.
+        line: u64,
+        /// Name of the column.
+        column: String,
+        /// The cell's text.
+        cell: String,
+    },
+    /// A row, not the last, has too few or too many cells.
+    #[error("{}, line {line}: {found} cells, but the header has {expected}; mend or delete the line", path.display())]
+    WrongCellCount {
+        /// The log.
+        path: PathBuf,
+        /// Line in the file, counted from 1.
+        line: u64,
+        /// Cells in the header.
+        expected: usize,
+        /// Cells in the row.
+        found: usize,
+    },
+    /// A time stamp is earlier than the one before it.
+    #[error(
+        "{}, line {line}, column `t`: time runs backwards, from {previous} s to {stamp} s; sort the rows, or split the file into one log a run",
+        path.display()
+    )]
+    TimeBackwards {
+        /// The log.
+        path: PathBuf,
+        /// Line in the file, counted from 1.
+        line: u64,
+        /// The last stamp before, in seconds.
+        previous: f64,
+        /// The stamp, in seconds.
+        stamp: f64,
+    },
+    /// Every row is a gap.
+    #[error("{}: no usable row of {rows}{reasons}", path.display())]
+    NoUsableRows {
+        /// The log.
+        path: PathBuf,
+        /// Rows in the file.
+        rows: u64,
+        /// Why they were skipped, in words; starts with a separator or is empty.
+        reasons: String,
+    },
+    /// No segment is long enough for the filter.
+    #[error(
+        "{}: no stretch without a gap is long enough: the longest has {longest} samples, a cut-off of {cutoff_hz:.3} Hz needs {needed}; raise the cut-off or record longer",
+        path.display()
+    )]
+    NoLongSegment {
+        /// The log.
+        path: PathBuf,
+        /// Samples of the longest segment.
+        longest: usize,
+        /// Samples that the filter needs.
+        needed: usize,
+        /// The lower of the two cut-off frequencies, in Hz.
+        cutoff_hz: f64,
+    },
+    /// A cut-off that the log's sample rate can't carry.
+    #[error(
+        "{}: a cut-off of {cutoff_hz} Hz does not fit a sample rate of {rate_hz:.1} Hz; choose one above 0 and up to {highest_hz:.1} Hz",
+        path.display()
+    )]
+    Cutoff {
+        /// The log.
+        path: PathBuf,
+        /// The cut-off asked for, in Hz.
+        cutoff_hz: f64,
+        /// The log's sample rate, in Hz.
+        rate_hz: f64,
+        /// The highest cut-off that fits, in Hz.
+        highest_hz: f64,
+    },
+    /// The arrays of a [`Recording`](crate::Recording) do not fit each other.
+    #[error("recording: `{array}` has {found} values, but {rows} rows of {joints} joints need {expected}", expected = rows * joints)]
+    Shape {
+        /// Name of the array.
+        array: &'static str,
+        /// Rows of the recording.
+        rows: usize,
+        /// Joints of the recording.
+        joints: usize,
+        /// Values that the array holds.
+        found: usize,
+    },
+}
+
+impl LogError {
+    /// An [`io::Error`] met while reading `path`.
+    pub(crate) fn reading(path: PathBuf, source: io::Error) -> Self {
+        match source.kind() {
+            io::ErrorKind::NotFound => LogError::NotFound { path },
+            _ => LogError::Unreadable { path, source },
+        }
+    }
+}
+
+fn others(missing: &[String]) -> String {
+    match missing.len() {
+        0 | 1 => String::new(),
+        2 => format!(" (nor `{}`)", missing[1]),
+        n => format!(" (nor {} others)", n - 1),
+    }
+}
+
+fn nearest_hint(nearest: &[String]) -> String {
+    match nearest {
+        [] => "add it, or hold the joint".into(),
+        names => {
+            let quoted: Vec<_> = names.iter().map(|name| format!("`{name}`")).collect();
+            format!("nearest: {}; rename the column, or hold the joint", quoted.join(", "))
+        }
+    }
+}

@@ -1,0 +1,347 @@
+//! The first pass over a log: what is in it, without changing anything.
+
+use crate::clock::{Clock, uniform_misfit};
+use crate::columns::{Layout, TorqueColumns};
+use crate::histogram::Histogram;
+use crate::joint_survey::{Five, JointCollector};
+use crate::reader::{LogReader, Row, Rows};
+use crate::segments::{RowCounts, SegmentSink, split};
+use crate::spectrum::SpectrumEstimator;
+use crate::{GapCount, JointSurvey, LogError, Segment, Spectrum};
+use std::path::{Path, PathBuf};
+
+/// What is in a log: the result of [`survey`], and what [`stream`](crate::stream) needs to read it again.
+#[derive(Debug, Clone)]
+pub struct Survey {
+    /// The log.
+    pub path: PathBuf,
+    /// Place in the session, see [`arrange_session`].
+    pub session: Session,
+    /// What was asked for when it was surveyed.
+    pub torque: TorqueColumns,
+    /// Rows below the header.
+    pub rows: u64,
+    /// Rows that are usable: part of a segment.
+    pub used_rows: u64,
+    /// Stretches without a gap of at least [`SHORTEST_KEPT`](Survey::SHORTEST_KEPT) rows, in order.
+    pub segments: Vec<Segment>,
+    /// Shorter stretches.
+    pub short_segments: u64,
+    /// Why rows were skipped and segments split, in the order of first occurrence.
+    pub gaps: Vec<GapCount>,
+    /// Columns in the header that are not used.
+    pub ignored_columns: Vec<String>,
+    /// Median distance of consecutive stamps, in seconds; exact over the first 65536, checked against a
+    /// histogram over all.
+    pub median_period: f64,
+    /// Mean distance of consecutive stamps inside segments, in seconds: the sample period.
+    pub period: f64,
+    /// Root mean square deviation of the distances inside segments from the median, relative to it.
+    pub jitter: f64,
+    /// Longest distance of stamps, in seconds, that does not split: 1.25 times the 99th percentile, within
+    /// 1.5 to 2.5 medians.
+    pub longest_step: f64,
+    /// The clock under which the positions are smoother: the median error of a sample against the cubic
+    /// through its four
+    /// neighbours is compared at places where the stamps are uneven. [`Clock::Uniform`] must win by a tenth.
+    pub clock: Clock,
+    /// One entry a joint, in the order asked for.
+    pub joints: Vec<JointSurvey>,
+    /// Hash of the file's bytes: two files of equal content have the same.
+    pub content_hash: u64,
+    /// Power spectra.
+    pub spectrum: Spectrum,
+}
+
+/// Where a log lies in its session.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Session {
+    /// Which log it is, counted from 0.
+    pub log: usize,
+    /// What to add to the log's stamps to get the session's time, in seconds.
+    pub offset: f64,
+}
+
+impl Survey {
+    /// Rows from which on a stretch is listed in [`segments`](Survey::segments); no filter can use a shorter
+    /// one.
+    pub const SHORTEST_KEPT: usize = 8;
+
+    /// Sample rate, in Hz.
+    pub fn rate_hz(&self) -> f64 {
+        1.0 / self.period
+    }
+
+    /// First and last usable stamp, in seconds.
+    pub fn time_range(&self) -> (f64, f64) {
+        let start = self.segments.first().map_or(0.0, |segment| segment.t_start);
+        (start, self.segments.last().map_or(start, |segment| segment.t_end))
+    }
+
+    /// Time covered by the segments, in seconds.
+    pub fn duration(&self) -> f64 {
+        self.segments.iter().map(|segment| segment.t_end - segment.t_start).sum()
+    }
+}
+
+/// Numbers the logs of a session and puts them on one time axis.
+///
+/// Stamps that overlap nowhere are taken to count from one origin and are kept. Where any two logs overlap,
+/// each log is put behind the
+/// one before it in the order given.
+pub fn arrange_session(surveys: &mut [Survey]) {
+    let mut ranges: Vec<_> = surveys.iter().map(Survey::time_range).collect();
+    ranges.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let overlap = ranges.windows(2).any(|pair| pair[1].0 <= pair[0].1);
+    let mut end = None;
+    for (log, survey) in surveys.iter_mut().enumerate() {
+        let (first, last) = survey.time_range();
+        let offset = match end {
+            Some(end) if overlap => end + survey.period - first,
+            _ => 0.0,
+        };
+        survey.session = Session { log, offset };
+        end = Some(last + offset);
+    }
+}
+
+/// Reads a log once and says what is in it.
+///
+/// Constant memory: statistics, histograms and spectra, and one small record a segment. `progress` is told
+/// the bytes done and the
+/// bytes in total now and then.
+///
+/// # Errors
+/// A file that can't be read, columns that are missing, cells that are not numbers, time that runs backwards,
+/// no usable row.
+pub fn survey(
+    path: &Path,
+    joints: &[String],
+    torque: TorqueColumns,
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<Survey, LogError> {
+    let mut open = || LogReader::open(path, joints, torque);
+    let (mut survey, reader) = survey_rows(&mut open, joints, progress)?;
+    survey.torque = torque;
+    survey.ignored_columns.clone_from(&reader.columns().ignored);
+    survey.content_hash = reader.content_hash();
+    Ok(survey)
+}
+
+/// [`survey`] of any source of rows, which `open` starts from the beginning; also gives back the source, read
+/// to its end.
+pub(crate) fn survey_rows<R: Rows>(
+    open: &mut dyn FnMut() -> Result<R, LogError>,
+    joints: &[String],
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<(Survey, R), LogError> {
+    let head = Steps::of_head(&mut open()?)?;
+    let mut rows = open()?;
+    let mut collector = Collector::new(rows.layout(), head, progress);
+    let mut counts = split(&mut rows, head.longest(), &mut collector)?;
+    let all = collector.all_steps();
+    if !head.holds_for(all) {
+        // The log goes on unlike its head: once more, with what is now known.
+        rows = open()?;
+        collector = Collector::new(rows.layout(), all, progress);
+        counts = split(&mut rows, all.longest(), &mut collector)?;
+    }
+    if counts.used == 0 {
+        return Err(match counts.rows {
+            0 => LogError::Empty { path: rows.path().into() },
+            n => LogError::NoUsableRows { path: rows.path().into(), rows: n, reasons: counts.reasons() },
+        });
+    }
+    Ok((collector.finish(rows.path(), joints, counts), rows))
+}
+
+/// How far apart the stamps are.
+#[derive(Debug, Clone, Copy)]
+struct Steps {
+    median: f64,
+    /// The 99th percentile.
+    high: f64,
+}
+
+/// Steps at the head of a log whose median is exact.
+const HEAD: usize = 1 << 16;
+
+impl Steps {
+    fn of_head(rows: &mut dyn Rows) -> Result<Self, LogError> {
+        let mut values = vec![0.0; rows.layout().width];
+        let mut steps = Vec::new();
+        let mut previous = None;
+        while steps.len() < HEAD {
+            match rows.next(&mut values)? {
+                Row::Sample { .. } => {
+                    // Time that stands still or runs backwards is the splitter's to report.
+                    steps.extend(previous.map(|previous| values[0] - previous).filter(|step| *step > 0.0));
+                    previous = Some(values[0]);
+                }
+                Row::Gap { .. } => previous = None,
+                Row::End => break,
+            }
+        }
+        steps.sort_by(f64::total_cmp);
+        let quantile = |p: f64| steps.get((p * steps.len() as f64) as usize).copied().unwrap_or(1.0);
+        Ok(Steps { median: quantile(0.5), high: quantile(0.99) })
+    }
+
+    /// A lost sample doubles the step, jitter widens it: a split comes above 1.5 medians where stamps are
+    /// even, above 2.5 where they
+    /// are not.
+    fn longest(self) -> f64 {
+        (1.25 * self.high).clamp(1.5 * self.median, 2.5 * self.median)
+    }
+
+    fn holds_for(self, all: Steps) -> bool {
+        (all.median / self.median - 1.0).abs() < 0.2
+    }
+}
+
+/// A place is uneven where the stamp is off its neighbours' grid by this share of the period.
+const UNEVEN: f64 = 1e-3;
+
+struct Collector<'a> {
+    layout: Layout,
+    steps: Steps,
+    joints: Vec<JointCollector>,
+    spectrum: SpectrumEstimator,
+    segments: Vec<Segment>,
+    short_segments: u64,
+    /// The five latest samples of the segment, oldest first, flat.
+    recent: Vec<f64>,
+    in_segment: usize,
+    last_stamp: Option<f64>,
+    step_histogram: Histogram,
+    step_count: f64,
+    step_sum: f64,
+    step_square: f64,
+    progress: &'a mut dyn FnMut(u64, u64),
+}
+
+impl<'a> Collector<'a> {
+    fn new(layout: &Layout, steps: Steps, progress: &'a mut dyn FnMut(u64, u64)) -> Self {
+        let joint = |i: usize| {
+            let has = |places: &[Option<usize>]| places[i].is_some();
+            JointCollector::new(layout.torque, has(&layout.qd), has(&layout.qdd), has(&layout.temp))
+        };
+        Collector {
+            joints: (0..layout.joints).map(joint).collect(),
+            spectrum: SpectrumEstimator::new(layout, steps.median),
+            steps,
+            segments: Vec::new(),
+            short_segments: 0,
+            recent: vec![0.0; 5 * layout.width],
+            in_segment: 0,
+            last_stamp: None,
+            step_histogram: Histogram::new(),
+            step_count: 0.0,
+            step_sum: 0.0,
+            step_square: 0.0,
+            layout: layout.clone(),
+            progress,
+        }
+    }
+
+    fn all_steps(&self) -> Steps {
+        if self.step_histogram.total() == 0 {
+            return self.steps;
+        }
+        Steps { median: self.step_histogram.median(), high: self.step_histogram.quantile(0.99) }
+    }
+
+    fn step(&mut self, step: f64) {
+        self.step_count += 1.0;
+        self.step_sum += step;
+        self.step_square += (step / self.steps.median - 1.0).powi(2);
+    }
+
+    fn five(&self, place: Option<usize>) -> Five {
+        std::array::from_fn(|i| place.map_or(f64::NAN, |place| self.recent[i * self.layout.width + place]))
+    }
+
+    fn finish(self, path: &Path, joints: &[String], counts: RowCounts) -> Survey {
+        let votes: Vec<f64> = self.joints.iter().filter_map(JointCollector::smoother_when_uniform).collect();
+        let mean = votes.iter().sum::<f64>() / votes.len().max(1) as f64;
+        let jitter = (self.step_square / self.step_count.max(1.0)).sqrt();
+        let uneven = jitter > UNEVEN;
+        let clock = if uneven && mean < UNIFORM_WINS { Clock::Stamped } else { Clock::Uniform };
+        let period = if self.step_count > 0.0 { self.step_sum / self.step_count } else { self.steps.median };
+        Survey {
+            path: path.into(),
+            session: Session::default(),
+            torque: if self.layout.torque { TorqueColumns::Required } else { TorqueColumns::Absent },
+            rows: counts.rows,
+            used_rows: counts.used,
+            segments: self.segments,
+            short_segments: self.short_segments,
+            gaps: counts.gaps,
+            ignored_columns: Vec::new(),
+            median_period: self.steps.median,
+            period,
+            jitter,
+            longest_step: self.steps.longest(),
+            clock,
+            joints: (self.joints.iter().zip(joints))
+                .map(|(joint, name)| joint.finish(name, clock == Clock::Stamped))
+                .collect(),
+            content_hash: 0,
+            spectrum: self.spectrum.finish(self.layout.joints),
+        }
+    }
+}
+
+/// ln of how much smoother (on the mean over joints) positions must be at equal distances before the stamps
+/// are disbelieved.
+const UNIFORM_WINS: f64 = 0.1;
+
+impl SegmentSink for Collector<'_> {
+    fn sample(&mut self, values: &[f64]) -> bool {
+        let (width, n) = (self.layout.width, self.layout.joints);
+        // Also across splits: they may come from a head unlike the rest.
+        if let Some(last) = self.last_stamp.replace(values[0]) {
+            self.step_histogram.push(values[0] - last);
+        }
+        if self.in_segment > 0 {
+            self.step(values[0] - self.recent[4 * width]);
+        }
+        self.recent.copy_within(width.., 0);
+        self.recent[4 * width..].copy_from_slice(values);
+        self.in_segment += 1;
+
+        let (q, tau) = (self.layout.q(), self.layout.tau());
+        let torques = if self.layout.torque { &values[tau..tau + n] } else { &[] };
+        self.spectrum.push(&values[q..q + n], torques);
+        let optional = |place: Option<usize>| place.map_or(f64::NAN, |place| values[place]);
+        for (i, joint) in self.joints.iter_mut().enumerate() {
+            let torque = torques.get(i).copied().unwrap_or(f64::NAN);
+            joint.push(values[q + i], torque, optional(self.layout.qd[i]), optional(self.layout.qdd[i]));
+        }
+        if self.in_segment >= 5 {
+            let t = self.five(Some(0));
+            let uneven = uniform_misfit(t).abs() > UNEVEN * self.steps.median;
+            for i in 0..n {
+                let torque = self.layout.torque.then_some(tau + i);
+                let (q, tau) = (self.five(Some(q + i)), self.five(torque));
+                let (qd, qdd) = (self.five(self.layout.qd[i]), self.five(self.layout.qdd[i]));
+                self.joints[i].push_five(t, uneven, q, tau, qd, qdd);
+            }
+        }
+        true
+    }
+
+    fn end(&mut self, segment: Segment) -> bool {
+        match segment.rows {
+            rows if rows < Survey::SHORTEST_KEPT => self.short_segments += 1,
+            _ => self.segments.push(segment),
+        }
+        self.in_segment = 0;
+        self.spectrum.end_segment();
+        true
+    }
+
+    fn progress(&mut self, done: u64, total: u64) {
+        (self.progress)(done, total);
+    }
+}

@@ -1,0 +1,94 @@
+//! `cargo xtask oracle`: this workspace's dynamics against Pinocchio's, robot by robot.
+
+mod answers;
+mod case;
+mod comparison;
+mod pinocchio;
+
+use crate::environment;
+use answers::QUANTITIES;
+use case::Case;
+use std::process::ExitCode;
+
+/// The largest relative difference that is rounding.
+const TOLERANCE: f64 = 1e-9;
+
+/// Command line of `cargo xtask oracle`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Random states for each robot.
+    #[arg(long, default_value_t = 200)]
+    states: usize,
+    /// Random robots, besides those that are found as files.
+    #[arg(long, default_value_t = 12)]
+    random_robots: u64,
+    /// Seed of the states; random robots are numbered from it on.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// The Python that the private environment is made with.
+    #[arg(long, default_value = "python3")]
+    python: String,
+}
+
+/// Prints the table of differences; fails if one is too large.
+///
+/// # Errors
+/// Pinocchio cannot be installed, a robot cannot be read, or Pinocchio fails on it.
+pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let oracle = pinocchio::Oracle::install(&arguments.python)?;
+    let folder = tempfile::tempdir()?;
+    let mut cases = case::from_files(&environment::workspace_root()?)?;
+    cases.extend(case::random(folder.path(), arguments.seed, arguments.random_robots)?);
+
+    println!(
+        "Largest relative difference to Pinocchio {}, {} random states for each robot, seed {}",
+        oracle.version(),
+        arguments.states,
+        arguments.seed
+    );
+    println!("(* joints follow others: forward dynamics of Pinocchio through its mass matrix, not ABA)\n");
+    print!("{:<22} {:<12} {:>6}", "robot", "base", "joints");
+    QUANTITIES.iter().for_each(|quantity| print!(" {quantity:>10}"));
+    println!();
+    let mut largest = 0.0_f64;
+    for case in &cases {
+        let row = compare(&oracle, case, arguments)?;
+        println!("{row}");
+        largest = row.differences.iter().fold(largest, |largest, &difference| largest.max(difference));
+    }
+    let agrees = largest < TOLERANCE;
+    let verdict = if agrees { "below" } else { "NOT below" };
+    println!("\nmax relative difference {largest:.1e} over {} robots: {verdict} {TOLERANCE:.0e}", cases.len());
+    Ok(if agrees { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// A line of the table.
+struct Row<'a> {
+    case: &'a Case,
+    joints: usize,
+    follows: bool,
+    /// One for each of [`QUANTITIES`].
+    differences: Vec<f64>,
+}
+
+impl std::fmt::Display for Row<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let star = if self.follows { "*" } else { "" };
+        write!(f, "{:<22} {:<12} {:>6}", self.case.robot, self.case.base(), format!("{}{star}", self.joints))?;
+        self.differences.iter().try_for_each(|difference| write!(f, " {difference:>10.1e}"))
+    }
+}
+
+fn compare<'a>(
+    oracle: &pinocchio::Oracle,
+    case: &'a Case,
+    arguments: &Arguments,
+) -> anyhow::Result<Row<'a>> {
+    let tree = case.read()?;
+    let states = answers::States::random(&tree, arguments.states, arguments.seed)?;
+    let ours = answers::answers(&tree, &states)?;
+    let theirs = oracle.answers(case, &tree, &states)?;
+    let differences =
+        ours.iter().zip(&theirs).map(|(ours, theirs)| comparison::relative_difference(ours, theirs)).collect();
+    Ok(Row { case, joints: tree.joint_count(), follows: tree.has_mimic(), differences })
+}

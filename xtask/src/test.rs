@@ -1,0 +1,94 @@
+//! `cargo xtask test`: all checks of the workspace, with one line at the end that counts the tests.
+
+mod tally;
+
+use crate::environment;
+use anyhow::Context;
+use std::io::{BufRead, BufReader};
+use std::process::{ExitCode, Stdio};
+use tally::Tally;
+
+/// Command line of `cargo xtask test`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Tests only: neither format, lints nor documentation.
+    #[arg(long)]
+    quick: bool,
+}
+
+/// A check that is one call of cargo.
+struct Check {
+    arguments: &'static [&'static str],
+    environment: &'static [(&'static str, &'static str)],
+}
+
+const CHECKS: [Check; 3] = [
+    Check { arguments: &["fmt", "--all", "--check"], environment: &[] },
+    Check {
+        arguments: &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"],
+        environment: &[],
+    },
+    Check { arguments: &["doc", "--workspace", "--no-deps"], environment: &[("RUSTDOCFLAGS", "-D warnings")] },
+];
+
+/// `--show-output` prints what passing tests said, so that a test that skipped itself is seen and counted.
+const TESTS: &[&str] = &["test", "--workspace", "--no-fail-fast", "--", "--show-output"];
+
+/// Runs every check, also after one has failed, and prints the tally as the last line.
+///
+/// # Errors
+/// Cargo cannot be started.
+pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let mut failed = Vec::new();
+    let checks = if arguments.quick { &[] } else { &CHECKS[..] };
+    for check in checks {
+        if !passes(check)? {
+            failed.push(check.arguments);
+        }
+    }
+    let (mut tally, passed) = run_tests()?;
+    tally.add_failures(failed.len() as u64);
+    if !passed {
+        failed.push(TESTS);
+    }
+    for arguments in &failed {
+        println!("failed: cargo {}", arguments.join(" "));
+    }
+    println!("{tally}");
+    Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn passes(check: &Check) -> anyhow::Result<bool> {
+    announce(check.arguments);
+    let status = environment::cargo()?
+        .args(check.arguments)
+        .envs(check.environment.iter().copied())
+        .status()
+        .context("cargo cannot be started")?;
+    Ok(status.success())
+}
+
+/// Runs the tests, passing on their output line by line, and counts; whether all is well.
+fn run_tests() -> anyhow::Result<(Tally, bool)> {
+    announce(TESTS);
+    let mut child =
+        environment::cargo()?.args(TESTS).stdout(Stdio::piped()).spawn().context("cargo cannot be started")?;
+    let mut tally = Tally::default();
+    if let Some(output) = child.stdout.take() {
+        for line in BufReader::new(output).split(b'\n') {
+            let line = line.context("the output of the tests cannot be read")?;
+            let line = String::from_utf8_lossy(&line);
+            println!("{line}");
+            tally.read_line(&line);
+        }
+    }
+    let passed = child.wait().context("cargo test did not end")?.success();
+    if !passed && !tally.has_failures() {
+        tally.add_failures(1); // tests that do not compile, or a binary that crashed
+    }
+    Ok((tally, passed))
+}
+
+fn announce(arguments: &[&str]) {
+    println!("\n=== cargo {}", arguments.join(" "));
+}

@@ -1,0 +1,118 @@
+//! Names of effects: the 23 of the fixed formats, and what lies outside them.
+
+use serde::{Deserialize, Serialize};
+
+/// An effect of the catalogue, named as in `report.json` and `--declare`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+#[value(rename_all = "snake_case")]
+#[allow(missing_docs, reason = "the names are the documentation; formats.md defines them")]
+pub enum Kind {
+    ViscousFriction,
+    CoulombFriction,
+    AsymmetricFriction,
+    StribeckFriction,
+    QuadraticFriction,
+    LoadDependentFriction,
+    RotorInertia,
+    TorqueOffset,
+    TorqueGain,
+    JointSpring,
+    GravityBalancer,
+    TorqueRipple,
+    TransmissionCoupling,
+    Payload,
+    GravityTilt,
+    EncoderOffset,
+    TimeDelay,
+    Hysteresis,
+    ThermalDrift,
+    ExternalForce,
+    EndStop,
+    JointElasticity,
+    ActuatorSaturation,
+}
+
+/// An effect that no name of the catalogue fits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+#[value(rename_all = "snake_case")]
+pub enum Stranger {
+    /// A sinusoid in time that has nothing to do with the motion.
+    TimeSinusoid,
+    /// A spring between two joints: k·(qᵢ + qⱼ) on both.
+    PositionCoupling,
+    /// A cubic spring with a dead zone in mid-range.
+    DeadZoneSpring,
+    /// An offset that walks at random.
+    RandomWalk,
+    /// A torque sensor that reads zero below a threshold.
+    SensorDeadBand,
+    /// A load that is picked up in mid-log.
+    LoadStep,
+    /// A torque that follows the product of two joints' speeds.
+    SpeedProduct,
+    /// Friction that comes and goes around the turn.
+    PositionFriction,
+}
+
+/// What a secret is called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(untagged)]
+pub enum Name {
+    /// An effect of the catalogue.
+    Catalogue(Kind),
+    /// One from outside.
+    Outside(Stranger),
+}
+
+impl Kind {
+    /// The name in files.
+    pub fn name(self) -> String {
+        clap::ValueEnum::to_possible_value(&self).map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
+    /// Whether a free identification of the rigid body swallows the effect, so that it can only be told against a held model.
+    pub fn needs_held_model(self) -> bool {
+        matches!(self, Kind::Payload | Kind::GravityTilt | Kind::EncoderOffset)
+    }
+
+    /// Whether it is also sought against a held model: something that changes in a robot's life.
+    pub fn may_grow(self) -> bool {
+        use Kind::*;
+        matches!(
+            self,
+            ViscousFriction | CoulombFriction | TorqueGain | TimeDelay | ActuatorSaturation | TorqueOffset | ExternalForce
+        )
+    }
+
+    /// Whether `self` on some joint contains `other` on the same joint as a special case, or the other way round, or the two
+    /// are so much alike that finding one of them is right.
+    pub fn is_nested_with(self, other: Kind) -> bool {
+        use Kind::*;
+        let group = |kinds: &[Kind]| kinds.contains(&self) && kinds.contains(&other);
+        self == other
+            || group(&[CoulombFriction, AsymmetricFriction, StribeckFriction, Hysteresis, ThermalDrift])
+            || group(&[ViscousFriction, AsymmetricFriction, QuadraticFriction, ThermalDrift])
+            || group(&[ViscousFriction, CoulombFriction, TransmissionCoupling])
+            || group(&[RotorInertia, TransmissionCoupling, JointElasticity])
+            || group(&[TorqueOffset, JointSpring, GravityBalancer, ExternalForce, GravityTilt])
+            || group(&[CoulombFriction, LoadDependentFriction])
+            || group(&[TorqueOffset, AsymmetricFriction])
+            || group(&[JointSpring, EndStop, Hysteresis])
+            || group(&[TimeDelay, JointElasticity, RotorInertia, ViscousFriction])
+            || group(&[Payload, GravityTilt, EncoderOffset, ExternalForce, TorqueGain])
+    }
+}
+
+impl Name {
+    /// The name in files.
+    pub fn name(self) -> String {
+        match self {
+            Name::Catalogue(kind) => kind.name(),
+            Name::Outside(stranger) => {
+                clap::ValueEnum::to_possible_value(&stranger).map_or_else(String::new, |value| value.get_name().to_owned())
+            }
+        }
+    }
+}

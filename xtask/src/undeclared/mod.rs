@@ -1,0 +1,150 @@
+//! Robot logs with effects that nobody declared: generate them, let the tracer loose on them, score what it says.
+//!
+//! The tracer is a separate program (`phiw explain`) that sees files only. What is true stays here, or in a `truth.json` beside the
+//! folder that it sees. All forms of effects are written from the literature and not from the tracer's catalogue.
+
+mod case;
+mod dice;
+mod draw;
+mod elasticity;
+mod friction;
+mod kind;
+mod load;
+mod mechanism;
+mod plant;
+mod report_file;
+mod robot;
+mod run;
+mod saturation;
+mod score;
+mod secret;
+mod sensors;
+mod suite;
+mod table;
+#[cfg(test)]
+mod tests;
+mod tracer;
+mod trajectory;
+mod truth;
+mod visibility;
+mod write;
+
+use anyhow::Context;
+use kind::{Kind, Name};
+use std::path::PathBuf;
+use suite::{Seeds, Spec, Suite};
+
+/// Arguments of `cargo xtask undeclared`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// All suites, as many cases as the experiment asks for.
+    #[arg(long)]
+    all: bool,
+    /// One suite.
+    #[arg(long, conflicts_with = "all")]
+    suite: Option<Suite>,
+    /// Only cases with this effect among their secrets.
+    #[arg(long)]
+    kind: Option<Kind>,
+    /// Only cases of this robot.
+    #[arg(long)]
+    robot: Option<String>,
+    /// How many cases of each suite (default: as many as the experiment asks for).
+    #[arg(long)]
+    count: Option<usize>,
+    /// Which seeds.
+    #[arg(long, default_value = "report")]
+    seeds: Seeds,
+    /// Only write the cases' files into this folder: `<seed>/` for the tracer, `<seed>.truth.json` beside it.
+    #[arg(long, value_name = "DIR")]
+    generate: Option<PathBuf>,
+    /// The case of this seed only.
+    #[arg(long, value_name = "SEED", conflicts_with_all = ["all", "suite", "kind", "robot", "count"])]
+    case: Option<u64>,
+    /// Keep the files of each case, and its truth, in this folder.
+    #[arg(long, value_name = "DIR")]
+    keep: Option<PathBuf>,
+    /// Cases at a time.
+    #[arg(long, default_value_t = 2)]
+    jobs: usize,
+    /// The tracer (default: build it from this workspace).
+    #[arg(long, value_name = "PATH")]
+    phiw: Option<PathBuf>,
+    /// Trace each case's twin without secrets too, and take the noise floor from there: what the noise leaves behind the tracer's
+    /// own filter. Twice as slow.
+    #[arg(long)]
+    oracle: bool,
+    /// Where `cases.csv` and `score.md` go.
+    #[arg(long, value_name = "DIR", default_value = "target/undeclared")]
+    out: PathBuf,
+}
+
+/// Runs the task.
+///
+/// # Errors
+/// A folder cannot be written, a model does not read, or there is no tracer.
+pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
+    let robots = robot::robots()?;
+    let specs = specs(arguments, &robots)?;
+    if let Some(folder) = &arguments.generate {
+        return generate(&specs, &robots, folder);
+    }
+    let threads = std::thread::available_parallelism().map_or(1, usize::from).div_ceil(arguments.jobs.max(1));
+    let tracer = tracer::Tracer::find(arguments.phiw.as_deref(), threads)?;
+    let options = run::Options { jobs: arguments.jobs, oracle: arguments.oracle, keep: arguments.keep.as_deref() };
+    let scored = run::run_all(&specs, &robots, &tracer, &options)?;
+    if arguments.case.is_some() {
+        for case in &scored {
+            println!("{}", serde_json::to_string_pretty(&case.truth)?);
+        }
+    }
+    let score = format!("# Undeclared effects, {:?} seeds\n\n{}", arguments.seeds, table::markdown(&scored));
+    println!("{score}");
+    std::fs::create_dir_all(&arguments.out).with_context(|| arguments.out.display().to_string())?;
+    for (name, text) in [("score.md", score), ("cases.csv", table::csv(&scored))] {
+        let path = arguments.out.join(name);
+        std::fs::write(&path, text).with_context(|| path.display().to_string())?;
+    }
+    Ok(())
+}
+
+/// Writes the cases' files and truths, and runs nothing.
+fn generate(specs: &[Spec], robots: &[robot::Robot], folder: &std::path::Path) -> anyhow::Result<()> {
+    for spec in specs {
+        let case = case::Case::draw(spec, robots).with_context(|| format!("no robot can have case {}", spec.seed))?;
+        write::write_case(&case, folder)?;
+    }
+    if let [only] = specs {
+        println!("{}", std::fs::read_to_string(folder.join(format!("{}.truth.json", only.seed)))?);
+    }
+    Ok(())
+}
+
+fn specs(arguments: &Arguments, robots: &[robot::Robot]) -> anyhow::Result<Vec<Spec>> {
+    if let Some(seed) = arguments.case {
+        let spec = Spec::of_seed(seed, robots.len()).with_context(|| format!("no suite has a case of seed {seed}"))?;
+        return Ok(vec![spec]);
+    }
+    if let Some(name) = &arguments.robot {
+        let names: Vec<&str> = robots.iter().map(|robot| robot.name).collect();
+        anyhow::ensure!(names.contains(&name.as_str()), "no robot {name:?}; there are {}", names.join(", "));
+    }
+    let suites = match arguments.suite {
+        Some(suite) => vec![suite],
+        None => Suite::ALL.to_vec(),
+    };
+    let mut specs = Vec::new();
+    for suite in suites {
+        let wanted = |spec: &Spec| {
+            arguments.robot.as_ref().is_none_or(|name| robots[spec.robot].name == name)
+                && arguments.kind.is_none_or(|kind| spec.secrets.contains(&Name::Catalogue(kind)))
+        };
+        let full = suite.full_count();
+        // With a filter and a count, cases beyond the full run's fill up what the filter takes away.
+        let range = if arguments.count.is_some() { 0..100_000 } else { 0..full };
+        let seeds = range.map(|index| suite.seed(arguments.seeds, index));
+        let found = seeds.filter_map(|seed| Spec::of_seed(seed, robots.len())).filter(wanted);
+        specs.extend(found.take(arguments.count.unwrap_or(full)));
+    }
+    Ok(specs)
+}

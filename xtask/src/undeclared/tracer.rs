@@ -1,0 +1,98 @@
+//! Runs the tracer on the files of a case. It is a program of its own and sees nothing else.
+
+use super::case::Case;
+use super::report_file::Report;
+use super::write::write_visible;
+use anyhow::{Context, bail};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+/// The program under test.
+pub struct Tracer {
+    /// Path of `phiw`.
+    pub program: PathBuf,
+    /// Threads that it may use.
+    pub threads: usize,
+}
+
+/// What it said, and how long it took.
+pub struct Traced {
+    /// The report.
+    pub report: Report,
+    /// Time of `explain` alone.
+    pub elapsed: Duration,
+}
+
+impl Tracer {
+    /// Writes the case into `folder`, identifies the clean robot where a model is held, and lets the tracer explain the logs.
+    ///
+    /// # Errors
+    /// A file cannot be written or read, or the tracer fails: its standard error is in the message.
+    pub fn run(&self, case: &Case, folder: &Path) -> anyhow::Result<Traced> {
+        write_visible(case, folder)?;
+        let declared: Vec<String> = case.declared.iter().map(|kind| kind.name()).collect();
+        let base = |task: &str, logs: [&str; 3], out: &str| {
+            let mut command = Command::new(&self.program);
+            command.current_dir(folder).env("RAYON_NUM_THREADS", self.threads.to_string());
+            command.args([task, "--urdf", "robot.urdf", "--train", logs[0], logs[1], "--validate", logs[2]]);
+            if !declared.is_empty() {
+                command.args(["--declare", &declared.join(",")]);
+            }
+            command.args(["--out", out]);
+            command
+        };
+        let mut explain = base("explain", ["train_a.csv", "train_b.csv", "validate.csv"], "out");
+        if case.spec.held {
+            run(base("identify", ["clean_a.csv", "clean_b.csv", "clean_c.csv"], "clean"))?;
+            explain.args(["--model", "clean/model.json"]);
+        }
+        let start = Instant::now();
+        run(explain)?;
+        let elapsed = start.elapsed();
+        let path = folder.join("out/report.json");
+        let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        let report = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
+        Ok(Traced { report, elapsed })
+    }
+
+    /// The program at `path`, or else the one built from this workspace.
+    ///
+    /// # Errors
+    /// There is no such program, or the build fails.
+    pub fn find(path: Option<&Path>, threads: usize) -> anyhow::Result<Self> {
+        let program = match path {
+            Some(path) => path.canonicalize().with_context(|| path.display().to_string())?,
+            None => build()?,
+        };
+        Ok(Tracer { program, threads })
+    }
+}
+
+fn run(mut command: Command) -> anyhow::Result<()> {
+    let output = command.output().with_context(|| format!("{:?}", command.get_program()))?;
+    if !output.status.success() {
+        let arguments: Vec<_> = command.get_args().map(|argument| argument.to_string_lossy()).collect();
+        let message = String::from_utf8_lossy(&output.stderr);
+        bail!("`phiw {}` ended with {}: {}", arguments.join(" "), output.status, message.trim());
+    }
+    Ok(())
+}
+
+fn build() -> anyhow::Result<PathBuf> {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let build = Command::new(cargo)
+        .args(["build", "--release", "--package", "phiw", "--message-format", "json-render-diagnostics"])
+        .stderr(std::process::Stdio::inherit())
+        .output()
+        .context("cargo")?;
+    if !build.status.success() {
+        bail!("phiw does not build");
+    }
+    let messages = String::from_utf8_lossy(&build.stdout);
+    let executable = messages.lines().rev().find_map(|line| {
+        let message: serde_json::Value = serde_json::from_str(line).ok()?;
+        message.get("executable")?.as_str().map(PathBuf::from)
+    });
+    executable.context("cargo built phiw but named no executable")
+}

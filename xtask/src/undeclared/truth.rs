@@ -1,0 +1,97 @@
+//! What is true of a case, for the scorer and for whoever debugs the tracer; never in the folder that the tracer sees.
+
+use super::case::Case;
+use super::kind::{Kind, Name};
+use super::mechanism::Mechanism;
+use super::secret::{Form, Secret};
+use serde::Serialize;
+
+/// The truth of one case.
+#[derive(Clone, Debug, Serialize)]
+pub struct Truth {
+    /// Its seed: everything follows from it.
+    pub seed: u64,
+    /// Its family.
+    pub suite: super::suite::Suite,
+    /// The robot's name.
+    pub robot: &'static str,
+    /// Whether the secrets set in after the clean robot was identified, whose model is held.
+    pub held_model: bool,
+    /// Effects to be declared.
+    pub declared: Vec<String>,
+    /// What nobody declared.
+    pub secrets: Vec<TrueSecret>,
+    /// Speed over which signs are smoothed \[rad/s\].
+    pub sign_width: f64,
+    /// Sensors and sampling.
+    pub sensors: super::sensors::Sensors,
+    /// Draws thrown away before this one.
+    pub rejected: u64,
+}
+
+/// One undeclared effect.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TrueSecret {
+    /// What it is called.
+    pub kind: Name,
+    /// Names of its joints; none for a tilt of the base.
+    pub joints: Vec<String>,
+    /// Other names, with their joints, for literally the same torques.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub equivalents: Vec<(Kind, Vec<String>)>,
+    /// Its form, spelled out.
+    pub form: String,
+    /// Its size in the form's unit.
+    pub scale: f64,
+    /// RMS of its torque over that of the joint without it, for the joint that feels it most.
+    pub size: f64,
+    /// RMS of what the declared model cannot absorb, in units of the torque noise.
+    pub visible: f64,
+}
+
+impl Truth {
+    /// Of a drawn case.
+    pub fn of(case: &Case) -> Self {
+        let secret = |drawn: &super::case::Drawn| TrueSecret {
+            kind: drawn.secret.name,
+            joints: case.robot.names(&drawn.secret.joints),
+            equivalents: equivalents(case, &drawn.secret),
+            form: shortened(format!("{:?}", drawn.secret.form)),
+            scale: drawn.secret.scale,
+            size: drawn.size,
+            visible: drawn.visible,
+        };
+        Truth {
+            seed: case.spec.seed,
+            suite: case.spec.suite,
+            robot: case.robot.name,
+            held_model: case.spec.held,
+            declared: case.declared.iter().map(|kind| kind.name()).collect(),
+            secrets: case.secrets.iter().map(secret).collect(),
+            sign_width: case.ordinary.width,
+            sensors: case.sensors.clone(),
+            rejected: case.rejected,
+        }
+    }
+}
+
+/// A balancer whose spring has no rest length pulls the first link with a torque that is a pure sinusoid of its angle: so does a
+/// force on that link that keeps its direction.
+fn equivalents(case: &Case, secret: &Secret) -> Vec<(Kind, Vec<String>)> {
+    match secret.form {
+        Form::Mechanism(Mechanism::Balancer { rest: 0.0, .. })
+            if secret.joints.iter().all(|&joint| case.robot.tree.joint(joint).parent.is_none()) =>
+        {
+            vec![(Kind::ExternalForce, case.robot.names(&secret.joints))]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Paths of random walks are long and say nothing.
+fn shortened(text: String) -> String {
+    match text.char_indices().nth(400) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text,
+    }
+}
