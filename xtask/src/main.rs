@@ -2,6 +2,7 @@
 
 mod environment;
 mod oracle;
+mod run;
 mod test;
 mod undeclared;
 
@@ -17,6 +18,10 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
+    /// The best main job so far, on an example log that is made on the spot: identify, with report.
+    Run(run::Arguments),
+    /// A log as long as wanted, to see that memory does not grow with it.
+    SyntheticLog(run::synthetic_log::Arguments),
     /// All checks of the workspace, and the count of tests.
     Test(test::Arguments),
     /// Compare with Pinocchio, installed from PyPI into a private environment.
@@ -27,6 +32,8 @@ enum Task {
 
 fn main() -> anyhow::Result<ExitCode> {
     match Arguments::parse().task {
+        Task::Run(arguments) => run::command(&arguments),
+        Task::SyntheticLog(arguments) => run::synthetic_log::command(&arguments),
         Task::Test(arguments) => test::command(&arguments),
         Task::Oracle(arguments) => oracle::command(&arguments),
         Task::Undeclared(arguments) => undeclared::command(&arguments).map(|()| ExitCode::SUCCESS),

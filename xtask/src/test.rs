@@ -28,7 +28,10 @@ const CHECKS: [Check; 3] = [
         arguments: &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"],
         environment: &[],
     },
-    Check { arguments: &["doc", "--workspace", "--no-deps"], environment: &[("RUSTDOCFLAGS", "-D warnings")] },
+    Check {
+        arguments: &["doc", "--workspace", "--no-deps"],
+        environment: &[("RUSTDOCFLAGS", "-D warnings")],
+    },
 ];
 
 /// `--show-output` prints what passing tests said, so that a test that skipped itself is seen and counted.
@@ -71,8 +74,11 @@ fn passes(check: &Check) -> anyhow::Result<bool> {
 /// Runs the tests, passing on their output line by line, and counts; whether all is well.
 fn run_tests() -> anyhow::Result<(Tally, bool)> {
     announce(TESTS);
-    let mut child =
-        environment::cargo()?.args(TESTS).stdout(Stdio::piped()).spawn().context("cargo cannot be started")?;
+    let mut child = environment::cargo()?
+        .args(TESTS)
+        .stdout(Stdio::piped())
+        .spawn()
+        .context("cargo cannot be started")?;
     let mut tally = Tally::default();
     if let Some(output) = child.stdout.take() {
         for line in BufReader::new(output).split(b'\n') {

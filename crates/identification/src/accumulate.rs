@@ -16,6 +16,14 @@ pub trait BlockSource: Sync {
     fn blocks(&self, sink: &mut dyn FnMut(Block)) -> Result<(), LogError>;
 }
 
+/// Blocks in memory, such as those of a [`Recording`](phiw_telemetry::Recording::blocks).
+impl BlockSource for Vec<Block> {
+    fn blocks(&self, sink: &mut dyn FnMut(Block)) -> Result<(), LogError> {
+        self.iter().cloned().for_each(sink);
+        Ok(())
+    }
+}
+
 /// A stretch of time of one log whose rows are kept apart: to be left out, or held out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fold {
@@ -28,13 +36,19 @@ pub struct Fold {
 }
 
 impl Fold {
-    fn contains(&self, log: usize, t: f64) -> bool {
+    /// Whether it holds the moment `t` \[s\] of a log.
+    pub fn contains(&self, log: usize, t: f64) -> bool {
         self.log == log && self.start <= t && t < self.end
     }
 }
 
 /// Blocks that wait for the processors; more would cost memory only.
 const BLOCKS_PER_THREAD: usize = 2;
+
+/// Blocks that are worked on at a time.
+pub(crate) fn batch_size() -> usize {
+    BLOCKS_PER_THREAD * rayon::current_num_threads()
+}
 
 /// The factors of `design` over each fold: \[Φ f\] of each torque, after the parallel filter.
 ///
@@ -49,7 +63,7 @@ pub fn accumulate(
     sources: &[&dyn BlockSource],
 ) -> Result<Vec<GroupedFactor>, IdentificationError> {
     let mut merged: Vec<Vec<Option<Factor>>> = vec![vec![None; design.rows().len()]; folds.len()];
-    let batch_size = BLOCKS_PER_THREAD * rayon::current_num_threads();
+    let batch_size = batch_size();
     let mut failure = None;
     for source in sources {
         let mut batch = Vec::with_capacity(batch_size);

@@ -20,6 +20,11 @@ pub struct RowLayout {
     effects: Vec<usize>,
 }
 
+/// Whether a joint moves, given the filtered share of samples in which it does.
+pub(crate) fn moves(share: f64) -> bool {
+    share >= 0.5
+}
+
 /// A robot's rigid body plus effects, as columns.
 pub struct Design {
     tree: Tree,
@@ -113,7 +118,7 @@ impl Design {
 
     /// Whether a filtered evaluation counts for the torque `row`.
     pub fn counts(&self, evaluation: &[f64], row: usize) -> bool {
-        evaluation[self.width + row] >= 0.5
+        moves(evaluation[self.width + row])
     }
 
     /// The same with a rigid-body model for the effects whose columns need torques.

@@ -7,8 +7,10 @@ mod effect;
 mod error;
 mod fit;
 mod identify;
+mod kept_blocks;
 mod log_set;
 mod model;
+mod predict;
 mod reference;
 mod sample;
 
@@ -21,9 +23,11 @@ pub use effect::{
 pub use error::IdentificationError;
 pub use fit::{Fit, TorqueError, fit, merge, torque_error};
 pub use identify::{Data, Identified, Variants, identify};
+pub use kept_blocks::KeptBlocks;
 pub use log_set::{HELD_OUT_SHARE, LogFile, LogSet, Progress};
 pub use model::{
     BodyParameters, EffectParameters, FactorRows, Model, NamedParameter, parameter_name, standard_unit,
 };
+pub use predict::{Prediction, predict};
 pub use reference::ReferenceModel;
 pub use sample::{BlockReference, Needs, Sample};

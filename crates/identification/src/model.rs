@@ -24,7 +24,7 @@ pub struct Model {
     pub declared: Vec<String>,
     /// The base parameters.
     pub base_parameters: Vec<NamedParameter>,
-    /// Standard parameters of each body: those nearest to the URDF's that have the base parameters.
+    /// Standard parameters of each body: those nearest to the URDF's that have the base parameters (a small sphere's where the URDF has no mass).
     pub bodies: Vec<BodyParameters>,
     /// The effects beside the rigid body.
     pub effects: Vec<EffectParameters>,
@@ -103,7 +103,7 @@ impl FactorRows {
         for row in 0..size {
             rows[row * size + row..(row + 1) * size].iter_mut().zip(&mut entries).for_each(|(to, from)| *to = *from);
         }
-        Ok(Factor::of_rows(size, &rows)?)
+        Ok(Factor::of_rows(size, &rows)?.standing_for(self.rows))
     }
 }
 
@@ -125,7 +125,7 @@ impl Model {
         cutoff_hz: (f64, f64),
     ) -> Result<Self, IdentificationError> {
         let base = design.base();
-        let standard = base.to_standard(&fit.parameters[..base.count()], &design.tree().inertial_parameters())?;
+        let standard = base.to_standard(&fit.parameters[..base.count()], &with_masses(design.tree()))?;
         let body = |(body, values): (&phiw_dynamics::Body, &[f64])| BodyParameters {
             joint: body.joint.clone(),
             inertial: std::array::from_fn(|parameter| values[parameter]),
@@ -214,6 +214,25 @@ impl Model {
         identified.set_inertial_parameters(&parameters)?;
         Ok(identified)
     }
+}
+
+/// Radius of the sphere that stands for a body of which the URDF says nothing \[m\].
+const UNKNOWN_RADIUS: f64 = 0.1;
+
+/// The tree's standard parameters, a body without mass replaced by a sphere of the others' mean mass (of 1 kg if none has any).
+///
+/// Standard parameters near a mass of zero belong to no real body, and URDF cannot express a first moment without mass.
+fn with_masses(tree: &Tree) -> Vec<f64> {
+    let mut parameters = tree.inertial_parameters();
+    let masses = parameters.iter().step_by(PARAMETERS_PER_BODY).filter(|mass| **mass > 0.0);
+    let (count, sum) = masses.fold((0.0, 0.0), |(count, sum), mass| (count + 1.0, sum + mass));
+    let mass = if count > 0.0 { sum / count } else { 1.0 };
+    let moment = 0.4 * mass * UNKNOWN_RADIUS * UNKNOWN_RADIUS;
+    let sphere = [mass, 0.0, 0.0, 0.0, moment, 0.0, moment, 0.0, 0.0, moment];
+    for body in parameters.chunks_exact_mut(PARAMETERS_PER_BODY).filter(|body| body[0] == 0.0) {
+        body.iter_mut().zip(sphere).for_each(|(value, sphere)| *value += sphere);
+    }
+    parameters
 }
 
 /// Name of a standard parameter: joint, then parameter.

@@ -71,47 +71,40 @@ impl ReferenceModel {
         }
     }
 
+    /// The derivatives are as smooth as the motion: computed a hundred times a second, and linear in between.
     fn derivatives(&self, block: &Block, out: &mut BlockReference) -> Result<(), DimensionError> {
         let joints = block.joints;
-        let size = block.t.len() * joints * joints;
+        let size = joints * joints;
+        let samples = block.t.len();
         for values in [&mut out.by_position, &mut out.by_velocity, &mut out.by_acceleration] {
-            values.resize(size, 0.0);
+            values.resize(samples * size, 0.0);
         }
+        if samples == 0 {
+            return Ok(());
+        }
+        let period = if samples > 1 { (block.t[samples - 1] - block.t[0]) / (samples - 1) as f64 } else { 1.0 };
+        let stride = ((DERIVATIVE_PERIOD / period) as usize).max(1);
         let mut workspace = Workspace::new(&self.tree);
-        let constant = |value: &f64| Dual { value: *value, derivative: 0.0 };
-        let mut torque = vec![constant(&0.0); joints];
-        let (mut q, mut v, mut a) = (torque.clone(), torque.clone(), torque.clone());
-        for sample in 0..block.t.len() {
-            let row = block.row(sample);
-            for joint in 0..joints {
-                q[joint] = constant(&block.q[row.start + joint]);
-                v[joint] = constant(&block.qd[row.start + joint]);
-                a[joint] = constant(&block.qdd[row.start + joint]);
-            }
-            let start = sample * joints * joints;
-            for along in 0..joints {
-                for (which, target) in
-                    [&mut out.by_position, &mut out.by_velocity, &mut out.by_acceleration].into_iter().enumerate()
-                {
-                    let variable = match which {
-                        0 => &mut q[along],
-                        1 => &mut v[along],
-                        _ => &mut a[along],
-                    };
-                    variable.derivative = 1.0;
-                    self.tree.inverse_dynamics(&q, &v, &a, &mut workspace, &mut torque)?;
-                    for (joint, value) in torque.iter().enumerate() {
-                        target[start + joint * joints + along] = value.derivative;
-                    }
-                    match which {
-                        0 => q[along].derivative = 0.0,
-                        1 => v[along].derivative = 0.0,
-                        _ => a[along].derivative = 0.0,
-                    }
+        let mut state = DualState::new(joints);
+        let mut before = None;
+        let mut sample = 0;
+        loop {
+            state.set(block, sample);
+            let at = sample * size..(sample + 1) * size;
+            state.derivatives(&self.tree, &mut workspace, Along::Position, &mut out.by_position[at.clone()])?;
+            state.derivatives(&self.tree, &mut workspace, Along::Velocity, &mut out.by_velocity[at.clone()])?;
+            state.derivatives(&self.tree, &mut workspace, Along::Acceleration, &mut out.by_acceleration[at])?;
+            if let Some(first) = before {
+                for values in [&mut out.by_position, &mut out.by_velocity, &mut out.by_acceleration] {
+                    interpolate(values, size, first, sample);
                 }
             }
+            if sample == samples - 1 {
+                return Ok(());
+            }
+            before = Some(sample);
+            sample = (sample + stride).min(samples - 1);
         }
-        Ok(())
     }
 
     fn gravity(&self, block: &Block, out: &mut BlockReference) -> Result<(), DimensionError> {
@@ -130,6 +123,80 @@ impl ReferenceModel {
             }
         }
         Ok(())
+    }
+}
+
+/// Time between two evaluations of the derivatives \[s\].
+const DERIVATIVE_PERIOD: f64 = 0.01;
+
+/// What a torque is differentiated by.
+#[derive(Clone, Copy)]
+enum Along {
+    Position,
+    Velocity,
+    Acceleration,
+}
+
+/// A state that carries a derivative.
+struct DualState {
+    q: Vec<Dual>,
+    v: Vec<Dual>,
+    a: Vec<Dual>,
+    torque: Vec<Dual>,
+}
+
+impl DualState {
+    fn new(joints: usize) -> Self {
+        let zero = vec![Dual { value: 0.0, derivative: 0.0 }; joints];
+        DualState { q: zero.clone(), v: zero.clone(), a: zero.clone(), torque: zero }
+    }
+
+    fn set(&mut self, block: &Block, sample: usize) {
+        let row = block.row(sample);
+        for (dual, values) in [(&mut self.q, &block.q), (&mut self.v, &block.qd), (&mut self.a, &block.qdd)] {
+            for (dual, value) in dual.iter_mut().zip(&values[row.clone()]) {
+                *dual = Dual { value: *value, derivative: 0.0 };
+            }
+        }
+    }
+
+    /// ∂τ/∂(q, q̇ or q̈), row-major, a row for each torque.
+    fn derivatives(
+        &mut self,
+        tree: &Tree,
+        workspace: &mut Workspace<Dual>,
+        along: Along,
+        out: &mut [f64],
+    ) -> Result<(), DimensionError> {
+        let joints = self.q.len();
+        for joint in 0..joints {
+            self.variable(along, joint).derivative = 1.0;
+            tree.inverse_dynamics(&self.q, &self.v, &self.a, workspace, &mut self.torque)?;
+            self.variable(along, joint).derivative = 0.0;
+            for (row, torque) in self.torque.iter().enumerate() {
+                out[row * joints + joint] = torque.derivative;
+            }
+        }
+        Ok(())
+    }
+
+    fn variable(&mut self, along: Along, joint: usize) -> &mut Dual {
+        match along {
+            Along::Position => &mut self.q[joint],
+            Along::Velocity => &mut self.v[joint],
+            Along::Acceleration => &mut self.a[joint],
+        }
+    }
+}
+
+/// Fills in the rows between two that are known.
+fn interpolate(values: &mut [f64], width: usize, first: usize, last: usize) {
+    for sample in first + 1..last {
+        let share = (sample - first) as f64 / (last - first) as f64;
+        for column in 0..width {
+            let (a, b) = (values[first * width + column], values[last * width + column]);
+            values[sample * width + column] = a + share * (b - a);
+        }
     }
 }
 

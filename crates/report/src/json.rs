@@ -22,8 +22,8 @@ pub struct ReportJson {
     pub joints: Vec<String>,
     /// What the model contained before anything was sought: `rigid_body` and declared effects.
     pub declared: Vec<String>,
-    /// The answer in one word.
-    pub verdict: Verdict,
+    /// The answer in one word; `None` where the residual was not traced and may hold more than noise.
+    pub verdict: Option<Verdict>,
     /// RMS of the part of each joint's torque that no model can explain (N·m or N).
     #[serde(deserialize_with = "numbers_or_nan")]
     pub noise_floor: JointMap<f64>,
@@ -143,6 +143,21 @@ pub struct ProgramJson {
     /// How the logs were conditioned: cut-off, decimation, segments, samples skipped.
     #[serde(default)]
     pub conditioning: IndexMap<String, serde_json::Value>,
+    /// The final model's pooled error with rests included: samples at which a joint stands still, where static friction may carry any torque,
+    /// are left out of the errors above.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative_with_rests: Option<RelativeErrors>,
+}
+
+/// Pooled errors, RMS of the error over RMS of the torque.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct RelativeErrors {
+    /// On the motion that the model was fitted to.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub train: f64,
+    /// On held-out motion.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub validate: f64,
 }
 
 impl ReportJson {

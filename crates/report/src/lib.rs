@@ -1,7 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod json;
-mod number;
+pub mod number;
 pub mod page;
 pub mod plot;
 

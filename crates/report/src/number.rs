@@ -4,7 +4,7 @@
 pub(crate) const ABSENT: &str = "–";
 
 /// `value` with so many significant digits: `24.1`, `0.0123`, `3.2·10⁻⁷`; `–` if it is not finite.
-pub(crate) fn significant(value: f64, digits: usize) -> String {
+pub fn significant(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return ABSENT.into();
     }
@@ -25,7 +25,7 @@ pub(crate) fn significant(value: f64, digits: usize) -> String {
 }
 
 /// `share` (1 = all) as a percentage with three significant digits and at most one decimal.
-pub(crate) fn percent(share: f64) -> String {
+pub fn percent(share: f64) -> String {
     if !share.is_finite() {
         return ABSENT.into();
     }

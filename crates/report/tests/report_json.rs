@@ -85,9 +85,18 @@ fn additions_of_the_program_come_last() {
         version: "0.1.0".into(),
         warnings: vec!["train and validate are the same file".into()],
         conditioning: [("cut_off".to_string(), Value::from(5.2))].into_iter().collect(),
+        relative_with_rests: Some(RelativeErrors { train: 0.2, validate: 0.25 }),
     });
     let text = report.to_json().unwrap();
     assert!(text.find("\"phiw\"") > text.find("\"remaining\""));
+    assert_eq!(ReportJson::from_json(&text).unwrap(), report);
+}
+
+#[test]
+fn an_untraced_residual_has_no_verdict() {
+    let report = ReportJson { verdict: None, ..example() };
+    let text = report.to_json().unwrap();
+    assert!(text.contains("\"verdict\": null"), "{text}");
     assert_eq!(ReportJson::from_json(&text).unwrap(), report);
 }
 

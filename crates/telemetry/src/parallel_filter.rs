@@ -70,6 +70,8 @@ impl ParallelFilter {
         mut emit: impl FnMut(usize, &[f64]),
     ) {
         let (Some(&first), Some(&last)) = (outputs.first(), outputs.last()) else { return };
+        // The widest vector instructions that the processor has: rows can be thousands of numbers wide.
+        let arch = pulp::Arch::new();
         let slots = 2 * self.half_length / self.decimation + 2;
         scratch.resize(width, slots);
         let covered = |output: usize| {
@@ -91,11 +93,12 @@ impl ParallelFilter {
             for index in finished..begun {
                 let tap = self.taps[sample + self.half_length - outputs[index]];
                 let slot = index % slots;
-                for (sum, value) in
-                    scratch.sums[slot * width..(slot + 1) * width].iter_mut().zip(&scratch.row)
-                {
-                    *sum += tap * value;
-                }
+                let sums = &mut scratch.sums[slot * width..(slot + 1) * width];
+                let row = &scratch.row;
+                arch.dispatch(
+                    #[inline(always)]
+                    || sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += tap * value),
+                );
             }
             while finished < begun && covered(outputs[finished]).end == sample + 1 {
                 let slot = finished % slots;

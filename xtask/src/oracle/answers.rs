@@ -39,8 +39,7 @@ impl States {
         let random = &mut RandomNumbers::new(seed);
         let mut workspace = Workspace::new(tree);
         let mut force = vec![0.0; tree.velocity_size()];
-        let mut states =
-            States { count, q: Vec::new(), v: Vec::new(), a: Vec::new(), force: Vec::new() };
+        let mut states = States { count, q: Vec::new(), v: Vec::new(), a: Vec::new(), force: Vec::new() };
         for _ in 0..count {
             let state = random_state(tree, random);
             let other = random_state(tree, random);

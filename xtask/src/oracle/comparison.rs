@@ -20,7 +20,8 @@ fn row_difference(ours: &[f64], theirs: &[f64]) -> f64 {
         return f64::INFINITY;
     }
     let scale = theirs.iter().fold(SMALL, |scale, value| scale.max(value.abs()));
-    ours.iter().zip(theirs).fold(0.0, |largest: f64, (ours, theirs)| largest.max((ours - theirs).abs())) / scale
+    ours.iter().zip(theirs).fold(0.0, |largest: f64, (ours, theirs)| largest.max((ours - theirs).abs()))
+        / scale
 }
 
 #[cfg(test)]

@@ -97,6 +97,12 @@ def forward_dynamics(coordinates, data, q, v, force, mass_matrix):
     return np.linalg.solve(mass_matrix, force - bias)
 
 
+def is_singular(mass_matrix):
+    """Whether accelerations are undetermined: a massless base before its only joint, a point mass on its own axis."""
+    eigenvalues = np.linalg.eigvalsh(mass_matrix)
+    return eigenvalues[0] <= 1e-13 * eigenvalues[-1]
+
+
 def main(folder):
     case = json.loads((folder / "case.json").read_text())
     model = build(case)
@@ -125,7 +131,7 @@ def main(folder):
         "regressor": regressor,
         "rnea": rnea,
         "crba": crba,
-        "aba": aba,
+        "aba": [] if any(map(is_singular, crba)) else aba,
         "com": com,
     }
     for name, values in answers.items():

@@ -2,9 +2,9 @@
 
 use super::dice::{Dice, Stream};
 use super::draw::{Survey, catalogue, outside};
+use super::friction::Sign;
 use super::kind::{Kind, Name};
 use super::plant::{Ordinary, Record, States, record, rigid_torque};
-use super::friction::Sign;
 use super::robot::Robot;
 use super::secret::{Form, Secret};
 use super::sensors::Sensors;
@@ -78,7 +78,8 @@ impl<'a> Case<'a> {
         let (mut secret_dice, mut plant_dice, mut motion_dice) =
             (dice(Stream::Secret), dice(Stream::Plant), dice(Stream::Motion));
         let joints = choose_joints(spec, robot, &mut secret_dice)?;
-        let reach = spec.secrets.iter().zip(&joints).find(|(name, _)| **name == Name::Catalogue(Kind::EndStop));
+        let reach =
+            spec.secrets.iter().zip(&joints).find(|(name, _)| **name == Name::Catalogue(Kind::EndStop));
         let reach = reach.map(|(_, &joint)| Reach { joint, upper: secret_dice.chance(0.5) });
         // Bristles hold a force at rest, and springs ring after a jerk: for them the robot keeps moving.
         let restless = spec.has(Kind::CoulombFriction)
@@ -235,7 +236,9 @@ fn draw_motions(robot: &Robot, reach: Option<Reach>, restless: bool, dice: &mut 
 fn peak_effort(robot: &Robot, motion: &Motion) -> f64 {
     let states = States::of_motion(motion, &even_times(motion, 25.0));
     let torque = rigid_torque(&states, |_| &robot.tree);
-    let share = |(index, torque): (usize, &f64)| torque.abs() / robot.tree.joint(index % robot.joints()).limits.effort;
+    let share = |(index, torque): (usize, &f64)| {
+        torque.abs() / robot.tree.joint(index % robot.joints()).limits.effort
+    };
     torque.iter().enumerate().map(share).fold(0.0, f64::max)
 }
 
@@ -256,7 +259,8 @@ fn draw_ordinary(spec: &Spec, robot: &Robot, motions: &[Motion], dice: &mut Dice
             }
         }
     }
-    let rms: Vec<[f64; 3]> = squares.iter().map(|squares| squares.map(|square| (square / samples).sqrt())).collect();
+    let rms: Vec<[f64; 3]> =
+        squares.iter().map(|squares| squares.map(|square| (square / samples).sqrt())).collect();
     let level = |joint: usize| rms[joint][0].max(LEAST_LEVEL * robot.tree.joint(joint).limits.effort);
     let viscous = (0..joints).map(|joint| dice.uniform(0.05, 0.2) * level(joint) / rms[joint][1]).collect();
     let coulomb = (0..joints).map(|joint| dice.uniform(0.05, 0.25) * level(joint)).collect();
@@ -315,7 +319,7 @@ fn survey<'r>(
     }
     let rms = |part: usize| squares.iter().map(|square| (square[part] / samples).sqrt()).collect();
     let spans = motions.iter().map(|motion| [motion.start, motion.start + motion.duration]).collect();
-    Survey { tree: &robot.tree, range, speed: rms(0), torque: rms(1), reach, spans }
+    Survey { tree: &robot.tree, range, speed: rms(0), torque: rms(1), width: ordinary.width, reach, spans }
 }
 
 /// Whether each log shows the effect for a while: a stop that one of them never touches is not to be found there.

@@ -20,6 +20,8 @@ pub struct Survey<'a> {
     pub speed: Vec<f64>,
     /// Root mean square of the torque.
     pub torque: Vec<f64>,
+    /// Speed over which signs are smoothed.
+    pub width: f64,
     /// Which joint the motions bring near a limit.
     pub reach: Option<Reach>,
     /// Beginning and end of each log in session time \[s\].
@@ -71,7 +73,9 @@ impl Survey<'_> {
         let pairs: Vec<[usize; 2]> = bodies
             .iter()
             .enumerate()
-            .filter_map(|(body, inner)| inner.parent.map(|outer| [bodies[outer].velocity_index, bodies[body].velocity_index]))
+            .filter_map(|(body, inner)| {
+                inner.parent.map(|outer| [bodies[outer].velocity_index, bodies[body].velocity_index])
+            })
             .collect();
         (!pairs.is_empty()).then(|| dice.pick(&pairs).to_vec())
     }
@@ -80,7 +84,12 @@ impl Survey<'_> {
 /// The form of a catalogue's effect, the joints that it acts on and the sign of its scale.
 ///
 /// `None`: these motions leave no room for it.
-pub fn catalogue(kind: Kind, joint: usize, survey: &Survey, dice: &mut Dice) -> Option<(Vec<usize>, Form, f64)> {
+pub fn catalogue(
+    kind: Kind,
+    joint: usize,
+    survey: &Survey,
+    dice: &mut Dice,
+) -> Option<(Vec<usize>, Form, f64)> {
     if survey.is_ambiguous(kind, joint) {
         return None;
     }
@@ -98,11 +107,17 @@ pub fn catalogue(kind: Kind, joint: usize, survey: &Survey, dice: &mut Dice) -> 
             one(Friction::Asymmetric { positive: dice.chance(0.5), coulomb })
         }
         Kind::StribeckFriction => {
-            let (speed, exponent) = (speed * dice.log_uniform(0.08, 0.4), dice.uniform(0.5, 2.0));
+            // Not so narrow that the smoothed sign hides it.
+            let speed = (speed * dice.log_uniform(0.08, 0.4)).max(2.0 * survey.width);
+            let exponent = dice.uniform(0.5, 2.0);
             if dice.chance(0.5) {
                 return one(Friction::Stribeck { speed, exponent });
             }
-            one(Friction::StribeckLuGre { speed, exponent, distance: survey.distance(joint, dice, 1e-5, 1e-4) })
+            one(Friction::StribeckLuGre {
+                speed,
+                exponent,
+                distance: survey.distance(joint, dice, 1e-5, 1e-4),
+            })
         }
         Kind::QuadraticFriction => one(Friction::Quadratic),
         Kind::LoadDependentFriction => one(Friction::LoadDependent),
@@ -117,7 +132,8 @@ pub fn catalogue(kind: Kind, joint: usize, survey: &Survey, dice: &mut Dice) -> 
         Kind::GravityBalancer if survey.is_prismatic(joint) => None,
         Kind::GravityBalancer => {
             let rest = if dice.chance(0.5) { 0.0 } else { dice.uniform(0.1, 0.4) };
-            let balancer = Mechanism::Balancer { zero: dice.uniform(-PI, PI), arm: dice.uniform(0.2, 0.5), rest };
+            let balancer =
+                Mechanism::Balancer { zero: dice.uniform(-PI, PI), arm: dice.uniform(0.2, 0.5), rest };
             mechanism(balancer, dice.sign())
         }
         Kind::TorqueRipple => mechanism(ripple(joint, survey, dice)?, 1.0),
@@ -148,7 +164,12 @@ pub fn catalogue(kind: Kind, joint: usize, survey: &Survey, dice: &mut Dice) -> 
 }
 
 /// The form of an effect from outside the catalogue, as [`catalogue`].
-pub fn outside(stranger: Stranger, joint: usize, survey: &Survey, dice: &mut Dice) -> Option<(Vec<usize>, Form, f64)> {
+pub fn outside(
+    stranger: Stranger,
+    joint: usize,
+    survey: &Survey,
+    dice: &mut Dice,
+) -> Option<(Vec<usize>, Form, f64)> {
     let joints = survey.speed.len();
     let mechanism = |mechanism: Mechanism| Some((vec![joint], Form::Mechanism(mechanism), 1.0));
     match stranger {
@@ -177,11 +198,18 @@ pub fn outside(stranger: Stranger, joint: usize, survey: &Survey, dice: &mut Dic
                 level *= 0.998;
                 level
             };
-            mechanism(Mechanism::RandomWalk { path: (0..(end / step) as usize + 2).map(walk).collect(), step })
+            mechanism(Mechanism::RandomWalk {
+                path: (0..(end / step) as usize + 2).map(walk).collect(),
+                step,
+            })
         }
         Stranger::SensorDeadBand => Some((vec![joint], Form::DeadBand, 0.3 * survey.torque[joint])),
         Stranger::LoadStep => {
-            let when = survey.spans.iter().map(|[from, to]| [dice.uniform(from + 5.0, to - 5.0), *to + 1.0]).collect();
+            let when = survey
+                .spans
+                .iter()
+                .map(|[from, to]| [dice.uniform(from + 5.0, to - 5.0), *to + 1.0])
+                .collect();
             Some((vec![joint], Form::LoadStep { held: held_body(joint, dice), when }, 1.0))
         }
         Stranger::SpeedProduct => {
@@ -204,7 +232,8 @@ fn hysteresis(joint: usize, survey: &Survey, dice: &mut Dice) -> Friction {
     let count = 1 + dice.index(5);
     let weights: Vec<f64> = (0..count).map(|_| dice.uniform(0.3, 1.0)).collect();
     let total: f64 = weights.iter().sum();
-    let element = |(number, weight): (usize, &f64)| [distance * (number + 1) as f64 / count as f64, weight / total];
+    let element =
+        |(number, weight): (usize, &f64)| [distance * (number + 1) as f64 / count as f64, weight / total];
     Friction::Maxwell { elements: weights.iter().enumerate().map(element).collect() }
 }
 

@@ -10,7 +10,14 @@ const STEP: f64 = 1e-3;
 /// Replaces the state of the joint by its motor's: θ = q + compliance·τ of the link, and its derivatives.
 ///
 /// The link moves as the motion says; all friction and the rotor are on the motor's side.
-pub fn deflect(motor: &mut States, loads: &Loads, motion: &Motion, times: &[f64], joint: usize, compliance: f64) {
+pub fn deflect(
+    motor: &mut States,
+    loads: &Loads,
+    motion: &Motion,
+    times: &[f64],
+    joint: usize,
+    compliance: f64,
+) {
     let torque = |shift: f64| {
         let shifted: Vec<f64> = times.iter().map(|time| time + shift).collect();
         rigid_torque(&States::of_motion(motion, &shifted), |sample| loads.tree_at(shifted[sample]))

@@ -57,7 +57,9 @@ impl Friction {
         let sign = |v| scene.ordinary.sign(v);
         let coulomb = scene.ordinary.coulomb[joint];
         match self {
-            Friction::CoulombLuGre { distance } => from_fine(scene, joint, |v, _| lugre(v, *distance, |_| scale)),
+            Friction::CoulombLuGre { distance } => {
+                from_fine(scene, joint, |v, _| lugre(v, *distance, |_| scale))
+            }
             Friction::StribeckLuGre { speed, exponent, distance } => {
                 let steady = |v: f64| coulomb + scale * (-(v / speed).abs().powf(*exponent)).exp();
                 let mut torque = from_fine(scene, joint, |v, _| lugre(v, *distance, steady));
@@ -68,7 +70,9 @@ impl Friction {
                 torque
             }
             Friction::Maxwell { elements } => from_fine(scene, joint, |_, q| maxwell(q, elements, scale)),
-            Friction::Dahl { distance, exponent } => from_fine(scene, joint, |_, q| dahl(q, *distance, *exponent, scale)),
+            Friction::Dahl { distance, exponent } => {
+                from_fine(scene, joint, |_, q| dahl(q, *distance, *exponent, scale))
+            }
             _ => (0..scene.times.len())
                 .map(|sample| {
                     let v = scene.motor.v(sample, joint);
@@ -78,7 +82,9 @@ impl Friction {
                             let direction = if *positive { 1.0 } else { -1.0 };
                             if v * direction > 0.0 { v + coulomb * sign(v) } else { 0.0 }
                         }
-                        Friction::Stribeck { speed, exponent } => (-(v / speed).abs().powf(*exponent)).exp() * sign(v),
+                        Friction::Stribeck { speed, exponent } => {
+                            (-(v / speed).abs().powf(*exponent)).exp() * sign(v)
+                        }
                         Friction::Quadratic => v * v.abs(),
                         Friction::LoadDependent => scene.rigid(sample, joint).abs() * sign(v),
                         Friction::Thermal { time_constant, viscous } => {
@@ -99,7 +105,8 @@ fn from_fine(scene: &Scene, joint: usize, integrate: impl Fn(&[f64], &[f64]) -> 
     let steps = (motion.duration / FINE_STEP).ceil() as usize + 1;
     let states: Vec<_> =
         (0..steps).map(|step| motion.state(joint, motion.start + step as f64 * FINE_STEP)).collect();
-    let [positions, speeds]: [Vec<f64>; 2] = [0, 1].map(|part| states.iter().map(|state| state[part]).collect());
+    let [positions, speeds]: [Vec<f64>; 2] =
+        [0, 1].map(|part| states.iter().map(|state| state[part]).collect());
     let torque = integrate(&speeds, &positions);
     let read = |&time: &f64| interpolate(&torque, (time - motion.start) / FINE_STEP);
     scene.times.iter().map(read).collect()
@@ -166,12 +173,19 @@ mod tests {
         let time = |step: usize| step as f64 * FINE_STEP;
         let angle = |t: f64| 0.4 * (1.3 * t).sin() + 0.1 * (7.0 * t).sin();
         let speed = |t: f64| 0.52 * (1.3 * t).cos() + 0.7 * (7.0 * t).cos();
-        [(0..80_000).map(|step| angle(time(step))).collect(), (0..80_000).map(|step| speed(time(step))).collect()]
+        [
+            (0..80_000).map(|step| angle(time(step))).collect(),
+            (0..80_000).map(|step| speed(time(step))).collect(),
+        ]
     }
 
     /// Over whole cycles, once the first is over, a friction with memory only takes energy, and stays within its limit.
     fn check(force: &[f64], limit: f64, positions: &[f64]) {
-        let work: f64 = positions.windows(2).zip(force.windows(2)).map(|(q, f)| 0.5 * (f[0] + f[1]) * (q[1] - q[0])).sum();
+        let work: f64 = positions
+            .windows(2)
+            .zip(force.windows(2))
+            .map(|(q, f)| 0.5 * (f[0] + f[1]) * (q[1] - q[0]))
+            .sum();
         assert!(work > 0.0, "friction gave {work} J away");
         assert!(force.iter().all(|force| force.abs() <= limit * (1.0 + 1e-9)));
         assert!(force.iter().any(|force| force.abs() > 0.5 * limit), "it never came near its limit");

@@ -3,7 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 /// An effect of the catalogue, named as in `report.json` and `--declare`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
 #[serde(rename_all = "snake_case")]
 #[value(rename_all = "snake_case")]
 #[allow(missing_docs, reason = "the names are the documentation; formats.md defines them")]
@@ -34,7 +36,9 @@ pub enum Kind {
 }
 
 /// An effect that no name of the catalogue fits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
 #[serde(rename_all = "snake_case")]
 #[value(rename_all = "snake_case")]
 pub enum Stranger {
@@ -69,7 +73,8 @@ pub enum Name {
 impl Kind {
     /// The name in files.
     pub fn name(self) -> String {
-        clap::ValueEnum::to_possible_value(&self).map_or_else(String::new, |value| value.get_name().to_owned())
+        clap::ValueEnum::to_possible_value(&self)
+            .map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
     /// Whether a free identification of the rigid body swallows the effect, so that it can only be told against a held model.
@@ -82,7 +87,13 @@ impl Kind {
         use Kind::*;
         matches!(
             self,
-            ViscousFriction | CoulombFriction | TorqueGain | TimeDelay | ActuatorSaturation | TorqueOffset | ExternalForce
+            ViscousFriction
+                | CoulombFriction
+                | TorqueGain
+                | TimeDelay
+                | ActuatorSaturation
+                | TorqueOffset
+                | ExternalForce
         )
     }
 
@@ -110,9 +121,8 @@ impl Name {
     pub fn name(self) -> String {
         match self {
             Name::Catalogue(kind) => kind.name(),
-            Name::Outside(stranger) => {
-                clap::ValueEnum::to_possible_value(&stranger).map_or_else(String::new, |value| value.get_name().to_owned())
-            }
+            Name::Outside(stranger) => clap::ValueEnum::to_possible_value(&stranger)
+                .map_or_else(String::new, |value| value.get_name().to_owned()),
         }
     }
 }

@@ -68,7 +68,8 @@ impl Loads {
 fn tilted(gravity: [f64; 3], heading: f64, angle: f64) -> [f64; 3] {
     let axis = Vec3([heading.cos(), heading.sin(), 0.0]);
     let (gravity, (sine, cosine)) = (Vec3(gravity), angle.sin_cos());
-    (gravity.scale(cosine) + axis.cross(gravity).scale(sine) + axis.scale(axis.dot(gravity) * (1.0 - cosine))).0
+    (gravity.scale(cosine) + axis.cross(gravity).scale(sine) + axis.scale(axis.dot(gravity) * (1.0 - cosine)))
+        .0
 }
 
 /// A force that keeps its direction in the world, on a point of a link.

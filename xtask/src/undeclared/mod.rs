@@ -91,7 +91,8 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let threads = std::thread::available_parallelism().map_or(1, usize::from).div_ceil(arguments.jobs.max(1));
     let tracer = tracer::Tracer::find(arguments.phiw.as_deref(), threads)?;
-    let options = run::Options { jobs: arguments.jobs, oracle: arguments.oracle, keep: arguments.keep.as_deref() };
+    let options =
+        run::Options { jobs: arguments.jobs, oracle: arguments.oracle, keep: arguments.keep.as_deref() };
     let scored = run::run_all(&specs, &robots, &tracer, &options)?;
     if arguments.case.is_some() {
         for case in &scored {
@@ -111,7 +112,8 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
 /// Writes the cases' files and truths, and runs nothing.
 fn generate(specs: &[Spec], robots: &[robot::Robot], folder: &std::path::Path) -> anyhow::Result<()> {
     for spec in specs {
-        let case = case::Case::draw(spec, robots).with_context(|| format!("no robot can have case {}", spec.seed))?;
+        let case = case::Case::draw(spec, robots)
+            .with_context(|| format!("no robot can have case {}", spec.seed))?;
         write::write_case(&case, folder)?;
     }
     if let [only] = specs {
@@ -122,7 +124,8 @@ fn generate(specs: &[Spec], robots: &[robot::Robot], folder: &std::path::Path) -
 
 fn specs(arguments: &Arguments, robots: &[robot::Robot]) -> anyhow::Result<Vec<Spec>> {
     if let Some(seed) = arguments.case {
-        let spec = Spec::of_seed(seed, robots.len()).with_context(|| format!("no suite has a case of seed {seed}"))?;
+        let spec = Spec::of_seed(seed, robots.len())
+            .with_context(|| format!("no suite has a case of seed {seed}"))?;
         return Ok(vec![spec]);
     }
     if let Some(name) = &arguments.robot {

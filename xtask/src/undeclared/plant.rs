@@ -129,7 +129,8 @@ impl Record {
     /// What the secrets did to the torque of a joint.
     pub fn effect(&self, joint: usize) -> impl Iterator<Item = f64> {
         let joints = self.states.joints;
-        (0..self.times.len()).map(move |sample| self.torque[sample * joints + joint] - self.ideal[sample * joints + joint])
+        (0..self.times.len())
+            .map(move |sample| self.torque[sample * joints + joint] - self.ideal[sample * joints + joint])
     }
 }
 
@@ -147,7 +148,13 @@ pub fn rigid_torque<'t>(states: &States, tree_at: impl Fn(usize) -> &'t Tree) ->
 }
 
 /// Runs the plant along a motion and notes what a perfect logger would see at the given session times.
-pub fn record(tree: &Tree, ordinary: &Ordinary, secrets: &[&Secret], motion: &Motion, times: &[f64]) -> Record {
+pub fn record(
+    tree: &Tree,
+    ordinary: &Ordinary,
+    secrets: &[&Secret],
+    motion: &Motion,
+    times: &[f64],
+) -> Record {
     let joints = tree.joint_count();
     let (mut states, mut torque) = true_torque(tree, ordinary, secrets, motion, times);
     // The sensor is late first, then wrong.
@@ -164,7 +171,9 @@ pub fn record(tree: &Tree, ordinary: &Ordinary, secrets: &[&Secret], motion: &Mo
         match secret.form {
             Form::Gain => over(&mut torque, joints, &secret.joints, |torque| torque * (1.0 + secret.scale)),
             Form::DeadBand => {
-                over(&mut torque, joints, &secret.joints, |torque| if torque.abs() < secret.scale { 0.0 } else { torque });
+                over(&mut torque, joints, &secret.joints, |torque| {
+                    if torque.abs() < secret.scale { 0.0 } else { torque }
+                });
             }
             _ => {}
         }

@@ -25,7 +25,8 @@ const MODELS: [(&str, &str); 5] = [
 /// All robots, small ones first.
 pub fn robots() -> anyhow::Result<Vec<Robot>> {
     let read = |(name, urdf)| {
-        let reading = read_urdf(urdf, &UrdfOptions::default()).with_context(|| format!("models/{name}.urdf"))?;
+        let reading =
+            read_urdf(urdf, &UrdfOptions::default()).with_context(|| format!("models/{name}.urdf"))?;
         Ok(Robot { name, urdf, tree: reading.tree })
     };
     MODELS.into_iter().map(read).collect()
@@ -46,21 +47,28 @@ impl Robot {
 #[cfg(test)]
 mod tests {
     use super::robots;
+    use phiw_dynamics::Workspace;
+    use phiw_dynamics::random_tree::{RandomNumbers, RandomState, random_state};
     use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
     use phiw_regressor::{BaseParameters, BaseParametersOptions};
 
-    fn check(name: &str, joints: usize, base_parameters: usize) {
+    /// `irregular`: links whose published inertia is no body's.
+    fn check(name: &str, joints: usize, base_parameters: usize, irregular: &[&str]) {
         let robots = robots().expect("the models read");
         let robot = robots.iter().find(|robot| robot.name == name).expect(name);
         let findings = read_urdf(robot.urdf, &UrdfOptions::default()).expect(name).findings;
-        assert!(findings.is_empty(), "{name}: {findings:?}");
+        assert_eq!(findings.len(), irregular.len(), "{name}: {findings:?}");
         assert_eq!(robot.joints(), joints, "{name}");
         let base = BaseParameters::of_tree(&robot.tree, BaseParametersOptions::default()).expect(name);
         assert_eq!(base.count(), base_parameters, "{name}");
         for body in robot.tree.bodies() {
-            let pseudo = pseudo_inertia(&body.inertial);
-            assert!(smallest_leading_minor(pseudo) > 0.0, "{name}: {} is no body of this world", body.link);
-            assert!(body.limits.effort.is_finite() && body.limits.velocity.is_finite(), "{name}: {}", body.joint);
+            let is_physical = smallest_pivot(pseudo_inertia(&body.inertial)) > 0.0;
+            assert_eq!(is_physical, !irregular.contains(&body.link.as_str()), "{name}: {}", body.link);
+            assert!(
+                body.limits.effort.is_finite() && body.limits.velocity.is_finite(),
+                "{name}: {}",
+                body.joint
+            );
         }
     }
 
@@ -72,7 +80,7 @@ mod tests {
     }
 
     /// The smallest pivot of an elimination: positive for a positive definite matrix only.
-    fn smallest_leading_minor(mut matrix: [[f64; 4]; 4]) -> f64 {
+    fn smallest_pivot(mut matrix: [[f64; 4]; 4]) -> f64 {
         let mut smallest = f64::INFINITY;
         for pivot in 0..4 {
             smallest = smallest.min(matrix[pivot][pivot]);
@@ -86,12 +94,36 @@ mod tests {
         smallest
     }
 
+    /// The figures measured for the PUMA's link 3 miss the triangle inequality by a tenth, and no torque tells: what lies along
+    /// joint 3's axis may as well belong to link 2.
+    #[test]
+    fn the_pumas_third_link_is_as_good_as_a_body() {
+        let robots = robots().expect("the models read");
+        let puma = &robots.iter().find(|robot| robot.name == "puma560").expect("puma560").tree;
+        let mut moved = puma.inertial_parameters();
+        for (link, share) in [(1, -0.004), (2, 0.004)] {
+            moved[10 * link + 4] += share; // Ixx
+            moved[10 * link + 6] += share; // Iyy
+        }
+        let mut mended = puma.clone();
+        mended.set_inertial_parameters(&moved).expect("sizes fit");
+        assert!(mended.bodies().iter().all(|body| smallest_pivot(pseudo_inertia(&body.inertial)) > 0.0));
+        let (mut random, mut workspace) = (RandomNumbers::new(1), Workspace::new(puma));
+        let [mut as_published, mut as_mended] = [[0.0; 6]; 2];
+        for _ in 0..20 {
+            let RandomState { q, v, a } = random_state(puma, &mut random);
+            puma.inverse_dynamics(&q, &v, &a, &mut workspace, &mut as_published).expect("sizes fit");
+            mended.inverse_dynamics(&q, &v, &a, &mut workspace, &mut as_mended).expect("sizes fit");
+            assert!(as_published.iter().zip(&as_mended).all(|(a, b)| (a - b).abs() < 1e-9));
+        }
+    }
+
     #[test]
     fn models_read_and_are_physical() {
-        check("planar2", 2, 6);
-        check("scara4", 4, 8);
-        check("puma560", 6, 36);
-        check("arm7", 7, 43);
-        check("upper_body18", 18, 114);
+        check("planar2", 2, 6, &[]);
+        check("scara4", 4, 8, &[]);
+        check("puma560", 6, 36, &["link_3"]);
+        check("arm7", 7, 43, &[]);
+        check("upper_body18", 18, 114, &[]);
     }
 }

@@ -36,7 +36,12 @@ pub struct Options<'a> {
 ///
 /// # Errors
 /// A case cannot be drawn or written. A tracer that fails on a case is a score, not an error.
-pub fn run_all(specs: &[Spec], robots: &[Robot], tracer: &Tracer, options: &Options) -> anyhow::Result<Vec<Scored>> {
+pub fn run_all(
+    specs: &[Spec],
+    robots: &[Robot],
+    tracer: &Tracer,
+    options: &Options,
+) -> anyhow::Result<Vec<Scored>> {
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {elapsed} (left {eta}) {msg}")?;
     let progress = ProgressBar::new(specs.len() as u64).with_style(style);
     let next = AtomicUsize::new(0);
@@ -56,7 +61,8 @@ pub fn run_all(specs: &[Spec], robots: &[Robot], tracer: &Tracer, options: &Opti
                             })
                         };
                         let good = results.iter().filter(good).count();
-                        progress.set_message(format!("good {:.1} %", 100.0 * good as f64 / results.len() as f64));
+                        progress
+                            .set_message(format!("good {:.1} %", 100.0 * good as f64 / results.len() as f64));
                     }
                     progress.inc(1);
                 }

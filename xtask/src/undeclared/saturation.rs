@@ -47,8 +47,10 @@ pub fn install(
     for _ in 0..TRIALS {
         secret.scale = needed[((needed.len() - 1) as f64 * quantile) as usize];
         let bandwidth = dice.uniform(6.0, 14.0);
-        let simulated: Option<Vec<Motion>> =
-            motions.iter().map(|motion| simulate(tree, ordinary, motion, joint, secret.scale, bandwidth)).collect();
+        let simulated: Option<Vec<Motion>> = motions
+            .iter()
+            .map(|motion| simulate(tree, ordinary, motion, joint, secret.scale, bandwidth))
+            .collect();
         let Some(simulated) = simulated else {
             quantile = (quantile + 0.02).min(0.995);
             continue;
@@ -56,7 +58,9 @@ pub fn install(
         let clipped = simulated.iter().map(clipped_share).sum::<f64>() / simulated.len() as f64;
         let times: Vec<Vec<f64>> = simulated.iter().map(|motion| even_times(motion, 100.0)).collect();
         let size = secret.size(tree, ordinary, &simulated, &times);
-        if (CLIPPED[0]..=CLIPPED[1]).contains(&clipped) && (super::case::SIZES[0]..=super::case::SIZES[1]).contains(&size) {
+        if (CLIPPED[0]..=CLIPPED[1]).contains(&clipped)
+            && (super::case::SIZES[0]..=super::case::SIZES[1]).contains(&size)
+        {
             motions.clone_from_slice(&simulated);
             return Some(size);
         }
@@ -72,7 +76,14 @@ fn clipped_share(motion: &Motion) -> f64 {
 }
 
 /// The motion with the joint under control; `None` if it leaves its limits.
-fn simulate(tree: &Tree, ordinary: &Ordinary, motion: &Motion, joint: usize, limit: f64, bandwidth: f64) -> Option<Motion> {
+fn simulate(
+    tree: &Tree,
+    ordinary: &Ordinary,
+    motion: &Motion,
+    joint: usize,
+    limit: f64,
+    bandwidth: f64,
+) -> Option<Motion> {
     let joints = tree.joint_count();
     let mut workspace = Workspace::new(tree);
     let [mut q, mut v, mut a, mut torque] = [0; 4].map(|_| vec![0.0; joints]);
@@ -110,7 +121,9 @@ fn simulate(tree: &Tree, ordinary: &Ordinary, motion: &Motion, joint: usize, lim
         path.push([position, speed]);
         excess.push(commanded - commanded.clamp(-limit, limit));
         // Half a step ahead for all that is smooth, implicitly for friction, which is stiff near rest.
-        let net = |equation: [f64; 2], commanded: f64| commanded.clamp(-limit, limit) - equation[0] - ordinary.offset[joint];
+        let net = |equation: [f64; 2], commanded: f64| {
+            commanded.clamp(-limit, limit) - equation[0] - ordinary.offset[joint]
+        };
         let half = implicit_speed(ordinary, joint, speed, start[1], net(start, commanded), 0.5 * STEP);
         let middle = [position + 0.25 * STEP * (speed + half), half, time + 0.5 * STEP];
         let ahead = equation(middle[0], middle[1], middle[2])?;
@@ -138,10 +151,13 @@ fn simulate(tree: &Tree, ordinary: &Ordinary, motion: &Motion, joint: usize, lim
 /// The speed v₁ with inertia·(v₁ − v₀)/h = net − friction(v₁): monotone in v₁, found by bisection.
 fn implicit_speed(ordinary: &Ordinary, joint: usize, speed: f64, inertia: f64, net: f64, step: f64) -> f64 {
     let excess = |next: f64| {
-        inertia * (next - speed) / step + ordinary.viscous[joint] * next + ordinary.coulomb[joint] * ordinary.sign(next)
+        inertia * (next - speed) / step
+            + ordinary.viscous[joint] * next
+            + ordinary.coulomb[joint] * ordinary.sign(next)
             - net
     };
-    let reach = step / inertia * (net.abs() + ordinary.coulomb[joint] + ordinary.viscous[joint] * speed.abs());
+    let reach =
+        step / inertia * (net.abs() + ordinary.coulomb[joint] + ordinary.viscous[joint] * speed.abs());
     let (mut low, mut high) = (speed - reach, speed + reach);
     for _ in 0..50 {
         let middle = 0.5 * (low + high);

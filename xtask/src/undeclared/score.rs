@@ -54,13 +54,15 @@ struct Named {
 }
 
 impl Score {
-    /// Whether the case's own demand is met: all named right, or nothing named where there is nothing, or not called explained
-    /// where nothing of the catalogue explains it.
+    /// Whether the case's own demand is met: all named right and nothing else, or nothing named where there is nothing, or structure
+    /// admitted where nothing of the catalogue explains it.
     pub fn is_good(&self, suite: Suite) -> bool {
         match suite {
             Suite::Control => self.named.is_empty() && self.verdict == "sufficient",
-            Suite::Outside => self.verdict != "explained",
-            _ => self.outcomes.iter().all(|outcome| *outcome == Outcome::Right) && self.false_names.is_empty(),
+            Suite::Outside => matches!(self.verdict.as_str(), "unexplained" | "partly_explained"),
+            _ => {
+                self.outcomes.iter().all(|outcome| *outcome == Outcome::Right) && self.false_names.is_empty()
+            }
         }
     }
 }
@@ -75,7 +77,8 @@ pub fn score(truth: &Truth, report: &Report, floors: Option<&BTreeMap<String, f6
     for test in tests {
         for (outcome, secret) in outcomes.iter_mut().zip(&truth.secrets) {
             for (used, named) in used.iter_mut().zip(&named) {
-                if *outcome == Outcome::Missed && !*used
+                if *outcome == Outcome::Missed
+                    && !*used
                     && let Some(found) = test(secret, named)
                 {
                     (*outcome, *used) = (found, true);

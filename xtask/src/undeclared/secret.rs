@@ -105,7 +105,8 @@ impl Secret {
             let record = record(tree, ordinary, &[self], motion, times);
             for (joint, squares) in squares.iter_mut().enumerate() {
                 squares[0] += record.effect(joint).map(|effect| effect * effect).sum::<f64>();
-                squares[1] += record.ideal.iter().skip(joint).step_by(tree.joint_count()).map(|t| t * t).sum::<f64>();
+                squares[1] +=
+                    record.ideal.iter().skip(joint).step_by(tree.joint_count()).map(|t| t * t).sum::<f64>();
             }
         }
         squares.into_iter().map(|[effect, ideal]| (effect / ideal).sqrt()).fold(0.0, f64::max)

@@ -72,10 +72,14 @@ impl Sensors {
     /// True times of the samples and the stamps on them, from `start` on.
     pub fn times(&self, start: f64, duration: f64, dice: &mut Dice) -> [Vec<f64>; 2] {
         let period = 1.0 / self.rate;
-        let even: Vec<f64> = (0..(duration * self.rate) as usize).map(|k| start + k as f64 * period).collect();
+        let even: Vec<f64> =
+            (0..(duration * self.rate) as usize).map(|k| start + k as f64 * period).collect();
         let mut jittered = |share: f64| -> Vec<f64> {
             // Never before the start, where nobody was logging.
-            even.iter().map(|time| time + share * period * dice.uniform(-1.0, 1.0)).map(|t| t.max(start)).collect()
+            even.iter()
+                .map(|time| time + share * period * dice.uniform(-1.0, 1.0))
+                .map(|t| t.max(start))
+                .collect()
         };
         match self.clock {
             Clock::Even => [even.clone(), even],

@@ -80,8 +80,14 @@ impl Spec {
         let index = (seed % 100_000) as usize;
         let dice = &mut Dice::new(seed, u64::MAX >> 8, Stream::Secret);
         let kinds = Kind::value_variants();
-        let mut spec =
-            Spec { seed, suite, robot: index % robots, secrets: Vec::new(), held: false, together: dice.chance(0.3) };
+        let mut spec = Spec {
+            seed,
+            suite,
+            robot: index % robots,
+            secrets: Vec::new(),
+            held: false,
+            together: dice.chance(0.3),
+        };
         match suite {
             Suite::One => {
                 let kind = kinds[index % kinds.len()];

@@ -26,6 +26,7 @@ pub fn markdown(cases: &[Scored]) -> String {
                 }
             }
         }
+        by_robot(&cases, &mut text);
         timing(&cases, &mut text);
     }
     failures(cases, &mut text);
@@ -84,8 +85,14 @@ fn kinds(cases: &[&Scored], text: &mut String) {
 }
 
 fn together(cases: &[&Scored], text: &mut String) {
-    let all = scores(cases).filter(|score| score.outcomes.iter().all(|outcome| *outcome == Outcome::Right)).count();
-    let _ = writeln!(text, "All secrets of the case named right: {all} of {} ({}).", cases.len(), percent(all, cases.len()));
+    let all =
+        scores(cases).filter(|score| score.outcomes.iter().all(|outcome| *outcome == Outcome::Right)).count();
+    let _ = writeln!(
+        text,
+        "All secrets of the case named right: {all} of {} ({}).",
+        cases.len(),
+        percent(all, cases.len())
+    );
 }
 
 fn control(cases: &[&Scored], text: &mut String) {
@@ -104,22 +111,45 @@ fn control(cases: &[&Scored], text: &mut String) {
 
 fn outside(cases: &[&Scored], text: &mut String) {
     let verdicts = ["unexplained", "partly_explained", "sufficient", "explained"];
-    text.push_str("| what it was | n | unexplained | partly explained | sufficient | **explained** | tracer failed |\n");
+    text.push_str(
+        "| what it was | n | unexplained | partly explained | sufficient | **explained** | tracer failed |\n",
+    );
     text.push_str("|---|--:|--:|--:|--:|--:|--:|\n");
     let mut rows: BTreeMap<Name, [usize; 5]> = BTreeMap::new();
     for case in cases {
         for secret in &case.truth.secrets {
             let row = rows.entry(secret.kind).or_default();
-            let verdict = case.score.as_ref().ok().and_then(|score| verdicts.iter().position(|v| *v == score.verdict));
+            let verdict =
+                case.score.as_ref().ok().and_then(|score| verdicts.iter().position(|v| *v == score.verdict));
             row[verdict.unwrap_or(4)] += 1;
         }
     }
     for (name, row) in &rows {
         let counts: Vec<String> = row.iter().map(usize::to_string).collect();
-        let _ = writeln!(text, "| {} | {} | {} |", name.name(), row.iter().sum::<usize>(), counts.join(" | "));
+        let _ =
+            writeln!(text, "| {} | {} | {} |", name.name(), row.iter().sum::<usize>(), counts.join(" | "));
     }
     let explained: usize = rows.values().map(|row| row[3]).sum();
     let _ = writeln!(text, "\nWrongly called explained: {explained} of {}.", cases.len());
+}
+
+/// How many cases of each robot came out as they should, and how many draws had to be thrown away.
+fn by_robot(cases: &[&Scored], text: &mut String) {
+    text.push_str("\n| robot | n | as it should be | | draws without a visible effect of that size |\n|---|--:|--:|--:|--:|\n");
+    let mut rows: BTreeMap<&str, [u64; 3]> = BTreeMap::new();
+    for case in cases {
+        let row = rows.entry(case.truth.robot).or_default();
+        row[0] += 1;
+        row[1] += u64::from(case.score.as_ref().is_ok_and(|score| score.is_good(case.truth.suite)));
+        row[2] += case.truth.rejected;
+    }
+    for (robot, [n, good, rejected]) in rows {
+        let _ = writeln!(
+            text,
+            "| {robot} | {n} | {good} | {} | {rejected} |",
+            percent(good as usize, n as usize)
+        );
+    }
 }
 
 fn timing(cases: &[&Scored], text: &mut String) {
@@ -145,7 +175,9 @@ fn failures(cases: &[Scored], text: &mut String) {
         let secrets: Vec<String> = truth
             .secrets
             .iter()
-            .map(|secret| format!("{}[{}] {:.0} %", secret.kind.name(), secret.joints.join("+"), 100.0 * secret.size))
+            .map(|secret| {
+                format!("{}[{}] {:.0} %", secret.kind.name(), secret.joints.join("+"), 100.0 * secret.size)
+            })
             .collect();
         let held = if truth.held_model { ", model held" } else { "" };
         let _ = writeln!(text, "- {} ({}{held}): {} → {said}", truth.seed, truth.robot, or_nothing(&secrets));
@@ -162,7 +194,7 @@ fn or_nothing(list: &[String]) -> String {
 /// One line for each case.
 pub fn csv(cases: &[Scored]) -> String {
     let mut text = String::from(
-        "seed,suite,robot,held_model,declared,secrets,sizes,visible,noise_correlation_time,rate,outcomes,false_names,named,\
+        "seed,suite,robot,rejected,held_model,declared,secrets,sizes,visible,noise_correlation_time,rate,outcomes,false_names,named,\
          verdict,closed,closed_pooled,seconds,error\n",
     );
     for case in cases {
@@ -172,10 +204,11 @@ pub fn csv(cases: &[Scored]) -> String {
         };
         let _ = write!(
             text,
-            "{},{:?},{},{},{},{},{},{},{:.4},{},",
+            "{},{:?},{},{},{},{},{},{},{},{:.4},{},",
             truth.seed,
             truth.suite,
             truth.robot,
+            truth.rejected,
             truth.held_model,
             truth.declared.join(" "),
             each(&|secret| format!("{}[{}]", secret.kind.name(), secret.joints.join("+"))),
@@ -187,7 +220,8 @@ pub fn csv(cases: &[Scored]) -> String {
         let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.4}"));
         let _ = match &case.score {
             Ok(score) => {
-                let outcomes: Vec<String> = score.outcomes.iter().map(|outcome| format!("{outcome:?}")).collect();
+                let outcomes: Vec<String> =
+                    score.outcomes.iter().map(|outcome| format!("{outcome:?}")).collect();
                 writeln!(
                     text,
                     "{},{},{},{},{},{},{:.3},",

@@ -36,7 +36,10 @@ fn the_same_seed_gives_the_same_bytes() {
     for spec in [spec(Suite::One, 3), spec(Suite::Two, 1), spec(Suite::Control, 2)] {
         assert_eq!(draw(&spec, &robots).logs(), draw(&spec, &robots).logs(), "{spec:?}");
     }
-    assert_ne!(draw(&spec(Suite::Control, 0), &robots).logs(), draw(&spec(Suite::Control, 5), &robots).logs());
+    assert_ne!(
+        draw(&spec(Suite::Control, 0), &robots).logs(),
+        draw(&spec(Suite::Control, 5), &robots).logs()
+    );
 }
 
 /// Sizes as asked, named joints that exist, felt in the held model's logs only.
@@ -238,7 +241,10 @@ fn clocks_jitter_as_asked() {
             assert_eq!(times.len(), 10_000);
             assert!(times.windows(2).all(|pair| pair[0] < pair[1]) && times[0] >= 25.0);
             let largest = (0..10_000).map(|k| (times[k] - 25.0 - k as f64 / 500.0).abs()).fold(0.0, f64::max);
-            assert!(if jitters { largest > 0.0003 && largest <= 0.0004 } else { largest < 1e-9 }, "{clock:?}: {largest}");
+            assert!(
+                if jitters { largest > 0.0003 && largest <= 0.0004 } else { largest < 1e-9 },
+                "{clock:?}: {largest}"
+            );
         }
         assert_eq!(all[0] == all[1], samples_jitter == stamps_jitter);
     };
@@ -278,7 +284,8 @@ fn logs_are_quantised_and_noisy_as_asked() {
                 })
                 .collect();
             let power: f64 = noise.iter().map(|value| value * value).sum::<f64>() / noise.len() as f64;
-            let lag: f64 = noise.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / noise.len() as f64 / power;
+            let lag: f64 =
+                noise.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / noise.len() as f64 / power;
             let expected = if correlation_time > 0.0 { (-0.002_f64 / correlation_time).exp() } else { 0.0 };
             assert!((power - 1.0).abs() < 0.2, "{power}");
             assert!((lag - expected).abs() < 0.04, "{lag} {expected}");
@@ -291,13 +298,11 @@ fn a_twin_without_secrets_keeps_motion_and_noise() {
     let robots = models();
     let case = draw(&spec(Suite::One, 0), &robots);
     let twin = case.without_secrets();
-    let secret = case.secrets[0].secret.joints[0];
-    let (logs, twins) = (case.logs(), twin.logs());
-    for ((name, log), (_, twin)) in logs.iter().zip(&twins) {
-        let n = case.robot.joints();
+    let own = 1 + case.robot.joints() + case.secrets[0].secret.joints[0];
+    for ((name, log), (_, twin)) in case.logs().iter().zip(&twin.logs()) {
         for (row, other) in log.lines().zip(twin.lines()).skip(1).step_by(100) {
             for (column, (cell, other)) in row.split(',').zip(other.split(',')).enumerate() {
-                assert_eq!(cell == other, column != 1 + n + secret || cell == other, "{name}, column {column}");
+                assert!(cell == other || column == own, "{name}, column {column}");
             }
         }
         assert_ne!(log, twin);

@@ -91,7 +91,13 @@ impl Motion {
     }
 
     /// Moves from pose to pose, as when picking and placing, all joints together, with rests.
-    pub fn point_to_point(tree: &Tree, dice: &mut Dice, start: f64, duration: f64, reach: Option<Reach>) -> Self {
+    pub fn point_to_point(
+        tree: &Tree,
+        dice: &mut Dice,
+        start: f64,
+        duration: f64,
+        reach: Option<Reach>,
+    ) -> Self {
         let rooms: Vec<Room> = (0..tree.joint_count()).map(|joint| room(tree, joint)).collect();
         let pose = |dice: &mut Dice, number: usize| -> Vec<f64> {
             let inside = |(joint, room): (usize, &Room)| match reach {
@@ -112,7 +118,8 @@ impl Motion {
             // A minimum-jerk move of distance d in time T peaks at 1.875 d/T and 5.77 d/T².
             let needed = rooms.iter().zip(from.iter().zip(&to)).map(|(room, (from, to))| {
                 let distance = (to - from).abs();
-                (1.875 * distance / (haste * room.velocity)).max((5.77 * distance / (8.0 * room.velocity)).sqrt())
+                (1.875 * distance / (haste * room.velocity))
+                    .max((5.77 * distance / (8.0 * room.velocity)).sqrt())
             });
             let end = clock + needed.fold(0.4, f64::max);
             if end > duration - 0.3 {
@@ -164,7 +171,9 @@ impl JointMotion {
             JointMotion::PointToPoint { moves } => {
                 let after = moves.partition_point(|move_| move_[0] <= time);
                 match after.checked_sub(1).map(|index| moves[index]) {
-                    Some([begin, end, from, to]) => minimum_jerk((time - begin) / (end - begin), end - begin, from, to),
+                    Some([begin, end, from, to]) => {
+                        minimum_jerk((time - begin) / (end - begin), end - begin, from, to)
+                    }
                     None => [moves.first().map_or(0.0, |first| first[2]), 0.0, 0.0],
                 }
             }
@@ -212,7 +221,11 @@ fn fourier_joint(
             // Spread evenly in the logarithm, lowest and highest always among them.
             let position = (number as f64 + dice.uniform(-0.4, 0.4)) / (count - 1) as f64;
             let harmonic = (harmonics as f64).powf(position.clamp(0.0, 1.0)).round().max(1.0);
-            [dice.uniform(0.3, 1.0) * harmonic.powf(-decay), TAU * fundamental * harmonic, dice.uniform(0.0, TAU)]
+            [
+                dice.uniform(0.3, 1.0) * harmonic.powf(-decay),
+                TAU * fundamental * harmonic,
+                dice.uniform(0.0, TAU),
+            ]
         })
         .collect();
     let unscaled = JointMotion::Fourier { center: 0.0, terms: terms.clone() };
@@ -278,7 +291,9 @@ fn hermite(states: &[JointState], place: f64, step: f64) -> JointState {
     let (h00, h10) = ((1.0 + 2.0 * x) * (1.0 - x).powi(2), x * (1.0 - x).powi(2));
     let (h01, h11) = (x * x * (3.0 - 2.0 * x), x * x * (x - 1.0));
     let position = h00 * q0 + h10 * step * v0 + h01 * q1 + h11 * step * v1;
-    let velocity = (6.0 * x * x - 6.0 * x) * (q0 - q1) / step + (1.0 - x) * (1.0 - 3.0 * x) * v0 + x * (3.0 * x - 2.0) * v1;
+    let velocity = (6.0 * x * x - 6.0 * x) * (q0 - q1) / step
+        + (1.0 - x) * (1.0 - 3.0 * x) * v0
+        + x * (3.0 * x - 2.0) * v1;
     [position, velocity, a0 + x * (a1 - a0)]
 }
 
@@ -303,8 +318,16 @@ mod tests {
                     let time = 25.0 + 0.05 * f64::from(sample) + 0.0123;
                     let [before, [q, v, a], after] =
                         [time - step, time, time + step].map(|time| motion.state(joint, time));
-                    assert!((v - (after[0] - before[0]) / (2.0 * step)).abs() < 1e-3, "{}: {time}", robot.name);
-                    assert!((a - (after[1] - before[1]) / (2.0 * step)).abs() < 0.1, "{}: {time}", robot.name);
+                    assert!(
+                        (v - (after[0] - before[0]) / (2.0 * step)).abs() < 1e-3,
+                        "{}: {time}",
+                        robot.name
+                    );
+                    assert!(
+                        (a - (after[1] - before[1]) / (2.0 * step)).abs() < 0.1,
+                        "{}: {time}",
+                        robot.name
+                    );
                     assert!(q > limits.lower && q < limits.upper && v.abs() <= limits.velocity);
                     furthest = [furthest[0].min(q), furthest[1].max(q)];
                 }
@@ -327,11 +350,16 @@ mod tests {
 
     #[test]
     fn a_simulated_motion_passes_through_its_grid() {
-        let states: Vec<_> = (0..50).map(|k| 0.1 * f64::from(k)).map(|t| [t.sin(), t.cos(), -t.sin()]).collect();
+        let states: Vec<_> =
+            (0..50).map(|k| 0.1 * f64::from(k)).map(|t| [t.sin(), t.cos(), -t.sin()]).collect();
         let joint = JointMotion::Simulated { step: 0.1, states };
         for time in [0.0, 0.31, 1.77, 4.9] {
             let [q, v, a] = joint.state(time, 5.0);
-            assert!((q - time.sin()).abs() < 1e-5 && (v - time.cos()).abs() < 1e-3 && (a + time.sin()).abs() < 2e-3);
+            assert!(
+                (q - time.sin()).abs() < 1e-5
+                    && (v - time.cos()).abs() < 1e-3
+                    && (a + time.sin()).abs() < 2e-3
+            );
         }
     }
 }

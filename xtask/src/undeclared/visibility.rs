@@ -15,7 +15,13 @@ pub struct Absorber {
 
 impl Absorber {
     /// The columns of the rigid body and the declared effects along a record, weighted by one over the noise.
-    pub fn new(tree: &Tree, ordinary: &Ordinary, declared: &[Kind], records: &[Record], noise: &[f64]) -> Self {
+    pub fn new(
+        tree: &Tree,
+        ordinary: &Ordinary,
+        declared: &[Kind],
+        records: &[Record],
+        noise: &[f64],
+    ) -> Self {
         let joints = tree.joint_count();
         let weights: Vec<f64> = noise.iter().map(|noise| 1.0 / noise).collect();
         let mut absorber = Absorber { joints, basis: Vec::new(), weights };
@@ -24,7 +30,9 @@ impl Absorber {
             let mut parameters = vec![0.0; tree.inertial_parameters().len()];
             parameters[parameter] = 1.0;
             if single.set_inertial_parameters(&parameters).is_ok() {
-                absorber.add(records.iter().flat_map(|record| rigid_torque(&record.states, |_| &single)).collect());
+                absorber.add(
+                    records.iter().flat_map(|record| rigid_torque(&record.states, |_| &single)).collect(),
+                );
             }
         }
         for kind in declared {
@@ -41,12 +49,22 @@ impl Absorber {
         absorber
     }
 
-    /// Also what a simpler effect on the same joint could pass for.
+    /// Also what a simpler effect could pass for: an offset, or a spring.
     pub fn add_simpler(&mut self, kind: Kind, joint: usize, records: &[Record]) {
-        if matches!(kind, Kind::GravityBalancer | Kind::JointSpring | Kind::Hysteresis) {
+        use Kind::{
+            AsymmetricFriction, EncoderOffset, ExternalForce, GravityBalancer, GravityTilt, Hysteresis,
+            JointSpring, Payload,
+        };
+        let offsets = match kind {
+            GravityBalancer | JointSpring | Hysteresis | AsymmetricFriction => joint..joint + 1,
+            // Felt along the chain: an offset on any of its joints.
+            ExternalForce | Payload | GravityTilt | EncoderOffset => 0..self.joints,
+            _ => 0..0,
+        };
+        for joint in offsets {
             self.add_shape(records, joint, &|_, _, _| 1.0);
         }
-        if matches!(kind, Kind::GravityBalancer | Kind::Hysteresis) {
+        if matches!(kind, GravityBalancer | Hysteresis) {
             self.add_shape(records, joint, &|states, sample, joint| states.q(sample, joint));
         }
     }
@@ -54,7 +72,9 @@ impl Absorber {
     fn add_shape(&mut self, records: &[Record], joint: usize, shape: &dyn Fn(&States, usize, usize) -> f64) {
         let joints = self.joints;
         let column = records.iter().flat_map(|record| {
-            let value = move |row: usize| if row % joints == joint { shape(&record.states, row / joints, joint) } else { 0.0 };
+            let value = move |row: usize| {
+                if row % joints == joint { shape(&record.states, row / joints, joint) } else { 0.0 }
+            };
             (0..record.times.len() * joints).map(value)
         });
         let column = column.collect();
@@ -91,12 +111,14 @@ impl Absorber {
 
     /// RMS of what is left of the records' effect, in units of the noise, for the joint where most is left.
     pub fn visible(&self, records: &[Record]) -> f64 {
-        let effect = records.iter().flat_map(|record| record.torque.iter().zip(&record.ideal).map(|(a, b)| a - b));
+        let effect =
+            records.iter().flat_map(|record| record.torque.iter().zip(&record.ideal).map(|(a, b)| a - b));
         let mut column = self.weighted(effect.collect());
         self.project_out(&mut column);
         let samples = column.len() / self.joints;
         let mean_square = |joint| {
-            column.iter().skip(joint).step_by(self.joints).map(|value| value * value).sum::<f64>() / samples as f64
+            column.iter().skip(joint).step_by(self.joints).map(|value| value * value).sum::<f64>()
+                / samples as f64
         };
         (0..self.joints).map(mean_square).fold(0.0, f64::max).sqrt()
     }

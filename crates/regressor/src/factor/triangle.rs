@@ -44,6 +44,11 @@ impl Factor {
         Factor { columns, rows, r }
     }
 
+    /// The same factor standing for `rows` rows: for one that was written down and is read back.
+    pub fn standing_for(self, rows: u64) -> Self {
+        Factor { rows, ..self }
+    }
+
     /// Number of columns, the right-hand side included.
     pub fn columns(&self) -> usize {
         self.columns

@@ -74,6 +74,7 @@ impl JointSection {
         });
         let residual = residual_panel(&ResidualPanel {
             residual: Line::from(&residual),
+            torque: Line::from(&measured),
             noise_floor: self.noise_floor,
             unit: &self.unit,
         });

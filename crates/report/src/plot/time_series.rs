@@ -42,6 +42,8 @@ pub fn torque_panel(input: &TorquePanel<'_>) -> Svg {
 pub struct ResidualPanel<'a> {
     /// Measured minus predicted torque over time (s).
     pub residual: Line<'a>,
+    /// The torque above it (s), whose times are shown, so that the two stand in line though the residual may have gaps at its ends.
+    pub torque: Line<'a>,
     /// RMS of the noise, drawn as a band of ± this; none is drawn where it is not known.
     pub noise_floor: Option<f64>,
     /// Unit of the torque.
@@ -50,9 +52,9 @@ pub struct ResidualPanel<'a> {
 
 /// The residual of one joint over time with its noise floor, to stand under a [`torque_panel`].
 pub fn residual_panel(input: &ResidualPanel<'_>) -> Svg {
-    let ResidualPanel { residual, noise_floor, unit } = *input;
+    let ResidualPanel { residual, torque, noise_floor, unit } = *input;
     let floor = noise_floor.filter(|&floor| drawable(floor) && floor > 0.0);
-    let x = Axis::linear("t [s]", residual.points().map(|point| point.0), false, 9);
+    let x = Axis::linear("t [s]", residual.points().chain(torque.points()).map(|point| point.0), false, 9);
     let band = floor.into_iter().flat_map(|floor| [-floor, floor]);
     let y = Axis::linear(
         format!("residual [{unit}]"),

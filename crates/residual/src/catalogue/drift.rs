@@ -21,7 +21,7 @@ impl EffectKind for ThermalDrift {
     }
     fn scan(&self, _site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         let duration = ranges.session.1 - ranges.session.0;
-        let mut variants = values(TIME_CONSTANT, [2.0, 1.0, 0.5, 0.25, 0.125].map(|share| share * duration));
+        let mut variants = values(TIME_CONSTANT, [1.0, 0.5, 0.25, 0.125].map(|share| share * duration));
         if ranges.temperature {
             variants.extend(values(TIME_CONSTANT, [0.0]));
         }

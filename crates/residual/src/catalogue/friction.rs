@@ -8,10 +8,16 @@ use phiw_identification::{Effect, Needs, Sample};
 /// The constant of every smoothed sign: the speed over which it turns \[rad/s, m/s\].
 pub(super) const WIDTH: &str = "sign_width";
 
-/// Speeds over which a sign may turn, from the plain sign up to a tenth of the joint's speed.
+/// Speeds over which a sign may turn: the plain sign, then up to 0.064 rad/s (m/s), but no more than half of the joint's RMS speed.
 pub(super) fn sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
-    let largest = 0.02 * ranges.joints[joint].velocity_rms;
-    values(WIDTH, [0.0].into_iter().chain((0..6).map(|halvings| largest * 0.5_f64.powi(halvings))))
+    let largest = 0.5 * ranges.joints[joint].velocity_rms;
+    let widths = (0..15).map(|step| 0.0005 * 2.0_f64.powf(0.5 * f64::from(step))).filter(|&width| width <= largest);
+    values(WIDTH, [0.0].into_iter().chain(widths))
+}
+
+/// A few of them, for effects that are not themselves about the sign.
+pub(super) fn few_sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
+    sign_widths(joint, ranges).into_iter().step_by(5).collect()
 }
 
 fn width_of(constants: &Constants) -> f64 {
@@ -68,7 +74,7 @@ impl EffectKind for Asymmetric {
         "asymmetric_friction"
     }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
-        let widths: Vec<Constants> = sign_widths(site[0], ranges).into_iter().step_by(3).collect();
+        let widths = few_sign_widths(site[0], ranges);
         let mut variants = values("part", [0.0]);
         variants.extend(product(&values("part", [1.0, 2.0]), &widths));
         variants
@@ -139,10 +145,9 @@ impl EffectKind for Stribeck {
     }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         let speed = ranges.joints[site[0]].velocity_rms;
-        let speeds = values(STRIBECK_VELOCITY, (0..6).map(|halvings| speed * 0.5_f64.powi(halvings)));
+        let speeds = values(STRIBECK_VELOCITY, (0..5).map(|halvings| speed * 0.5_f64.powi(halvings)));
         let shapes = product(&speeds, &values(EXPONENT, [1.0, 2.0]));
-        let widths = values(WIDTH, [0.0, 0.02 * speed]);
-        product(&shapes, &widths)
+        product(&shapes, &values(WIDTH, [0.02 * speed]))
     }
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
         let mut near = around(found, STRIBECK_VELOCITY, step);
@@ -162,7 +167,16 @@ impl EffectKind for Stribeck {
         let exponent = constant(constants, EXPONENT, 2.0);
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
             let velocity = sample.qd()[joint];
-            out[0] = (-(velocity / speed).abs().powf(exponent)).exp() * smooth_sign(velocity, width);
+            let relative = (velocity / speed).abs();
+            let power = if exponent == 1.0 {
+                relative
+            } else if exponent == 2.0 {
+                relative * relative
+            } else {
+                relative.powf(exponent)
+            };
+            // Far above the Stribeck velocity nothing is left.
+            out[0] = if power > 40.0 { 0.0 } else { (-power).exp() * smooth_sign(velocity, width) };
         };
         let parameters = [("fs", ParameterKind::Torque, 0.0)];
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
@@ -177,7 +191,7 @@ impl EffectKind for LoadDependent {
         "load_dependent_friction"
     }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
-        sign_widths(site[0], ranges).into_iter().step_by(3).collect()
+        few_sign_widths(site[0], ranges)
     }
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
         around(found, WIDTH, step)

@@ -11,8 +11,10 @@ mod hysteresis;
 mod kind;
 mod position;
 mod sensing;
+mod sentence;
 
 pub use columns::{Formula, OwnTorque, ParameterKind, smooth_sign};
+pub use sentence::sentence;
 pub use kind::{Constants, EffectKind, JointRange, SignalRanges};
 
 use phiw_dynamics::Tree;

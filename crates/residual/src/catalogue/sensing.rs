@@ -202,7 +202,7 @@ impl EffectKind for ActuatorSaturation {
     }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         let peak = ranges.joints[site[0]].torque_peak;
-        values(LIMIT, (0..10).map(|step| peak * (0.95 - 0.07 * f64::from(step))))
+        values(LIMIT, (0..8).map(|step| peak * (0.95 - 0.08 * f64::from(step))))
     }
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
         let Some(&limit) = found.get(LIMIT) else { return Vec::new() };

@@ -1,0 +1,52 @@
+//! Short logs kept in memory between passes, long ones read again: bounded either way.
+
+use crate::{BlockSource, IdentificationError};
+use phiw_telemetry::{Block, LogError};
+
+/// Conditioned blocks of a source, kept if they are few.
+pub struct KeptBlocks<'a> {
+    source: &'a dyn BlockSource,
+    kept: Option<Vec<Block>>,
+}
+
+impl<'a> KeptBlocks<'a> {
+    /// Keeps the sources' blocks as long as they fit into `budget` bytes together; those that do not are read again at every pass.
+    ///
+    /// # Errors
+    /// A log cannot be read.
+    pub fn keep(sources: &[&'a dyn BlockSource], mut budget: usize) -> Result<Vec<Self>, IdentificationError> {
+        let mut all = Vec::with_capacity(sources.len());
+        for &source in sources {
+            let mut kept = Some(Vec::new());
+            let mut used = 0;
+            source.blocks(&mut |block| {
+                used += size(&block);
+                match &mut kept {
+                    Some(blocks) if used <= budget => blocks.push(block),
+                    _ => kept = None,
+                }
+            })?;
+            if kept.is_some() {
+                budget -= used;
+            }
+            all.push(KeptBlocks { source, kept });
+        }
+        Ok(all)
+    }
+}
+
+fn size(block: &Block) -> usize {
+    let temperatures = block.temp.as_ref().map_or(0, Vec::len);
+    let numbers = block.t.len() + 3 * block.q.len() + block.tau.len() + temperatures + block.outputs.len();
+    numbers * size_of::<f64>()
+}
+
+impl BlockSource for KeptBlocks<'_> {
+    fn blocks(&self, sink: &mut dyn FnMut(Block)) -> Result<(), LogError> {
+        match &self.kept {
+            Some(blocks) => blocks.iter().cloned().for_each(sink),
+            None => self.source.blocks(sink)?,
+        }
+        Ok(())
+    }
+}

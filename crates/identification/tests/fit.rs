@@ -1,0 +1,140 @@
+//! Fits of robots whose truth is known.
+
+mod synthetic;
+
+use phiw_dynamics::Tree;
+use phiw_identification::{BlockSource, Data, Fold, Identified, InputError, IdentificationError, Variants, identify, predict};
+use phiw_telemetry::{Block, Recording};
+
+const FOLDS: usize = 13;
+
+fn fit(tree: &Tree, blocks: &Vec<Block>, seconds: f64, rest_speeds: Vec<f64>) -> Identified {
+    let effects = (0..tree.joint_count()).map(|joint| vec![synthetic::Viscous::on(tree, joint)]).collect();
+    identify(tree, effects, &synthetic::data(blocks, synthetic::folds(seconds, FOLDS), rest_speeds)).unwrap()
+}
+
+#[test]
+fn without_noise_the_truth_is_found() {
+    for seed in 0..6 {
+        let tree = synthetic::robot(seed, 4);
+        let blocks = synthetic::blocks(&synthetic::recording(&tree, seed, 40.0, 2.0, 0.0, 0), 500);
+        let identified = fit(&tree, &blocks, 40.0, Vec::new());
+        let truth = synthetic::truth(&tree, 2.0);
+        assert!(identified.fit.undetermined.is_empty());
+        // What the low-pass over the positions bends is left.
+        assert!(identified.held_out.relative < 1e-6, "{}", identified.held_out.relative);
+        for (found, truth) in identified.fit.parameters.iter().zip(&truth) {
+            assert!((found - truth).abs() < 1e-4 * (1.0 + truth.abs()), "{found}, in truth {truth}");
+        }
+    }
+}
+
+/// Delete-one-fold deviations against the spread of fits to the same motion with other noise.
+#[test]
+fn standard_deviations_are_those_of_repeated_experiments() {
+    const EXPERIMENTS: u64 = 40;
+    let tree = synthetic::robot(2, 2);
+    let fits: Vec<Identified> = (0..EXPERIMENTS)
+        .map(|seed| fit(&tree, &synthetic::blocks(&synthetic::recording(&tree, 1, 40.0, 2.0, 0.5, seed), 4096), 40.0, Vec::new()))
+        .collect();
+    for parameter in 0..fits[0].design.parameter_count() {
+        let mean = |value: &dyn Fn(&Identified) -> f64| fits.iter().map(value).sum::<f64>() / EXPERIMENTS as f64;
+        let center = mean(&|fit| fit.fit.parameters[parameter]);
+        let spread = mean(&|fit| (fit.fit.parameters[parameter] - center).powi(2)).sqrt();
+        let claimed = mean(&|fit| fit.fit.standard_deviations[parameter].powi(2)).sqrt();
+        let ratio = claimed / spread;
+        assert!((0.6..1.7).contains(&ratio), "parameter {parameter}: ± {claimed} claimed, {spread} in truth");
+    }
+}
+
+/// A recording whose joint 0 stands still in the second half, under a torque that no model knows of.
+fn resting(tree: &Tree) -> Recording {
+    let mut log = synthetic::recording(tree, 4, 40.0, 2.0, 0.0, 0);
+    let joints = tree.joint_count();
+    let half = log.len() / 2;
+    let stop = log.q[half * joints];
+    for row in half..log.len() {
+        log.q[row * joints] = stop;
+        log.tau[row * joints] += 30.0;
+        for derivative in [&mut log.qd, &mut log.qdd].into_iter().flatten() {
+            derivative[row * joints] = 0.0;
+        }
+    }
+    // The others feel that joint 0 does not move.
+    let mut torque = vec![0.0; joints];
+    for row in half..log.len() {
+        let own = row * joints..(row + 1) * joints;
+        let [v, a] = [&log.qd, &log.qdd].map(|values| values.as_ref().unwrap()[own.clone()].to_vec());
+        tree.inverse_dynamics(&log.q[own.clone()], &v, &a, &mut phiw_dynamics::Workspace::new(tree), &mut torque).unwrap();
+        for joint in 1..joints {
+            log.tau[own.start + joint] = torque[joint] + 2.0 * v[joint];
+        }
+    }
+    log
+}
+
+#[test]
+fn torque_at_rest_decides_nothing() {
+    let tree = synthetic::robot(6, 3);
+    let blocks = synthetic::blocks(&resting(&tree), 500);
+    let data = |rest_speeds| {
+        let folds = synthetic::folds(40.0, 20);
+        let all: Vec<Fold> = folds.iter().copied().filter(|fold| !(fold.start..fold.end).contains(&20.0)).collect();
+        Data { train: all.clone(), held_out: all, sources: vec![&blocks as &dyn BlockSource], rest_speeds }
+    };
+    let effects = || -> Vec<Variants> { (0..3).map(|joint| vec![synthetic::Viscous::on(&tree, joint)]).collect() };
+    let misled = identify(&tree, effects(), &data(Vec::new())).unwrap();
+    let fitted = identify(&tree, effects(), &data(vec![1e-3; 3])).unwrap();
+    let rows = |identified: &Identified, joint: usize| -> u64 {
+        identified.train_folds.iter().map(|fold| fold.groups()[joint].factor.rows()).sum()
+    };
+    assert_eq!(rows(&fitted, 1), rows(&misled, 1));
+    let share = rows(&fitted, 0) as f64 / rows(&misled, 0) as f64;
+    assert!((0.45..0.6).contains(&share), "joint 0 moves half of the time, {share} of its rows count");
+    assert!(misled.train.rmse[0] > 1.0);
+    // What the filter mixes across the stop is left.
+    assert!(fitted.train.rmse[0] < 0.05 * misled.train.rmse[0], "{:?} {:?}", fitted.train.rmse, misled.train.rmse);
+
+    let (mut resting, mut outputs) = (0, 0);
+    predict(&fitted.design, &fitted.fit.parameters, &[&blocks], &mut |prediction| {
+        outputs += 1;
+        resting += u32::from(!prediction.counts(0));
+        assert!(prediction.counts(0) || prediction.t > 19.0);
+    })
+    .unwrap();
+    assert!((0.4..0.6).contains(&(f64::from(resting) / f64::from(outputs))));
+}
+
+/// The errors that the factors tell are those of the predictions, summed one by one.
+#[test]
+fn predictions_have_the_error_that_the_factors_tell() {
+    let tree = synthetic::robot(9, 4);
+    let blocks = synthetic::blocks(&synthetic::recording(&tree, 9, 40.0, 2.0, 1.0, 3), 300);
+    let identified = fit(&tree, &blocks, 40.0, vec![0.05; 4]);
+    let held_out = synthetic::folds(40.0, FOLDS).pop().unwrap();
+    let (mut squares, mut rows) = (vec![0.0; 4], vec![0; 4]);
+    predict(&identified.design, &identified.fit.parameters, &[&blocks], &mut |prediction| {
+        for joint in (0..4).filter(|&joint| held_out.contains(0, prediction.t) && prediction.counts(joint)) {
+            squares[joint] += prediction.residual(joint).powi(2);
+            rows[joint] += 1;
+        }
+    })
+    .unwrap();
+    for joint in 0..4 {
+        let rmse = (squares[joint] / f64::from(rows[joint])).sqrt();
+        assert!((rmse / identified.held_out.rmse[joint] - 1.0).abs() < 1e-9, "joint {joint}");
+    }
+}
+
+#[test]
+fn too_short_a_log_is_said_to_be() {
+    let tree = synthetic::robot(1, 6);
+    let blocks = synthetic::blocks(&synthetic::recording(&tree, 1, 0.6, 2.0, 0.1, 0), 500);
+    let data = synthetic::data(&blocks, synthetic::folds(0.6, 2), Vec::new());
+    match identify(&tree, Vec::new(), &data) {
+        Err(IdentificationError::Input(InputError::TooShort { rows, parameters, .. })) => {
+            assert!(rows < 2 * parameters as u64);
+        }
+        other => panic!("{:?}", other.map(|identified| identified.train)),
+    }
+}

@@ -1,0 +1,75 @@
+//! `model.json`: what is written is what is read.
+
+mod synthetic;
+
+use phiw_dynamics::Tree;
+use phiw_identification::{IdentificationError, Identified, Model, identify};
+
+fn identified(tree: &Tree) -> Identified {
+    let blocks = synthetic::blocks(&synthetic::recording(tree, 3, 30.0, 2.0, 0.3, 3), 1000);
+    let effects = (0..tree.joint_count()).map(|joint| vec![synthetic::Viscous::on(tree, joint)]).collect();
+    identify(tree, effects, &synthetic::data(&blocks, synthetic::folds(30.0, 8), Vec::new())).unwrap()
+}
+
+fn model(identified: &Identified) -> Model {
+    let declared = ["viscous".to_owned()];
+    Model::of_fit(&identified.design, &identified.fit, &declared, &[("finger".to_owned(), 0.1)], (20.0, 10.0)).unwrap()
+}
+
+#[test]
+fn a_model_survives_its_file_to_the_last_bit() {
+    let tree = synthetic::robot(4, 5);
+    let identified = identified(&tree);
+    let model = model(&identified);
+    let read: Model = serde_json::from_str(&serde_json::to_string_pretty(&model).unwrap()).unwrap();
+    assert_eq!(read, model);
+    let (design, parameters) = read.design(&tree, &synthetic::OneKind).unwrap();
+    assert_eq!(parameters, identified.fit.parameters);
+    let kinds = |design: &phiw_identification::Design| design.effects().iter().map(|effect| effect.spec()).collect::<Vec<_>>();
+    assert_eq!(kinds(&design), kinds(&identified.design));
+    let (factor, fitted) = (read.factor.factor().unwrap(), &identified.fit.factor);
+    assert_eq!(factor.rows(), fitted.rows());
+    let again = factor.solve().unwrap().parameters;
+    for (again, parameter) in again.iter().zip(&parameters) {
+        assert!((again - parameter).abs() < 1e-9 * (1.0 + parameter.abs()));
+    }
+}
+
+/// Also where the URDF has no inertials to be near to.
+#[test]
+fn standard_parameters_have_the_base_parameters_that_were_found() {
+    let tree = synthetic::robot(4, 5);
+    let identified = identified(&tree);
+    let mut empty = tree.clone();
+    empty.set_inertial_parameters(&vec![0.0; tree.inertial_parameters().len()]).unwrap();
+    for tree in [tree, empty] {
+        let model = Model::of_fit(&synthetic::design(&tree), &identified.fit, &[], &[], (20.0, 10.0)).unwrap();
+        let lifted = model.identified_tree(&tree).unwrap();
+        assert!(lifted.bodies().iter().all(|body| body.inertial[0] != 0.0), "URDF cannot express a body without mass");
+        let found = identified.design.base().from_standard(&lifted.inertial_parameters()).unwrap();
+        for (found, fitted) in found.iter().zip(&identified.fit.parameters) {
+            assert!((found - fitted).abs() < 1e-8 * (1.0 + fitted.abs()), "{found} {fitted}");
+        }
+    }
+}
+
+#[test]
+fn a_model_of_another_robot_is_refused() {
+    let tree = synthetic::robot(4, 5);
+    let model = model(&identified(&tree));
+    let refused = |model: &Model, tree: &Tree| match model.design(tree, &synthetic::OneKind) {
+        Err(IdentificationError::Model(message)) => message,
+        other => panic!("{:?}", other.map(|_| ())),
+    };
+    assert!(refused(&model, &synthetic::robot(4, 6)).contains("--hold"));
+    let mut other = model.clone();
+    other.base_parameters.pop();
+    assert!(refused(&other, &tree).contains("the kinematics differ"));
+    assert!(refused(&Model { schema: 99, ..model.clone() }, &tree).contains("schema 99"));
+    let mut cut = model.clone();
+    cut.effects[0].parameters.clear();
+    assert!(refused(&cut, &tree).contains("has not the parameters"));
+    cut = model;
+    cut.factor.entries.pop();
+    assert!(cut.factor.factor().is_err());
+}

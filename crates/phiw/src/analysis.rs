@@ -1,0 +1,95 @@
+//! A fitted model with everything that the report says of it.
+
+use crate::session::Session;
+use crate::traces::Traces;
+use crate::{Error, warnings};
+use phiw_identification::{Data, Identified, Model, merge};
+use phiw_regressor::RegressorError;
+
+/// A residual up to this many times the noise floor is noise.
+pub const NOISE_MARGIN: f64 = 1.1;
+
+/// A fitted model with everything that the report says of it.
+pub struct Analysis<'a> {
+    /// Robot, logs, declared effects.
+    pub session: &'a Session,
+    /// The fit.
+    pub identified: &'a Identified,
+    /// The same as it is written to `model.json`.
+    pub model: Model,
+    /// Torques over time.
+    pub traces: Traces,
+    /// RMS of the noise in each joint's filtered torque \[N·m, N\].
+    pub noise_floor: Vec<f64>,
+    /// What a reader should know before trusting a number.
+    pub warnings: Vec<String>,
+}
+
+impl<'a> Analysis<'a> {
+    /// Passes over the logs once more with the fitted model and puts everything together.
+    ///
+    /// # Errors
+    /// A log cannot be read any more.
+    pub fn new(session: &'a Session, data: &Data<'_>, identified: &'a Identified) -> Result<Self, Error> {
+        let Identified { design, fit, .. } = identified;
+        let conditioning = session.logs.conditioning();
+        let cutoffs = (conditioning.cutoff_hz, conditioning.parallel_cutoff_hz);
+        let model = Model::of_fit(design, fit, &session.declared, &session.arguments.hold, cutoffs)?;
+        let folds = [data.train.as_slice(), data.held_out.as_slice()];
+        let traces = Traces::collect(design, &fit.parameters, folds, &data.sources)?;
+        let noise_floor = white_noise_floor(session)?;
+        let warnings = warnings::all(session, identified);
+        Ok(Analysis { session, identified, model, traces, noise_floor, warnings })
+    }
+
+    /// Names of the robot's joints.
+    pub fn joints(&self) -> Vec<String> {
+        self.session.tree.joint_names().map(str::to_owned).collect()
+    }
+
+    /// Joints whose held-out error exceeds the noise floor by more than its uncertainty.
+    pub fn joints_above_noise(&self) -> Vec<usize> {
+        let errors = self.identified.held_out.rmse.iter().zip(&self.noise_floor).enumerate();
+        errors.filter(|(_, (error, floor))| **error > NOISE_MARGIN * **floor).map(|(joint, _)| joint).collect()
+    }
+
+    /// cond of the weighted regressor.
+    pub fn condition_number(&self) -> f64 {
+        self.identified.fit.factor.condition_number().unwrap_or(f64::NAN)
+    }
+
+    /// Determined parameters that act like an undetermined one on the training motion, with their share, largest first.
+    ///
+    /// # Errors
+    /// None is known: the fit has solved the same columns.
+    pub fn acts_like(&self, undetermined: usize) -> Result<Vec<(usize, f64)>, RegressorError> {
+        let fit = &self.identified.fit;
+        let all = merge(&self.identified.train_folds)?;
+        let weights: Vec<f64> = fit.residual_std.iter().map(|std| 1.0 / std.max(f64::MIN_POSITIVE)).collect();
+        let factor = all.combine(&weights)?;
+        let mut columns = fit.determined();
+        columns.push(undetermined);
+        let coefficients = factor.select(&columns)?.solve()?.parameters;
+        let norm = factor.column_norm(undetermined);
+        let share = |(&column, coefficient): (&usize, &f64)| (column, coefficient * factor.column_norm(column) / norm);
+        let mut shares: Vec<(usize, f64)> = columns.iter().zip(&coefficients).map(share).collect();
+        shares.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+        Ok(shares)
+    }
+}
+
+/// RMS of the torque noise that passes the parallel filter, if it is white: σ·√Σtaps², over all logs.
+fn white_noise_floor(session: &Session) -> Result<Vec<f64>, Error> {
+    let mut squares = vec![0.0; session.tree.joint_count()];
+    let mut rows = 0.0;
+    for survey in session.logs.surveys() {
+        let plan = session.logs.conditioning().plan(survey)?;
+        let gain: f64 = plan.parallel.taps().iter().map(|tap| tap * tap).sum();
+        rows += survey.used_rows as f64;
+        for (square, joint) in squares.iter_mut().zip(&survey.joints) {
+            let noise = joint.torque.map_or(f64::NAN, |torque| torque.noise_std);
+            *square += survey.used_rows as f64 * gain * noise * noise;
+        }
+    }
+    Ok(squares.into_iter().map(|square| (square / rows).sqrt()).collect())
+}

@@ -1,0 +1,166 @@
+//! The command line.
+
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+
+/// What was asked for.
+#[derive(Debug, Parser)]
+#[command(name = "phiw", version, about = "Identify a robot from its URDF and logs")]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Fit the declared model to logs: model.json, report.json, report.html, identified.urdf.
+    Identify(IdentifyArguments),
+    /// The same, then close the loop: find what the model lacks, add it, and report the error before and after.
+    Explain(ExplainArguments),
+}
+
+impl Command {
+    /// Whether nothing but errors is to be printed.
+    pub fn quiet(&self) -> bool {
+        match self {
+            Command::Identify(identify) => identify.session.quiet,
+            Command::Explain(explain) => explain.session.quiet,
+        }
+    }
+}
+
+/// Arguments of `phiw identify`.
+#[derive(Debug, Args)]
+pub struct IdentifyArguments {
+    /// Robot, logs and declared model.
+    #[command(flatten)]
+    pub session: SessionArguments,
+}
+
+/// Arguments of `phiw explain`.
+#[derive(Debug, Args)]
+pub struct ExplainArguments {
+    /// Robot, logs and declared model.
+    #[command(flatten)]
+    pub session: SessionArguments,
+    /// A model.json of `phiw identify` or `phiw explain`: its parameters are held, and what has changed since is sought.
+    #[arg(long, value_name = "MODEL.json")]
+    pub model: Option<PathBuf>,
+}
+
+/// Robot, logs and declared model: what every command on measured logs takes.
+#[derive(Clone, Debug, Default, Args)]
+pub struct SessionArguments {
+    /// The robot's URDF.
+    #[arg(long, value_name = "ROBOT.urdf")]
+    pub urdf: PathBuf,
+    /// Logs (CSV) that the model is fitted to.
+    #[arg(long, value_name = "LOG", required = true, num_args = 1..)]
+    pub train: Vec<PathBuf>,
+    /// Logs that its error is measured on; without any, the last 30 % of each training log are held out.
+    #[arg(long, value_name = "LOG", num_args = 1..)]
+    pub validate: Vec<PathBuf>,
+    /// Effects beside the rigid body, on every joint: viscous_friction, coulomb_friction, rotor_inertia, …
+    #[arg(long, value_name = "EFFECT,…", value_delimiter = ',')]
+    pub declare: Vec<String>,
+    /// Joints of the URDF that do not move, at 0 or at a value [rad, m]; they need no column in the log.
+    #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
+    pub hold: Vec<(String, f64)>,
+    /// Cut-off of the low-pass over positions [Hz]; by default chosen from the logs' spectra.
+    #[arg(long, value_name = "HZ")]
+    pub cutoff_hz: Option<f64>,
+    /// Cut-off of the low-pass over the model's columns and the torque alike [Hz]; by default the motion's bandwidth.
+    #[arg(long, value_name = "HZ")]
+    pub parallel_cutoff_hz: Option<f64>,
+    /// Folder for the results; it is made if it is absent.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Print nothing but errors.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+impl SessionArguments {
+    /// The command line that gives these arguments to `phiw` and `command`, quoted for a shell.
+    pub fn command_line(&self, command: &str) -> String {
+        let mut words = vec!["phiw".to_owned(), command.to_owned()];
+        let mut option = |name: &str, values: Vec<String>| {
+            if !values.is_empty() {
+                words.push(name.to_owned());
+                words.extend(values.iter().map(|value| quoted(value)));
+            }
+        };
+        let paths = |paths: &[PathBuf]| paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>();
+        let list = |values: Vec<String>| if values.is_empty() { values } else { vec![values.join(",")] };
+        let number = |value: Option<f64>| value.iter().map(f64::to_string).collect::<Vec<_>>();
+        let held = |(joint, value): &(String, f64)| match *value {
+            0.0 => joint.clone(),
+            value => format!("{joint}={value}"),
+        };
+        option("--urdf", paths(std::slice::from_ref(&self.urdf)));
+        option("--train", paths(&self.train));
+        option("--validate", paths(&self.validate));
+        option("--declare", list(self.declare.clone()));
+        option("--hold", list(self.hold.iter().map(held).collect()));
+        option("--cutoff-hz", number(self.cutoff_hz));
+        option("--parallel-cutoff-hz", number(self.parallel_cutoff_hz));
+        option("--out", paths(std::slice::from_ref(&self.out)));
+        words.join(" ")
+    }
+}
+
+/// `JOINT` or `JOINT=VALUE`.
+fn held_joint(text: &str) -> Result<(String, f64), String> {
+    let (joint, value) = text.split_once('=').unwrap_or((text, "0"));
+    let joint = joint.trim();
+    if joint.is_empty() {
+        return Err("write JOINT or JOINT=VALUE".to_owned());
+    }
+    match value.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok((joint.to_owned(), number)),
+        _ => Err(format!("`{value}` is not a position; write {joint} or {joint}=0.5 (rad or m)")),
+    }
+}
+
+/// A word as a shell reads it back.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "_-./,=:+@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_reads_back() {
+        let words = [
+            "phiw", "identify", "--urdf", "a robot.urdf", "--train", "a.csv", "b'.csv", "--validate", "c.csv",
+            "--declare", "viscous_friction,torque_offset", "--hold", "finger,torso=-0.25", "--cutoff-hz", "12.5",
+            "--out", "out",
+        ];
+        let Command::Identify(read) = Arguments::try_parse_from(words).unwrap().command else {
+            panic!("`identify` is read as another command");
+        };
+        assert_eq!(
+            read.session.command_line("identify"),
+            "phiw identify --urdf 'a robot.urdf' --train a.csv 'b'\\''.csv' --validate c.csv \
+             --declare viscous_friction,torque_offset --hold finger,torso=-0.25 --cutoff-hz 12.5 --out out"
+        );
+        assert_eq!(read.session.hold, [("finger".to_owned(), 0.0), ("torso".to_owned(), -0.25)]);
+    }
+
+    #[test]
+    fn wrong_command_lines_are_refused() {
+        let identify = ["phiw", "identify", "--urdf", "r.urdf", "--train", "a.csv", "--out", "o"];
+        for more in [&["--hold", "a=b"][..], &["--hold", "=1"], &["--hold", "a=inf"], &["--cutoff-hz", "x"], &["--gold"]] {
+            assert!(Arguments::try_parse_from(identify.iter().chain(more)).is_err(), "{more:?}");
+        }
+        assert!(Arguments::try_parse_from(&identify[..6]).is_err(), "--out is required");
+    }
+}

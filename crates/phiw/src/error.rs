@@ -1,0 +1,115 @@
+//! Why a command failed, and with which exit status.
+
+use phiw_dynamics::urdf::UrdfError;
+use phiw_identification::{EffectError, IdentificationError, InputError};
+use phiw_telemetry::LogError;
+use std::io;
+use std::path::PathBuf;
+
+/// Why a command failed: one message that names the file, the place and the mend.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file cannot be read.
+    #[error("{}: {}", path.display(), unreadable(source))]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The URDF is not one that can be worked with.
+    #[error("{}: {source}", path.display())]
+    Urdf {
+        /// The URDF.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: Box<UrdfError>,
+    },
+    /// A model file that is none.
+    #[error("{}: not a model.json of phiw: {source}", path.display())]
+    NotAModel {
+        /// The file.
+        path: PathBuf,
+        /// What the reader says.
+        source: serde_json::Error,
+    },
+    /// The robot's base floats.
+    #[error("{}: the robot's base floats, and a log does not hold its motion; make its joint of type floating a fixed one", path.display())]
+    FloatingBase {
+        /// The URDF.
+        path: PathBuf,
+    },
+    /// The folder for the results is a file, or lies below one.
+    #[error("--out {}: `{}` is a file; name a folder that is there or can be made", out.display(), file.display())]
+    OutIsFile {
+        /// The folder asked for.
+        out: PathBuf,
+        /// The file that is in the way.
+        file: PathBuf,
+    },
+    /// A result cannot be written.
+    #[error("{}: can't be written: {source}", path.display())]
+    Unwritable {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The identified parameters cannot be written as a URDF.
+    #[error("identified.urdf: {0}")]
+    IdentifiedUrdf(UrdfError),
+    /// The logs, the effects or the fit.
+    #[error(transparent)]
+    Identification(#[from] IdentificationError),
+    /// A result that cannot be written as JSON.
+    #[error("{file}: {source}")]
+    Json {
+        /// The file.
+        file: &'static str,
+        /// What the writer says.
+        source: serde_json::Error,
+    },
+}
+
+impl Error {
+    /// 2 if the command line or an input is wrong, 1 for anything else.
+    pub fn exit_status(&self) -> u8 {
+        match self {
+            Error::Unreadable { .. }
+            | Error::Urdf { .. }
+            | Error::FloatingBase { .. }
+            | Error::NotAModel { .. }
+            | Error::OutIsFile { .. } => 2,
+            Error::Identification(IdentificationError::Regressor(_)) => 1,
+            Error::Identification(_) => 2,
+            Error::Unwritable { .. } | Error::IdentifiedUrdf(_) | Error::Json { .. } => 1,
+        }
+    }
+}
+
+impl From<EffectError> for Error {
+    fn from(error: EffectError) -> Self {
+        IdentificationError::from(error).into()
+    }
+}
+
+impl From<LogError> for Error {
+    fn from(error: LogError) -> Self {
+        IdentificationError::from(error).into()
+    }
+}
+
+impl From<InputError> for Error {
+    fn from(error: InputError) -> Self {
+        IdentificationError::from(error).into()
+    }
+}
+
+fn unreadable(source: &io::Error) -> String {
+    match source.kind() {
+        io::ErrorKind::NotFound => "no such file; check the path".to_owned(),
+        io::ErrorKind::InvalidData => "not a URDF: it is not text".to_owned(),
+        _ => format!("can't be read: {source}"),
+    }
+}

@@ -1,0 +1,203 @@
+//! `phiw explain`: the declared model, what it lacks, and the error before and after.
+
+use crate::analysis::Analysis;
+use crate::arguments::ExplainArguments;
+use crate::console::Console;
+use crate::explain_page;
+use crate::identify::{Outcome, outputs};
+use crate::output::{check_folder, write_folder};
+use crate::report_json::{by_joint, report_json};
+use crate::session::Session;
+use crate::{Error, summary};
+use phiw_identification::{Data, Identified, Model, TorqueError, identify};
+use phiw_report::ReportJson;
+use phiw_report::json::{EffectJson, JointMap, ParameterJson, RemainingJson, RivalJson, TorqueErrors, Verdict};
+use phiw_residual::SignalRanges;
+use phiw_residual::trace::{self, HeldModel, TraceInput, TraceOptions, Tracing, noise_floor, trace};
+use std::fmt::Write;
+
+/// A model to start from: its effects' specs, its parameters, and what was known if it is held.
+struct Start {
+    model: Model,
+    specs: Vec<phiw_identification::EffectSpec>,
+    parameters: Vec<f64>,
+    held: Option<HeldModel>,
+}
+
+/// Identifies the declared model (or takes the held one), traces its residual, and writes the grown model with its report.
+///
+/// # Errors
+/// An input is wrong, or the results cannot be written: [`Error::exit_status`] tells the two apart.
+pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcome, Error> {
+    check_folder(&arguments.session.out)?;
+    let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
+    let mut session = Session::open(&arguments.session, &progress)?;
+    let sources = session.logs.sources(&progress);
+    let data = session.data(&sources);
+    let start = start(arguments, &session, &data)?;
+    let floor = floor(&session, &data, &start.model)?;
+    let conditioning = session.logs.conditioning();
+    let plan = conditioning.plan(&session.logs.surveys()[0])?;
+    let input = TraceInput {
+        tree: &session.tree,
+        catalogue: &session.catalogue,
+        data: &data,
+        ranges: SignalRanges::of_surveys(session.logs.training()),
+        declared: start.specs.clone(),
+        parameters: start.parameters.clone(),
+        held: start.held,
+        noise_floor: floor.clone(),
+        rows_per_independent: (plan.output_rate_hz() / (2.0 * conditioning.parallel_cutoff_hz)).max(1.0),
+    };
+    let tracing = trace(input, &TraceOptions::default())?;
+    drop(data);
+    drop(sources);
+    if arguments.model.is_some() {
+        // What the held model declared is declared here too.
+        session.declared = start.model.declared.iter().filter(|kind| *kind != "rigid_body").cloned().collect();
+    }
+
+    let sources = session.logs.sources(&progress);
+    let data = session.data(&sources);
+    let mut analysis = Analysis::new(&session, &data, &tracing.model)?;
+    analysis.noise_floor = floor;
+    let declared_design = start.model.design(&session.tree, &session.catalogue)?;
+    let mut page = explain_page::page(&analysis, &tracing, declared_design, &data)?;
+    page.command_line = command_line(arguments);
+    console.finish();
+
+    let report = report(&analysis, &tracing);
+    let files = outputs(&analysis, &report, page.render())?;
+    write_folder(&arguments.session.out, &files)?;
+    let mut summary = story(&analysis, &tracing);
+    summary.push_str(&summary::summary(&analysis, &arguments.session.out, &files));
+    Ok(Outcome {
+        summary,
+        warnings: analysis.warnings,
+        report_html: arguments.session.out.join("report.html"),
+        report,
+    })
+}
+
+fn command_line(arguments: &ExplainArguments) -> String {
+    let mut line = arguments.session.command_line("explain");
+    if let Some(model) = &arguments.model {
+        line.push_str(&format!(" --model {}", model.display()));
+    }
+    line
+}
+
+fn start(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Result<Start, Error> {
+    let cutoffs = (session.logs.conditioning().cutoff_hz, session.logs.conditioning().parallel_cutoff_hz);
+    let Some(path) = &arguments.model else {
+        let identified: Identified = identify(&session.tree, session.effects()?, data)?;
+        let Identified { design, fit, .. } = &identified;
+        return Ok(Start {
+            model: Model::of_fit(design, fit, &session.declared, &session.arguments.hold, cutoffs)?,
+            specs: design.effects().iter().map(|effect| effect.spec()).collect(),
+            parameters: fit.parameters.clone(),
+            held: None,
+        });
+    };
+    let text =
+        std::fs::read_to_string(path).map_err(|source| Error::Unreadable { path: path.clone(), source })?;
+    let model: Model =
+        serde_json::from_str(&text).map_err(|source| Error::NotAModel { path: path.clone(), source })?;
+    let (design, parameters) = model.design(&session.tree, &session.catalogue)?;
+    let held = HeldModel {
+        factor: model.factor.factor()?,
+        determined: model.factor.parameters.clone(),
+        residual_std: model.residual_std.clone(),
+    };
+    let specs = design.effects().iter().map(|effect| effect.spec()).collect();
+    Ok(Start { model, specs, parameters, held: Some(held) })
+}
+
+/// The noise floor under the model's inertia.
+fn floor(session: &Session, data: &Data<'_>, model: &Model) -> Result<Vec<f64>, Error> {
+    let tree = model.identified_tree(&session.tree)?;
+    let mut rotor = vec![0.0; tree.joint_count()];
+    for effect in model.effects.iter().filter(|effect| effect.spec.kind == "rotor_inertia") {
+        if let (Some(joint), Some(inertia)) = (tree.joint_index(&effect.spec.joints[0]), effect.parameters.first()) {
+            rotor[joint] += inertia.value;
+        }
+    }
+    Ok(noise_floor(&tree, &rotor, session.logs.surveys(), session.logs.conditioning(), &data.sources)?)
+}
+
+fn verdict(verdict: trace::Verdict) -> Verdict {
+    match verdict {
+        trace::Verdict::Sufficient => Verdict::Sufficient,
+        trace::Verdict::Explained => Verdict::Explained,
+        trace::Verdict::PartlyExplained => Verdict::PartlyExplained,
+        trace::Verdict::Unexplained => Verdict::Unexplained,
+    }
+}
+
+fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
+    let joints = analysis.joints();
+    let error = |error: &TorqueError| phiw_report::json::TorqueError {
+        rmse: by_joint(&joints, &error.rmse),
+        relative: Some(error.relative),
+    };
+    let first = tracing.specs.len() - tracing.effects.len();
+    let effect = |(index, found): (usize, &trace::FoundEffect)| {
+        let effect = &analysis.model.effects[first + index];
+        let info = analysis.identified.design.effects()[first + index].parameters();
+        let mut parameters: JointMap<_> = JointMap::new();
+        for (named, info) in effect.parameters.iter().zip(info) {
+            // What was fitted by linearisation stands partly in the constant of the same name.
+            let base = found.spec.constants.get(&named.name).copied().unwrap_or_default();
+            let value =
+                ParameterJson { value: base + named.value, std: named.std.unwrap_or(f64::NAN), unit: named.unit.clone() };
+            let of_joint: &mut indexmap::IndexMap<String, ParameterJson> = parameters.entry(info.joint).or_default();
+            of_joint.insert(named.name.clone(), value);
+        }
+        EffectJson {
+            kind: found.spec.kind.clone(),
+            joints: found.spec.joints.clone(),
+            parameters,
+            validate_relative: found.relative,
+            explains: found.explains,
+            confidence: found.confidence,
+            rivals: found
+                .rivals
+                .iter()
+                .map(|rival| RivalJson {
+                    kind: rival.spec.kind.clone(),
+                    joints: rival.spec.joints.clone(),
+                    confidence: rival.confidence,
+                })
+                .collect(),
+        }
+    };
+    let mut depends_on: Vec<String> = Vec::new();
+    for dependence in &tracing.remaining.depends_on {
+        if !depends_on.contains(&dependence.signal) {
+            depends_on.push(dependence.signal.clone());
+        }
+    }
+    ReportJson {
+        verdict: Some(verdict(tracing.verdict)),
+        before: TorqueErrors { train: error(&tracing.before.0), validate: error(&tracing.before.1) },
+        effects: tracing.effects.iter().enumerate().map(effect).collect(),
+        after: TorqueErrors { train: error(&tracing.model.train), validate: error(&tracing.model.held_out) },
+        remaining: RemainingJson {
+            structured: !tracing.remaining.joints.is_empty(),
+            joints: tracing.remaining.joints.clone(),
+            depends_on,
+        },
+        ..report_json(analysis)
+    }
+}
+
+/// The answer in sentences.
+fn story(analysis: &Analysis<'_>, tracing: &Tracing) -> String {
+    let mut text = String::new();
+    for line in explain_page::headline(analysis, tracing) {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "{line}");
+    }
+    text.push('\n');
+    text
+}

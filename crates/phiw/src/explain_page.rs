@@ -1,0 +1,311 @@
+//! The report page of a traced residual: the page of an identification, and what was found.
+
+use crate::analysis::Analysis;
+use crate::{Error, page as identified_page};
+use phiw_identification::{Data, Design, predict};
+use phiw_report::IdentificationPage;
+use phiw_report::json::Verdict;
+use phiw_report::number::percent;
+use phiw_report::page::{CandidateRow, EffectParameter, EffectSection, Picture, Remaining, Rival};
+use phiw_report::plot::{Line, ResidualAgainstSignal, residual_against_signal};
+use phiw_residual::catalogue::sentence;
+use phiw_residual::trace::{self, FoundEffect, Ranked, Tracing};
+
+/// Points of a scatter; more would only blacken it.
+const POINTS: usize = 3000;
+
+/// The page. `declared` is the model before anything was added, with its parameters.
+///
+/// # Errors
+/// A log cannot be read any more.
+pub fn page(
+    analysis: &Analysis<'_>,
+    tracing: &Tracing,
+    declared: (Design, Vec<f64>),
+    data: &Data<'_>,
+) -> Result<IdentificationPage, Error> {
+    let mut page = identified_page::page(analysis, String::new());
+    page.headline = headline(analysis, tracing);
+    page.verdict = Some(match tracing.verdict {
+        trace::Verdict::Sufficient => Verdict::Sufficient,
+        trace::Verdict::Explained => Verdict::Explained,
+        trace::Verdict::PartlyExplained => Verdict::PartlyExplained,
+        trace::Verdict::Unexplained => Verdict::Unexplained,
+    });
+    for (row, before) in page.errors.rows.iter_mut().zip(&tracing.before.1.rmse) {
+        row.before = Some(*before);
+    }
+    page.errors.pooled.before = Some(tracing.before.1.relative);
+    let declared = (declared.0.with_rest_speeds(data.rest_speeds.clone()), declared.1);
+    let mut scatters = Scatters::new(analysis, tracing);
+    predict(&declared.0, &declared.1, &data.sources, &mut |prediction| scatters.add(0, prediction))?;
+    let fitted = &tracing.model.fit.parameters;
+    predict(&tracing.model.design, fitted, &data.sources, &mut |prediction| scatters.add(1, prediction))?;
+    page.effects = tracing
+        .effects
+        .iter()
+        .enumerate()
+        .map(|(index, found)| section(analysis, tracing, index, found, &scatters))
+        .collect();
+    page.remaining = Some(remaining(tracing));
+    Ok(page)
+}
+
+/// The answer in a few sentences.
+pub fn headline(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<String> {
+    let declared = identified_page::declared_in_words(analysis);
+    let (before, after) = (tracing.before.1.relative, tracing.model.held_out.relative);
+    let mut lines = Vec::new();
+    match tracing.verdict {
+        trace::Verdict::Sufficient => lines.push(format!(
+            "The declared model ({declared}) is sufficient: what it leaves, {} % of RMS torque held out, is noise.",
+            percent(before)
+        )),
+        trace::Verdict::Unexplained => lines.push(format!(
+            "The declared model ({declared}) leaves {} % of RMS torque held out, with structure that no effect of the catalogue accounts for.",
+            percent(before)
+        )),
+        trace::Verdict::Explained | trace::Verdict::PartlyExplained => {
+            lines.extend((0..tracing.effects.len()).map(|index| sentence_of(tracing, index)));
+            lines.push(format!("Held-out error {} % → {} %.", percent(before), percent(after)));
+        }
+    }
+    if !tracing.remaining.joints.is_empty() {
+        lines.push(describe(tracing));
+    }
+    lines
+}
+
+fn describe(tracing: &Tracing) -> String {
+    let remaining = &tracing.remaining;
+    let mut text = format!("What is left on {} is more than noise", remaining.joints.join(", "));
+    let mut follows: Vec<String> = Vec::new();
+    for joint in &remaining.joints {
+        let best = remaining.depends_on.iter().find(|dependence| &dependence.joint == joint);
+        if let Some(best) = best {
+            follows.push(format!("{} follows {} ({} % of its variance)", joint, signal_in_words(&best.signal), percent(best.share)));
+        }
+    }
+    if follows.is_empty() {
+        text.push_str(", and follows none of the signals that were tried");
+    } else {
+        text.push_str(": ");
+        text.push_str(&follows.join("; "));
+    }
+    text.push('.');
+    text
+}
+
+fn signal_in_words(signal: &str) -> String {
+    match signal.split_once('.') {
+        Some((signal, joint)) => format!("{} of {joint}", signal_in_words(signal)),
+        None => match signal {
+            "q" => "its position".to_owned(),
+            "qd" => "its velocity".to_owned(),
+            "qdd" => "its acceleration".to_owned(),
+            "tau" => "its load".to_owned(),
+            "t" => "time".to_owned(),
+            other => other.to_owned(),
+        },
+    }
+}
+
+/// Place of a found effect among those of the model.
+fn place(tracing: &Tracing, index: usize) -> usize {
+    tracing.specs.len() - tracing.effects.len() + index
+}
+
+fn sentence_of(tracing: &Tracing, index: usize) -> String {
+    let place = place(tracing, index);
+    let effect = &tracing.model.design.effects()[place];
+    let fitted: Vec<f64> =
+        tracing.model.design.effect_parameters(place).map(|parameter| tracing.model.fit.parameters[parameter]).collect();
+    sentence(&effect.spec(), &effect.parameters(), &fitted)
+}
+
+fn section(
+    analysis: &Analysis<'_>,
+    tracing: &Tracing,
+    index: usize,
+    found: &FoundEffect,
+    scatters: &Scatters,
+) -> EffectSection {
+    let place = place(tracing, index);
+    let info = analysis.identified.design.effects()[place].parameters();
+    let named = &analysis.model.effects[place].parameters;
+    let parameter = |(named, info): (&phiw_identification::NamedParameter, phiw_identification::EffectParameter)| EffectParameter {
+        joint: info.joint,
+        name: named.name.clone(),
+        value: found.spec.constants.get(&named.name).copied().unwrap_or_default() + named.value,
+        std: named.std.unwrap_or(f64::NAN),
+        unit: named.unit.clone(),
+    };
+    let telling = |kind: &str| {
+        let kind = analysis.session.catalogue.kind(kind);
+        kind.map(|kind| kind.telling_motion().to_owned()).unwrap_or_default()
+    };
+    EffectSection {
+        kind: found.spec.kind.clone(),
+        joints: found.spec.joints.clone(),
+        sentence: sentence_of(tracing, index),
+        parameters: named.iter().zip(info).map(parameter).collect(),
+        relative_before: found.relative_before,
+        relative_after: found.relative,
+        explains: found.explains,
+        confidence: found.confidence,
+        rivals: found
+            .rivals
+            .iter()
+            .map(|rival| Rival {
+                kind: rival.spec.kind.clone(),
+                joints: rival.spec.joints.clone(),
+                confidence: rival.confidence,
+                separated_by: telling(&rival.spec.kind),
+            })
+            .collect(),
+        candidates: candidates(&found.ranking),
+        pictures: scatters.pictures(index),
+    }
+}
+
+fn candidates(ranking: &[Ranked]) -> Vec<CandidateRow> {
+    let row = |ranked: &Ranked| CandidateRow {
+        kind: ranked.spec.kind.clone(),
+        joints: ranked.spec.joints.clone(),
+        held_out: ranked.held_out,
+        parameters: ranked.parameters,
+        note: String::new(),
+    };
+    ranking.iter().map(row).collect()
+}
+
+fn remaining(tracing: &Tracing) -> Remaining {
+    let structured = !tracing.remaining.joints.is_empty();
+    let follows = |dependence: &trace::Dependence| {
+        format!(
+            "{}: {} % of the held-out residual's variance follows {}",
+            dependence.joint,
+            percent(dependence.share),
+            signal_in_words(&dependence.signal)
+        )
+    };
+    Remaining {
+        structured,
+        joints: tracing.remaining.joints.clone(),
+        depends_on: tracing.remaining.depends_on.iter().take(12).map(follows).collect(),
+        description: if structured { vec![describe(tracing)] } else { Vec::new() },
+        candidates: candidates(&tracing.remaining.ranking),
+        pictures: Vec::new(),
+    }
+}
+
+/// Residual against the signal that an effect lives on, before anything was added and after all.
+struct Scatters {
+    effects: Vec<Scatter>,
+}
+
+struct Scatter {
+    joint: usize,
+    name: String,
+    signal: Signal,
+    points: [Thinned; 2],
+}
+
+#[derive(Clone, Copy)]
+enum Signal {
+    Position,
+    Velocity,
+    Acceleration,
+    Torque,
+    Time,
+}
+
+/// At most [`POINTS`] points, spread evenly over all that came.
+#[derive(Default)]
+struct Thinned {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    stride: usize,
+    seen: usize,
+}
+
+impl Thinned {
+    fn add(&mut self, x: f64, y: f64) {
+        let stride = self.stride.max(1);
+        if self.seen.is_multiple_of(stride) {
+            self.x.push(x);
+            self.y.push(y);
+        }
+        self.seen += 1;
+        if self.x.len() == 2 * POINTS {
+            let mut keep = (0..2 * POINTS).map(|index| index % 2 == 0);
+            self.x.retain(|_| keep.next().unwrap_or(false));
+            let mut keep = (0..2 * POINTS).map(|index| index % 2 == 0);
+            self.y.retain(|_| keep.next().unwrap_or(false));
+            self.stride = 2 * stride;
+        }
+    }
+}
+
+impl Scatters {
+    fn new(analysis: &Analysis<'_>, tracing: &Tracing) -> Self {
+        let scatter = |found: &FoundEffect| {
+            // An effect on the whole robot is shown on the first joint that it names, or the first of all.
+            let name = found.spec.joints.first().cloned().unwrap_or_else(|| analysis.joints()[0].clone());
+            Scatter {
+                joint: analysis.session.tree.joint_index(&name).unwrap_or_default(),
+                name,
+                signal: signal_of(&found.spec.kind),
+                points: [Thinned::default(), Thinned::default()],
+            }
+        };
+        Scatters { effects: tracing.effects.iter().map(scatter).collect() }
+    }
+
+    fn add(&mut self, when: usize, prediction: &phiw_identification::Prediction<'_>) {
+        for scatter in &mut self.effects {
+            let joint = scatter.joint;
+            if !prediction.counts(joint) {
+                continue;
+            }
+            let x = match scatter.signal {
+                Signal::Position => prediction.q[joint],
+                Signal::Velocity => prediction.qd[joint],
+                Signal::Acceleration => prediction.qdd[joint],
+                Signal::Torque => prediction.measured[joint],
+                Signal::Time => prediction.t,
+            };
+            scatter.points[when].add(x, prediction.residual(joint));
+        }
+    }
+
+    fn pictures(&self, index: usize) -> Vec<Picture> {
+        let Scatter { name, signal, points: [before, after], .. } = &self.effects[index];
+        let label = match signal {
+            Signal::Position => format!("q of {name} [rad, m]"),
+            Signal::Velocity => format!("q̇ of {name} [rad/s, m/s]"),
+            Signal::Acceleration => format!("q̈ of {name} [rad/s², m/s²]"),
+            Signal::Torque => format!("τ of {name} [N·m, N]"),
+            Signal::Time => "time [s]".to_owned(),
+        };
+        let svg = residual_against_signal(&ResidualAgainstSignal {
+            signal: &label,
+            residual: &format!("residual of {name} [N·m, N]"),
+            before: Line { x: &before.x, y: &before.y },
+            after: Line { x: &after.x, y: &after.y },
+        });
+        vec![Picture { caption: "Residual of the declared model and of the final one; the line is the median.".to_owned(), svg }]
+    }
+}
+
+/// The signal that an effect's torque is best seen against.
+fn signal_of(kind: &str) -> Signal {
+    match kind {
+        "joint_spring" | "gravity_balancer" | "torque_ripple" | "end_stop" | "encoder_offset" | "payload" | "gravity_tilt"
+        | "external_force" | "torque_offset" => Signal::Position,
+        "rotor_inertia" | "joint_elasticity" => Signal::Acceleration,
+        "torque_gain" | "actuator_saturation" | "load_dependent_friction" => Signal::Torque,
+        "thermal_drift" => Signal::Time,
+        _ => Signal::Velocity,
+    }
+}

@@ -1,0 +1,66 @@
+//! `phiw identify`: the declared model, fitted and written down.
+
+use crate::analysis::Analysis;
+use crate::arguments::SessionArguments;
+use crate::console::Console;
+use crate::identified_urdf::identified_urdf;
+use crate::output::{OutputFile, check_folder, write_folder};
+use crate::report_json::report_json;
+use crate::session::Session;
+use crate::{Error, page, summary};
+use phiw_report::ReportJson;
+use std::path::PathBuf;
+
+/// What a command has done.
+pub struct Outcome {
+    /// The result as text for a terminal.
+    pub summary: String,
+    /// What a reader should know before trusting a number.
+    pub warnings: Vec<String>,
+    /// The page.
+    pub report_html: PathBuf,
+    /// The numbers.
+    pub report: ReportJson,
+}
+
+/// Fits the declared model and writes `model.json`, `report.json`, `report.html` and `identified.urdf`.
+///
+/// Nothing is written before everything has been computed.
+///
+/// # Errors
+/// An input is wrong, or the results cannot be written: [`Error::exit_status`] tells the two apart.
+pub fn identify(arguments: &SessionArguments, console: &Console) -> Result<Outcome, Error> {
+    check_folder(&arguments.out)?;
+    let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
+    let session = Session::open(arguments, &progress)?;
+    let sources = session.logs.sources(&progress);
+    let data = session.data(&sources);
+    let identified = phiw_identification::identify(&session.tree, session.effects()?, &data)?;
+    let analysis = Analysis::new(&session, &data, &identified)?;
+    console.finish();
+
+    let report = report_json(&analysis);
+    let files = outputs(&analysis, &report, page::page(&analysis, arguments.command_line("identify")).render())?;
+    write_folder(&arguments.out, &files)?;
+    Ok(Outcome {
+        summary: summary::summary(&analysis, &arguments.out, &files),
+        warnings: analysis.warnings,
+        report_html: arguments.out.join("report.html"),
+        report,
+    })
+}
+
+/// The files that every identification writes.
+///
+/// # Errors
+/// The parameters cannot be expressed in a file's form.
+pub fn outputs(analysis: &Analysis<'_>, report: &ReportJson, page: String) -> Result<Vec<OutputFile>, Error> {
+    let json = |file| move |source| Error::Json { file, source };
+    let model = serde_json::to_string_pretty(&analysis.model).map_err(json("model.json"))?;
+    Ok(vec![
+        OutputFile { name: "model.json", text: model + "\n" },
+        OutputFile { name: "report.json", text: report.to_json().map_err(json("report.json"))? },
+        OutputFile { name: "report.html", text: page },
+        OutputFile { name: "identified.urdf", text: identified_urdf(analysis)? },
+    ])
+}

@@ -1,0 +1,23 @@
+#![doc = include_str!("../README.md")]
+
+pub mod analysis;
+pub mod arguments;
+pub mod console;
+mod consistency;
+mod date;
+mod error;
+pub mod explain;
+mod explain_page;
+pub mod identify;
+pub mod identified_urdf;
+mod not_identified;
+pub mod output;
+pub mod page;
+mod parameters;
+pub mod report_json;
+pub mod session;
+pub mod summary;
+pub mod traces;
+pub mod warnings;
+
+pub use error::Error;

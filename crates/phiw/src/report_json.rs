@@ -1,0 +1,59 @@
+//! `report.json` of an analysis.
+
+use crate::analysis::Analysis;
+use crate::page::conditioning_entries;
+use crate::traces::Role;
+use phiw_identification::TorqueError;
+use phiw_report::ReportJson;
+use phiw_report::json::{JointMap, ProgramJson, RelativeErrors, RemainingJson, SCHEMA, TorqueErrors, Verdict};
+
+/// The report of a model to which nothing was added: after is before.
+///
+/// The residual was not traced, so there is no verdict unless it is noise on every joint.
+pub fn report_json(analysis: &Analysis<'_>) -> ReportJson {
+    let joints = analysis.joints();
+    let errors = errors(analysis);
+    let above: Vec<String> = analysis.joints_above_noise().into_iter().map(|joint| joints[joint].clone()).collect();
+    ReportJson {
+        schema: SCHEMA,
+        robot: analysis.session.tree.name().to_owned(),
+        declared: analysis.model.declared.clone(),
+        verdict: above.is_empty().then_some(Verdict::Sufficient),
+        noise_floor: by_joint(&joints, &analysis.noise_floor),
+        before: errors.clone(),
+        effects: Vec::new(),
+        after: errors,
+        remaining: RemainingJson { structured: !above.is_empty(), joints: above, depends_on: Vec::new() },
+        phiw: Some(program(analysis)),
+        joints,
+    }
+}
+
+/// The errors of an analysis' model.
+pub fn errors(analysis: &Analysis<'_>) -> TorqueErrors {
+    let joints = analysis.joints();
+    let error = |error: &TorqueError| phiw_report::json::TorqueError {
+        rmse: by_joint(&joints, &error.rmse),
+        relative: Some(error.relative),
+    };
+    TorqueErrors { train: error(&analysis.identified.train), validate: error(&analysis.identified.held_out) }
+}
+
+/// What only this program writes.
+pub fn program(analysis: &Analysis<'_>) -> ProgramJson {
+    let entries = conditioning_entries(analysis).into_iter();
+    ProgramJson {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        warnings: analysis.warnings.clone(),
+        conditioning: entries.map(|(quantity, value)| (quantity, value.into())).collect(),
+        relative_with_rests: Some(RelativeErrors {
+            train: analysis.traces.relative_with_rests(Role::Train),
+            validate: analysis.traces.relative_with_rests(Role::HeldOut),
+        }),
+    }
+}
+
+/// One number for each joint.
+pub fn by_joint(joints: &[String], values: &[f64]) -> JointMap<f64> {
+    joints.iter().cloned().zip(values.iter().copied()).collect()
+}

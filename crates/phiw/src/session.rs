@@ -1,0 +1,96 @@
+//! What every command on measured logs starts from: robot, logs, declared effects.
+
+use crate::Error;
+use crate::arguments::SessionArguments;
+use phiw_dynamics::urdf::{Finding, UrdfOptions, read_urdf};
+use phiw_dynamics::{JointType, Tree};
+use phiw_identification::{BlockSource, Data, EffectError, LogFile, LogSet, Progress, Variants};
+use phiw_residual::{Catalogue, SignalRanges};
+use phiw_telemetry::ConditioningOptions;
+
+/// Robot, logs and declared effects, read and checked.
+pub struct Session {
+    /// The robot.
+    pub tree: Tree,
+    /// Text of its URDF.
+    pub xml: String,
+    /// What in the URDF should not be trusted.
+    pub findings: Vec<Finding>,
+    /// Declared kinds of effects, each once, `rigid_body` left out.
+    pub declared: Vec<String>,
+    /// The kinds that there are.
+    pub catalogue: Catalogue,
+    /// The logs.
+    pub logs: LogSet,
+    /// What was asked for.
+    pub arguments: SessionArguments,
+}
+
+impl Session {
+    /// Reads the URDF and surveys the logs. What is quick to find wrong is found first.
+    ///
+    /// # Errors
+    /// An input is wrong: robot, effect, or log.
+    pub fn open(arguments: &SessionArguments, progress: Progress<'_>) -> Result<Self, Error> {
+        let catalogue = Catalogue::default();
+        let declared = declared(&arguments.declare, &catalogue)?;
+        let (tree, xml, findings) = read_robot(arguments)?;
+        let options = ConditioningOptions {
+            cutoff_hz: arguments.cutoff_hz,
+            parallel_cutoff_hz: arguments.parallel_cutoff_hz,
+            ..ConditioningOptions::default()
+        };
+        let logs = LogSet::open(&tree, &arguments.train, &arguments.validate, &options, progress)?;
+        Ok(Session { tree, xml, findings, declared, catalogue, logs, arguments: arguments.clone() })
+    }
+
+    /// The declared effects, each with the constants that the data choose from.
+    ///
+    /// # Errors
+    /// A kind cannot be declared.
+    pub fn effects(&self) -> Result<Vec<Variants>, EffectError> {
+        let ranges = SignalRanges::of_surveys(self.logs.training());
+        let effects = self.declared.iter().map(|kind| self.catalogue.declare(kind, &self.tree, &ranges));
+        Ok(effects.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
+    }
+
+    /// The stretches of time to fit and to validate on, read from `sources` (see [`LogSet::sources`]).
+    pub fn data<'a>(&self, sources: &'a [LogFile<'a>]) -> Data<'a> {
+        Data {
+            train: self.logs.training_folds(),
+            held_out: self.logs.held_out_folds(),
+            sources: sources.iter().map(|source| source as &dyn BlockSource).collect(),
+            rest_speeds: self.logs.rest_speeds(),
+        }
+    }
+
+    /// Unit of a joint's torque.
+    pub fn torque_unit(&self, joint: usize) -> &'static str {
+        if self.tree.joint(joint).joint_type == JointType::Prismatic { "N" } else { "N·m" }
+    }
+}
+
+/// Each declared kind once, if all are known.
+fn declared(names: &[String], catalogue: &Catalogue) -> Result<Vec<String>, EffectError> {
+    let mut declared: Vec<String> = Vec::new();
+    for name in names.iter().map(|name| name.trim()).filter(|name| !name.is_empty() && *name != "rigid_body") {
+        if catalogue.kind(name)?.declared_constants().is_none() {
+            return Err(EffectError::NotDeclarable { kind: name.to_owned() });
+        }
+        if !declared.iter().any(|other| other == name) {
+            declared.push(name.to_owned());
+        }
+    }
+    Ok(declared)
+}
+
+fn read_robot(arguments: &SessionArguments) -> Result<(Tree, String, Vec<Finding>), Error> {
+    let path = || arguments.urdf.clone();
+    let xml = std::fs::read_to_string(&arguments.urdf).map_err(|source| Error::Unreadable { path: path(), source })?;
+    let options = UrdfOptions { held: arguments.hold.clone(), ..UrdfOptions::default() };
+    let reading = read_urdf(&xml, &options).map_err(|source| Error::Urdf { path: path(), source: Box::new(source) })?;
+    if reading.tree.is_floating() {
+        return Err(Error::FloatingBase { path: path() });
+    }
+    Ok((reading.tree, xml, reading.findings))
+}

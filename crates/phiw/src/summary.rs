@@ -1,0 +1,103 @@
+//! The result in a terminal.
+
+use crate::analysis::Analysis;
+use crate::identified_urdf::not_expressed;
+use crate::output::OutputFile;
+use crate::page::declared_in_words;
+use crate::traces::Role;
+use phiw_identification::HELD_OUT_SHARE;
+use phiw_report::number::{percent, significant};
+use std::fmt::Write;
+use std::path::Path;
+
+/// Errors per joint and pooled, parameters of the effects, where the files are.
+pub fn summary(analysis: &Analysis<'_>, folder: &Path, files: &[OutputFile]) -> String {
+    let mut text = format!("{}: {}\n\n", analysis.session.tree.name(), declared_in_words(analysis));
+    // Writing to a string does not fail.
+    let _ = errors(analysis, &mut text);
+    let _ = effects(analysis, &mut text);
+    let _ = closing(analysis, folder, files, &mut text);
+    text
+}
+
+fn errors(analysis: &Analysis<'_>, text: &mut String) -> std::fmt::Result {
+    let identified = analysis.identified;
+    let header = ["joint", "", "RMS torque", "RMSE train", "held out", "%", "noise floor"].map(str::to_owned);
+    let mut rows = vec![header];
+    for (joint, name) in analysis.joints().into_iter().enumerate() {
+        let (torque, error) = (identified.held_out.rms_torque[joint], identified.held_out.rmse[joint]);
+        rows.push([
+            name,
+            analysis.session.torque_unit(joint).to_owned(),
+            significant(torque, 3),
+            significant(identified.train.rmse[joint], 3),
+            significant(error, 3),
+            percent(error / torque),
+            significant(analysis.noise_floor[joint], 2),
+        ]);
+    }
+    write_table(text, &rows, 2)?;
+    writeln!(
+        text,
+        "pooled: train {} %, held out {} % of RMS torque ({} % with rests included)",
+        percent(identified.train.relative),
+        percent(identified.held_out.relative),
+        percent(analysis.traces.relative_with_rests(Role::HeldOut))
+    )?;
+    if analysis.session.logs.splits_training_logs() {
+        let share = percent(HELD_OUT_SHARE);
+        writeln!(text, "held out is the last {share} % of each training log, since no --validate was given")?;
+    }
+    Ok(())
+}
+
+fn effects(analysis: &Analysis<'_>, text: &mut String) -> std::fmt::Result {
+    if analysis.model.effects.is_empty() {
+        return Ok(());
+    }
+    let undetermined = &analysis.identified.fit.undetermined;
+    let mut rows = Vec::new();
+    for (index, effect) in analysis.model.effects.iter().enumerate() {
+        let parameters = analysis.identified.design.effect_parameters(index).zip(&effect.parameters);
+        for (parameter, named) in parameters {
+            let value = match undetermined.contains(&parameter) {
+                true => "not separable".to_owned(),
+                false => significant(named.value, 4),
+            };
+            let std = named.std.map_or(String::new(), |std| format!("± {} {}", significant(std, 2), named.unit));
+            rows.push([effect.spec.kind.clone(), effect.spec.joints.join(", "), named.name.clone(), value, std]);
+        }
+    }
+    writeln!(text)?;
+    // Numbers to the right, but the deviation follows its value.
+    write_table(text, &rows, 3)
+}
+
+fn closing(analysis: &Analysis<'_>, folder: &Path, files: &[OutputFile], text: &mut String) -> std::fmt::Result {
+    let base = analysis.identified.design.base().count();
+    writeln!(text, "\n{base} base parameters, cond {}", significant(analysis.condition_number(), 3))?;
+    let not_expressed = not_expressed(analysis);
+    if !not_expressed.is_empty() {
+        writeln!(text, "identified.urdf cannot express {}: model.json has all", not_expressed.join(", "))?;
+    }
+    let names: Vec<&str> = files.iter().map(|file| file.name).collect();
+    writeln!(text, "{} in {}", names.join(", "), folder.display())
+}
+
+/// Columns as wide as they need to be; those from `numbers` on to the right.
+fn write_table<const N: usize>(text: &mut String, rows: &[[String; N]], numbers: usize) -> std::fmt::Result {
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: [usize; N] = std::array::from_fn(width);
+    for row in rows {
+        let mut line = String::new();
+        for (column, (cell, width)) in row.iter().zip(widths).enumerate() {
+            if cell.starts_with('±') || column < numbers {
+                write!(line, "{cell:<width$}  ")?;
+            } else {
+                write!(line, "{cell:>width$}  ")?;
+            }
+        }
+        writeln!(text, "{}", line.trim_end())?;
+    }
+    Ok(())
+}

@@ -1,0 +1,67 @@
+//! What a reader should know before trusting a number.
+
+use crate::session::Session;
+use phiw_identification::Identified;
+use phiw_telemetry::{GapReason, Survey};
+use std::path::Path;
+
+/// All warnings: about the logs, then about the fit.
+pub fn all(session: &Session, identified: &Identified) -> Vec<String> {
+    let logs = &session.logs;
+    let mut warnings: Vec<String> = logs
+        .same_files()
+        .into_iter()
+        .map(|(train, validate)| {
+            format!(
+                "{} and {} have the same content: the error on it is not one on motion that the model has not seen; hold out another log",
+                train.display(),
+                validate.display()
+            )
+        })
+        .collect();
+    warnings.extend(twice_in_training(logs.training()));
+    warnings.extend(logs.surveys().iter().flat_map(of_log));
+    if identified.fit.standard_deviations.iter().all(|std| std.is_nan()) {
+        warnings.push(
+            "standard deviations could not be estimated: without one twelfth of the training motion some parameter is not determined at all; record more motion"
+                .to_owned(),
+        );
+    }
+    warnings
+}
+
+/// File name of a log.
+pub fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+fn twice_in_training(training: &[Survey]) -> Vec<String> {
+    let pairs = training.iter().enumerate().flat_map(|(index, a)| training[index + 1..].iter().map(move |b| (a, b)));
+    let same = pairs.filter(|(a, b)| a.content_hash == b.content_hash);
+    same.map(|(a, b)| format!("{} and {} have the same content: its samples count twice", a.path.display(), b.path.display()))
+        .collect()
+}
+
+/// Skipped rows, jumps, short stretches, unknown columns.
+fn of_log(survey: &Survey) -> Vec<String> {
+    let name = file_name(&survey.path);
+    let gap = |gap: &phiw_telemetry::GapCount| {
+        let (count, line) = (gap.count, gap.first_line);
+        let rows = if count == 1 { "row" } else { "rows" };
+        match gap.reason {
+            GapReason::TimeJump if count == 1 => format!("{name}: time jumps at line {line}; the log is split there"),
+            GapReason::TimeJump => format!("{name}: time jumps {count} times, first at line {line}; the log is split there"),
+            reason => format!("{name}: {count} {rows} skipped ({reason}), first at line {line}; the log is split there"),
+        }
+    };
+    let mut warnings: Vec<String> = survey.gaps.iter().map(gap).collect();
+    if survey.short_segments > 0 {
+        warnings.push(format!("{name}: {} stretches between gaps are too short to use", survey.short_segments));
+    }
+    if !survey.ignored_columns.is_empty() {
+        let quoted: Vec<String> = survey.ignored_columns.iter().map(|column| format!("`{column}`")).collect();
+        let columns = if quoted.len() == 1 { "column is" } else { "columns are" };
+        warnings.push(format!("{name}: unknown {columns} ignored: {}", quoted.join(", ")));
+    }
+    warnings
+}

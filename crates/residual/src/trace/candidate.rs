@@ -1,0 +1,130 @@
+//! What could be missing: every kind, site and constant that the logs may be asked about.
+
+use crate::catalogue::{Catalogue, Constants, EffectKind, SignalRanges};
+use phiw_dynamics::Tree;
+use phiw_identification::{Effect, EffectSpec};
+use std::ops::Range;
+
+/// One hypothesis: an effect (or two that go together) on a site with fixed constants.
+#[derive(Clone, Debug)]
+pub(super) struct Candidate {
+    /// The effects' specs, in the order of their columns.
+    pub specs: Vec<EffectSpec>,
+    /// Place of the kind in the catalogue: the simpler comes first.
+    pub rank: usize,
+    /// The effects' places among all effects of the design.
+    pub effects: Range<usize>,
+    /// Number of constants that were scanned, which count as parameters.
+    pub constants: usize,
+}
+
+impl Candidate {
+    /// Kind and joints, the same for all constants.
+    pub fn hypothesis(&self) -> Vec<(&str, &[String])> {
+        self.specs.iter().map(|spec| (spec.kind.as_str(), spec.joints.as_slice())).collect()
+    }
+}
+
+/// All candidates, and their effects in the order that the candidates count them.
+pub(super) struct Candidates {
+    pub list: Vec<Candidate>,
+    pub effects: Vec<Box<dyn Effect>>,
+}
+
+/// Effects that are already in the model: their kind on their joints is no candidate again, unless it can act twice.
+pub(super) fn enumerate(
+    catalogue: &Catalogue,
+    tree: &Tree,
+    ranges: &SignalRanges,
+    present: &[EffectSpec],
+    held_model: bool,
+) -> Candidates {
+    let mut all = Candidates { list: Vec::new(), effects: Vec::new() };
+    for (rank, kind) in catalogue.kinds().enumerate() {
+        if kind.needs_held_model() && !held_model {
+            continue;
+        }
+        for site in kind.sites(tree) {
+            let joints: Vec<String> = site.iter().map(|&joint| tree.joint(joint).joint.clone()).collect();
+            if present.iter().any(|spec| spec.kind == kind.name() && spec.joints == joints) && !held_model {
+                continue;
+            }
+            if held_model && present.iter().any(|spec| spec.kind == kind.name() && spec.joints == joints && !grows(kind)) {
+                continue;
+            }
+            for constants in scan(kind, &site, ranges, present, &joints) {
+                all.push(rank, vec![kind.build(tree, &site, &constants)], constants.len());
+            }
+        }
+    }
+    add_pairs(catalogue, tree, ranges, present, &mut all);
+    all
+}
+
+/// Kinds whose parameters may have changed against a held model: the change is found as the same kind again.
+fn grows(kind: &dyn EffectKind) -> bool {
+    matches!(kind.name(), "viscous_friction" | "coulomb_friction" | "torque_offset" | "rotor_inertia")
+}
+
+/// Constants to try; a sign's width is the one that the joint's declared friction has, where there is one.
+fn scan(
+    kind: &dyn EffectKind,
+    site: &[usize],
+    ranges: &SignalRanges,
+    present: &[EffectSpec],
+    joints: &[String],
+) -> Vec<Constants> {
+    const WIDTH: &str = "sign_width";
+    let declared = present
+        .iter()
+        .find(|spec| spec.kind == "coulomb_friction" && spec.joints == joints)
+        .and_then(|spec| spec.constants.get(WIDTH).copied());
+    let mut scanned = kind.scan(site, ranges);
+    let Some(width) = declared else { return scanned };
+    if kind.name() != "coulomb_friction" {
+        for constants in scanned.iter_mut().filter(|constants| constants.contains_key(WIDTH)) {
+            constants.insert(WIDTH.to_owned(), width);
+        }
+        let mut unique: Vec<Constants> = Vec::new();
+        scanned.into_iter().for_each(|constants| {
+            if !unique.contains(&constants) {
+                unique.push(constants);
+            }
+        });
+        return unique;
+    }
+    scanned
+}
+
+/// Viscous and Coulomb friction of a joint go together: either alone mimics the other in part.
+fn add_pairs(
+    catalogue: &Catalogue,
+    tree: &Tree,
+    ranges: &SignalRanges,
+    present: &[EffectSpec],
+    all: &mut Candidates,
+) {
+    let (Ok(viscous), Ok(coulomb)) = (catalogue.kind("viscous_friction"), catalogue.kind("coulomb_friction")) else {
+        return;
+    };
+    for site in coulomb.sites(tree) {
+        let joint = &tree.joint(site[0]).joint;
+        let is_friction = |spec: &EffectSpec| spec.kind == "viscous_friction" || spec.kind == "coulomb_friction";
+        if present.iter().any(|spec| is_friction(spec) && spec.joints.contains(joint)) {
+            continue;
+        }
+        for constants in coulomb.scan(&site, ranges) {
+            let pair = vec![viscous.build(tree, &site, &Constants::new()), coulomb.build(tree, &site, &constants)];
+            all.push(1, pair, constants.len());
+        }
+    }
+}
+
+impl Candidates {
+    fn push(&mut self, rank: usize, effects: Vec<Box<dyn Effect>>, constants: usize) {
+        let first = self.effects.len();
+        let specs = effects.iter().map(|effect| effect.spec()).collect();
+        self.effects.extend(effects);
+        self.list.push(Candidate { specs, rank, effects: first..self.effects.len(), constants });
+    }
+}

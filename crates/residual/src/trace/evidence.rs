@@ -1,0 +1,268 @@
+//! What the factors say of a candidate: refit of everything with it, error on motion held out, and how sure that is.
+
+use faer::Mat;
+use phiw_regressor::RegressorError;
+use phiw_regressor::factor::{Factor, FactorBuilder, leave_one_out};
+use phiw_regressor::least_squares::{Group, GroupedFactor};
+
+/// The model's columns in the factors of a larger design, whose candidates' columns follow them.
+pub(super) struct Evidence<'a> {
+    pub train: &'a GroupedFactor,
+    pub held_out: &'a GroupedFactor,
+    /// Training folds, then those held out.
+    pub folds: Vec<&'a GroupedFactor>,
+    /// Number of parameters of the model: the first ones of the design.
+    pub model: usize,
+    /// Parameters of the model that the logs determine.
+    pub determined: Vec<bool>,
+    /// 1/σ of each torque.
+    pub weights: Vec<f64>,
+    /// What was known before (a held model), over the model's parameters.
+    pub prior: Option<&'a Factor>,
+    /// For each torque, the model's rows of all the others and the prior.
+    others: Vec<Factor>,
+}
+
+/// A refit of the model together with some columns.
+#[derive(Clone, Debug)]
+pub(super) struct Refit {
+    /// All parameters of the design; zero where neither in the model nor in the candidate.
+    pub parameters: Vec<f64>,
+    /// Residual sum of squares of each torque on the training folds.
+    pub train: Vec<f64>,
+    /// The same on the folds held out.
+    pub held_out: Vec<f64>,
+}
+
+impl<'a> Evidence<'a> {
+    pub fn new(
+        train: &'a GroupedFactor,
+        held_out: &'a GroupedFactor,
+        folds: Vec<&'a GroupedFactor>,
+        model: usize,
+        determined: Vec<bool>,
+        weights: Vec<f64>,
+        prior: Option<&'a Factor>,
+    ) -> Result<Self, RegressorError> {
+        let mut evidence =
+            Evidence { train, held_out, folds, model, determined, weights, prior, others: Vec::new() };
+        evidence.others = evidence.model_rows_of_others()?;
+        Ok(evidence)
+    }
+
+    /// Places of the model's determined parameters among themselves.
+    fn places(&self) -> (Vec<Option<usize>>, usize) {
+        let mut count = 0;
+        let place = |&determined: &bool| {
+            determined.then(|| {
+                count += 1;
+                count - 1
+            })
+        };
+        let places = self.determined.iter().map(place).collect();
+        (places, count)
+    }
+
+    fn model_rows_of_others(&self) -> Result<Vec<Factor>, RegressorError> {
+        let (places, count) = self.places();
+        let mut rows = Vec::new();
+        for (group, weight) in self.train.groups().iter().zip(&self.weights) {
+            let mut builder = FactorBuilder::new(count + 1);
+            push_group(&mut builder, group, self.model, &places, &[], *weight)?;
+            rows.push(builder.factor());
+        }
+        if let Some(prior) = self.prior {
+            rows.push(prior.clone());
+        }
+        let mut others = leave_one_out(&rows)?;
+        others.truncate(self.train.groups().len());
+        Ok(others)
+    }
+
+    /// Refits the model with `added` parameters of the design; `rows` are the torques that they act on.
+    ///
+    /// `None` where the added columns have nothing left after the model has absorbed its part: not identifiable from these logs.
+    pub fn refit(&self, added: &[usize], rows: &[usize]) -> Result<Option<Refit>, RegressorError> {
+        let (places, count) = self.places();
+        let columns = count + added.len();
+        let mut builder = FactorBuilder::new(columns + 1);
+        // The candidate's columns stand last, the right-hand side behind them.
+        let model_columns: Vec<usize> = (0..count).chain([columns]).collect();
+        if let [row] = rows {
+            builder.push_factor(&self.others[*row], &model_columns, 1.0)?;
+            push_group(&mut builder, &self.train.groups()[*row], self.model, &places, added, self.weights[*row])?;
+        } else {
+            for (group, weight) in self.train.groups().iter().zip(&self.weights) {
+                push_group(&mut builder, group, self.model, &places, added, *weight)?;
+            }
+            if let Some(prior) = self.prior {
+                builder.push_factor(prior, &model_columns, 1.0)?;
+            }
+        }
+        let factor = builder.factor();
+        let solution = match factor.solve() {
+            Ok(solution) => solution.parameters,
+            Err(RegressorError::RankDeficient { .. }) => return Ok(None),
+            Err(error) => return Err(error),
+        };
+        // Columns that the model has absorbed but for a thousandth say nothing that the model does not.
+        let absorbed = |column: usize| factor.entry(column, column) < ABSORBED * factor.column_norm(column);
+        if (count..columns).any(absorbed) {
+            return Ok(None);
+        }
+        let mut parameters = vec![0.0; self.train.parameter_count()];
+        for (parameter, place) in places.iter().enumerate() {
+            parameters[parameter] = place.map_or(0.0, |place| solution[place]);
+        }
+        added.iter().zip(&solution[count..]).for_each(|(&parameter, value)| parameters[parameter] = *value);
+        Ok(Some(Refit {
+            train: self.train.residual_sums_of_squares(&parameters)?,
+            held_out: self.held_out.residual_sums_of_squares(&parameters)?,
+            parameters,
+        }))
+    }
+
+    /// Gain in log-likelihood of each torque's rows over `before`, with each torque's noise unknown: rows/2·ln(RSS⁰/RSS), training and held out.
+    pub fn gain(&self, before: &Refit, after: &Refit) -> (f64, f64) {
+        let gain = |factors: &GroupedFactor, before: &[f64], after: &[f64]| -> f64 {
+            let of_group = |row: usize| {
+                let rows = factors.groups()[row].factor.rows() as f64;
+                if before[row] > 0.0 && after[row] > 0.0 { 0.5 * rows * (before[row] / after[row]).ln() } else { 0.0 }
+            };
+            (0..before.len()).map(of_group).sum()
+        };
+        (gain(self.train, &before.train, &after.train), gain(self.held_out, &before.held_out, &after.held_out))
+    }
+
+    /// For each fold the weighted error of `refit`, with σ of each torque as given.
+    pub fn fold_errors(&self, refit: &Refit, std: &[f64]) -> Result<Vec<f64>, RegressorError> {
+        let error = |fold: &&GroupedFactor| {
+            let squares = fold.residual_sums_of_squares(&refit.parameters)?;
+            Ok(squares.iter().zip(std).map(|(sum, std)| 0.5 * sum / (std * std)).sum())
+        };
+        self.folds.iter().map(error).collect()
+    }
+
+    /// Wald statistic of the added parameters over their number, square root taken: how many standard deviations the candidate is from nothing.
+    ///
+    /// The standard deviations come from the scores of whole folds (a cluster-robust sandwich, Liang & Zeger 1986), so that samples that are correlated
+    /// within a fold are not counted one by one.
+    pub fn significance(&self, refit: &Refit, added: &[usize]) -> Result<f64, RegressorError> {
+        let (places, count) = self.places();
+        let columns = count + added.len();
+        let mut builder = FactorBuilder::new(columns + 1);
+        for fold in &self.folds {
+            for (group, weight) in fold.groups().iter().zip(&self.weights) {
+                push_group(&mut builder, group, self.model, &places, added, *weight)?;
+            }
+        }
+        if let Some(prior) = self.prior {
+            let model_columns: Vec<usize> = (0..count).chain([columns]).collect();
+            builder.push_factor(prior, &model_columns, 1.0)?;
+        }
+        let factor = builder.factor();
+        let solution = match factor.solve() {
+            Ok(solution) => solution.parameters,
+            Err(RegressorError::RankDeficient { .. }) => return Ok(0.0),
+            Err(error) => return Err(error),
+        };
+        let bread = factor.unit_covariance()?;
+        let _ = refit;
+        // Score of a fold: its columns times its residual.
+        let mut meat = Mat::<f64>::zeros(columns, columns);
+        for fold in &self.folds {
+            let mut builder = FactorBuilder::new(columns + 1);
+            for (group, weight) in fold.groups().iter().zip(&self.weights) {
+                push_group(&mut builder, group, self.model, &places, added, *weight)?;
+            }
+            let r = builder.factor();
+            let residual: Vec<f64> = (0..=columns)
+                .map(|row| {
+                    let fitted: f64 = (row..columns).map(|column| r.entry(row, column) * solution[column]).sum();
+                    r.entry(row, columns) - fitted
+                })
+                .collect();
+            let score: Vec<f64> =
+                (0..columns).map(|column| (0..=column).map(|row| r.entry(row, column) * residual[row]).sum()).collect();
+            for row in 0..columns {
+                for column in 0..columns {
+                    meat[(row, column)] += score[row] * score[column];
+                }
+            }
+        }
+        let sandwich = &bread * &meat * &bread;
+        // One parameter at a time: the Wald form of several would need more folds than there are parameters.
+        let folds = self.folds.len() as f64;
+        let small_sample = folds / (folds - 1.0).max(1.0);
+        let z = |place: usize| {
+            let variance = small_sample * sandwich[(place, place)];
+            if variance > 0.0 { solution[place].abs() / variance.sqrt() } else { 0.0 }
+        };
+        Ok((count..columns).map(z).fold(0.0, f64::max))
+    }
+}
+
+/// A column with less than this share left after the model's columns are taken out is not identifiable.
+const ABSORBED: f64 = 2e-3;
+
+/// Pushes a torque's rows over the model's determined columns, the added ones and the right-hand side.
+///
+/// A group's columns are in the order of the design's parameters, the model's first: its factor needs no new decomposition for the model's part,
+/// and what is below it is reduced to the added columns.
+fn push_group(
+    builder: &mut FactorBuilder,
+    group: &Group,
+    model: usize,
+    places: &[Option<usize>],
+    added: &[usize],
+    weight: f64,
+) -> Result<(), RegressorError> {
+    let factor = &group.factor;
+    let own = group.parameters.partition_point(|&parameter| parameter < model);
+    let width = builder.columns();
+    let first_added = width - 1 - added.len();
+    let right = factor.parameters();
+    // (column here, column in the target)
+    let tail: Vec<(usize, usize)> = group
+        .parameters
+        .iter()
+        .enumerate()
+        .skip(own)
+        .filter_map(|(column, parameter)| {
+            added.iter().position(|other| other == parameter).map(|place| (column, first_added + place))
+        })
+        .chain([(right, width - 1)])
+        .collect();
+    let mut row = vec![0.0; width];
+    for index in 0..own {
+        row.fill(0.0);
+        for column in index..own {
+            if let Some(place) = places[group.parameters[column]] {
+                row[place] = factor.entry(index, column);
+            }
+        }
+        tail.iter().for_each(|&(column, place)| row[place] = factor.entry(index, column));
+        builder.push_scaled_row(&row, weight)?;
+    }
+    let mut rest = FactorBuilder::new(tail.len());
+    let mut short = vec![0.0; tail.len()];
+    let last = tail.iter().map(|&(column, _)| column).max().unwrap_or(right);
+    for index in own..=last {
+        short
+            .iter_mut()
+            .zip(&tail)
+            .for_each(|(value, &(column, _))| *value = if column >= index { factor.entry(index, column) } else { 0.0 });
+        rest.push_row(&short)?;
+    }
+    let targets: Vec<usize> = tail.iter().map(|&(_, place)| place).collect();
+    builder.push_factor(&rest.factor(), &targets, weight)
+}
+
+/// Mean of paired differences over their standard error.
+pub(super) fn paired_t(left: &[f64], right: &[f64]) -> f64 {
+    let count = left.len() as f64;
+    let differences: Vec<f64> = left.iter().zip(right).map(|(a, b)| a - b).collect();
+    let mean = differences.iter().sum::<f64>() / count;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    if variance > 0.0 { mean / (variance / count).sqrt() } else { 0.0 }
+}

@@ -1,0 +1,192 @@
+//! One pass over the logs with a fitted model: what it leaves, sample by sample, in constant memory.
+
+use phiw_identification::{BlockSource, Design, Fold, IdentificationError};
+use phiw_telemetry::FilterScratch;
+
+/// What the residual of each torque looks like on some folds.
+#[derive(Clone, Debug, Default)]
+pub struct ResidualShape {
+    /// Autocorrelation of each torque's residual a quarter of a second apart: near zero for noise, whatever its colour within the filter's band.
+    pub autocorrelation: Vec<f64>,
+    /// For each joint, spatial frequencies \[periods·2π over the unit of position\] at which its residual has peaks, strongest first.
+    pub ripple_frequencies: Vec<Vec<f64>>,
+    /// Mean of |∂τ_j/∂q̈_k|² over the samples, row-major, where a noise floor is to be computed.
+    pub rows: u64,
+}
+
+/// Distance of two samples whose correlation is structure and not the noise's colour \[s\].
+const STRUCTURE_LAG: f64 = 0.25;
+/// Peaks of the residual over the position that are tried as ripple.
+const PEAKS: usize = 4;
+/// Highest spatial frequency that is tried \[1/rad\].
+const HIGHEST_FREQUENCY: f64 = 130.0;
+
+struct Collector {
+    lag: usize,
+    ring: Vec<Vec<f64>>,
+    filled: usize,
+    products: Vec<f64>,
+    squares: Vec<f64>,
+    grids: Vec<Grid>,
+}
+
+/// Fourier sums of a residual over the position.
+struct Grid {
+    first: f64,
+    step: f64,
+    sums: Vec<(f64, f64)>,
+}
+
+impl Grid {
+    /// Frequencies from one and a half periods over the range, four to a bin's width.
+    fn new(range: (f64, f64)) -> Self {
+        let width = (range.1 - range.0).max(1e-6);
+        let first = 1.5 * std::f64::consts::TAU / width;
+        let step = 0.25 * std::f64::consts::TAU / width;
+        let count = if first < HIGHEST_FREQUENCY { ((HIGHEST_FREQUENCY - first) / step) as usize + 1 } else { 0 };
+        // Short strokes have few bins; very long ones (linear axes in mm) are not followed without end.
+        Grid { first, step, sums: vec![(0.0, 0.0); count.min(2000)] }
+    }
+
+    fn add(&mut self, position: f64, residual: f64) {
+        let (mut sine, mut cosine) = (self.first * position).sin_cos();
+        let (step_sine, step_cosine) = (self.step * position).sin_cos();
+        for sum in &mut self.sums {
+            sum.0 += residual * cosine;
+            sum.1 += residual * sine;
+            (sine, cosine) = (sine * step_cosine + cosine * step_sine, cosine * step_cosine - sine * step_sine);
+        }
+    }
+
+    fn peaks(&self) -> Vec<f64> {
+        let power: Vec<f64> = self.sums.iter().map(|(re, im)| re * re + im * im).collect();
+        let mut peaks: Vec<usize> = (1..power.len().saturating_sub(1))
+            .filter(|&bin| power[bin] >= power[bin - 1] && power[bin] > power[bin + 1])
+            .collect();
+        peaks.sort_by(|&a, &b| power[b].total_cmp(&power[a]));
+        peaks.truncate(PEAKS);
+        let refined = |bin: usize| {
+            let (low, here, high) = (power[bin - 1], power[bin], power[bin + 1]);
+            let curvature = low - 2.0 * here + high;
+            let shift = if curvature < 0.0 { 0.5 * (low - high) / curvature } else { 0.0 };
+            self.first + self.step * (bin as f64 + shift.clamp(-0.5, 0.5))
+        };
+        peaks.into_iter().map(refined).collect()
+    }
+}
+
+/// The shape of what `parameters` leave on the folds. `ranges` are the joints' ranges of position.
+///
+/// # Errors
+/// A log cannot be read.
+pub fn residual_shape(
+    design: &Design,
+    parameters: &[f64],
+    folds: &[Fold],
+    sources: &[&dyn BlockSource],
+    ranges: &[(f64, f64)],
+) -> Result<ResidualShape, IdentificationError> {
+    let torques = design.rows().len();
+    let mut collector = Collector {
+        lag: 0,
+        ring: Vec::new(),
+        filled: 0,
+        products: vec![0.0; torques],
+        squares: vec![0.0; torques],
+        grids: ranges.iter().map(|&range| Grid::new(range)).collect(),
+    };
+    let mut scratch = design.scratch();
+    let mut filter = FilterScratch::default();
+    let mut residual = vec![0.0; torques];
+    let mut failure = None;
+    let mut rows = 0;
+    for source in sources {
+        let mut last = None;
+        source.blocks(&mut |mut block| {
+            design.correct(&mut block);
+            if let Err(error) = scratch.begin(&block) {
+                failure.get_or_insert(error);
+                return;
+            }
+            let continues = last == Some((block.log, block.segment));
+            last = Some((block.log, block.segment));
+            let outputs = block.outputs.clone();
+            if let [first, second, ..] = outputs[..] {
+                let period = block.t[second] - block.t[first];
+                collector.begin((STRUCTURE_LAG / period).round().max(1.0) as usize, continues);
+            }
+            let mut evaluated = Ok(());
+            block.filter(
+                design.evaluation_width(),
+                &mut filter,
+                |sample, row| {
+                    if evaluated.is_ok() {
+                        evaluated = scratch.evaluate(&block, sample, row);
+                    }
+                },
+                |output, t, row| {
+                    if !folds.iter().any(|fold| fold.log == block.log && fold.start <= t && t < fold.end) {
+                        return collector.begin(collector.lag, false);
+                    }
+                    rows += 1;
+                    for (torque, layout) in design.rows().iter().enumerate() {
+                        let row_of = &row[layout.range.clone()];
+                        let fitted: f64 = layout
+                            .parameters
+                            .iter()
+                            .zip(row_of)
+                            .map(|(&parameter, column)| parameters.get(parameter).map_or(0.0, |value| value * column))
+                            .sum();
+                        let measured = row_of[layout.parameters.len()];
+                        residual[torque] = if design.counts(row, torque) { measured - fitted } else { 0.0 };
+                    }
+                    collector.add(&residual, &block.q[block.row(outputs[output])]);
+                },
+            );
+            if let Err(error) = evaluated {
+                failure.get_or_insert(error);
+            }
+        })?;
+    }
+    if let Some(error) = failure {
+        return Err(error.into());
+    }
+    let correlation = |(product, square): (&f64, &f64)| if *square > 0.0 { product / square } else { 0.0 };
+    Ok(ResidualShape {
+        autocorrelation: collector.products.iter().zip(&collector.squares).map(correlation).collect(),
+        ripple_frequencies: collector.grids.iter().map(Grid::peaks).collect(),
+        rows,
+    })
+}
+
+impl Collector {
+    fn begin(&mut self, lag: usize, continues: bool) {
+        if lag != self.lag {
+            self.ring = vec![vec![0.0; self.squares.len()]; lag];
+            self.lag = lag;
+            self.filled = 0;
+        } else if !continues {
+            self.filled = 0;
+        }
+    }
+
+    fn add(&mut self, residual: &[f64], positions: &[f64]) {
+        for (joint, grid) in self.grids.iter_mut().enumerate() {
+            if residual[joint] != 0.0 {
+                grid.add(positions[joint], residual[joint]);
+            }
+        }
+        if self.lag == 0 {
+            return;
+        }
+        let slot = self.filled % self.lag;
+        for torque in 0..residual.len() {
+            if self.filled >= self.lag {
+                self.products[torque] += self.ring[slot][torque] * residual[torque];
+                self.squares[torque] += residual[torque] * residual[torque];
+            }
+            self.ring[slot][torque] = residual[torque];
+        }
+        self.filled += 1;
+    }
+}

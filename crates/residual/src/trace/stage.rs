@@ -1,0 +1,198 @@
+//! One pass over the logs with a model and candidates beside it.
+
+use super::candidate::{Candidate, Candidates};
+use super::evidence::{Evidence, Refit};
+use crate::Catalogue;
+use phiw_dynamics::Tree;
+use phiw_identification::{
+    Data, Design, Effect, EffectCatalogue, EffectSpec, IdentificationError, ReferenceModel, accumulate, merge,
+};
+use phiw_regressor::factor::Factor;
+use phiw_regressor::least_squares::GroupedFactor;
+use phiw_regressor::{BaseParameters, RegressorError};
+use rayon::prelude::*;
+
+/// What stays the same over all passes of a trace.
+pub(super) struct Fixed<'a> {
+    pub tree: &'a Tree,
+    pub base: BaseParameters,
+    pub catalogue: &'a Catalogue,
+    pub data: &'a Data<'a>,
+    /// What was known before, over the parameters of the held model that its logs determined.
+    pub prior: Option<Prior>,
+}
+
+/// A held model's factor, and the parameters that its columns stand for.
+pub(super) struct Prior {
+    pub factor: Factor,
+    pub parameters: Vec<usize>,
+    /// 1/σ of each torque when it was fitted.
+    pub weights: Vec<f64>,
+}
+
+/// Factors of a model and its candidates over all folds.
+pub(super) struct Stage {
+    pub design: Design,
+    pub candidates: Vec<Candidate>,
+    /// Number of the model's effects; the candidates' follow.
+    pub model_effects: usize,
+    pub train: GroupedFactor,
+    pub held_out: GroupedFactor,
+    pub folds: Vec<GroupedFactor>,
+}
+
+/// A candidate and what a refit with it gave.
+#[derive(Clone)]
+pub(super) struct Judged {
+    pub candidate: usize,
+    pub refit: Refit,
+    /// Gain in log-likelihood, correlated samples counted once, less a penalty for parameters and constants.
+    pub score: f64,
+    /// Gain on the folds held out alone.
+    pub held_out_gain: f64,
+    pub parameters: Vec<usize>,
+}
+
+impl<'a> Fixed<'a> {
+    pub fn build(&self, specs: &[EffectSpec]) -> Result<Vec<Box<dyn Effect>>, IdentificationError> {
+        Ok(specs.iter().map(|spec| self.catalogue.build(spec, self.tree)).collect::<Result<_, _>>()?)
+    }
+
+    /// A rigid body and effects with numbers, for columns that need torques.
+    pub fn reference(&self, specs: &[EffectSpec], parameters: &[f64]) -> Result<ReferenceModel, IdentificationError> {
+        let mut tree = self.tree.clone();
+        let (base, mut rest) = parameters.split_at(self.base.count());
+        tree.set_inertial_parameters(&self.base.to_standard(base, &self.tree.inertial_parameters())?)?;
+        let mut effects = Vec::new();
+        for effect in self.build(specs)? {
+            let (own, others) = rest.split_at(effect.parameters().len());
+            effects.push((effect, own.to_vec()));
+            rest = others;
+        }
+        Ok(ReferenceModel::new(tree).with_effects(effects))
+    }
+
+    /// One pass over the logs: the model's columns, then the candidates'.
+    pub fn pass(
+        &self,
+        specs: &[EffectSpec],
+        candidates: Candidates,
+        reference: ReferenceModel,
+    ) -> Result<Stage, IdentificationError> {
+        let mut effects = self.build(specs)?;
+        let model_effects = effects.len();
+        effects.extend(candidates.effects);
+        let design = Design::new(self.tree.clone(), self.base.clone(), effects)
+            .with_rest_speeds(self.data.rest_speeds.clone())
+            .with_reference(reference);
+        let all = [self.data.train.as_slice(), &self.data.held_out].concat();
+        let folds = accumulate(&design, &all, &self.data.sources)?;
+        let (train, held_out) = folds.split_at(self.data.train.len());
+        Ok(Stage {
+            model_effects,
+            candidates: candidates.list,
+            train: merge(train)?,
+            held_out: merge(held_out)?,
+            folds,
+            design,
+        })
+    }
+}
+
+impl Stage {
+    /// Number of the model's parameters.
+    pub fn model_size(&self) -> usize {
+        match self.model_effects {
+            0 => self.design.base().count(),
+            count => self.design.effect_parameters(count - 1).end,
+        }
+    }
+
+    /// Parameters of a candidate.
+    pub fn parameters(&self, candidate: usize) -> Vec<usize> {
+        let effects = self.candidates[candidate].effects.clone();
+        effects.flat_map(|effect| self.design.effect_parameters(self.model_effects + effect)).collect()
+    }
+
+    /// Torques that a candidate acts on.
+    pub fn rows(&self, candidate: usize) -> Vec<usize> {
+        let effects = self.candidates[candidate].effects.clone();
+        let mut rows: Vec<usize> = effects
+            .flat_map(|effect| self.design.effects()[self.model_effects + effect].entries())
+            .map(|entry| entry.row)
+            .collect();
+        rows.sort_unstable();
+        rows.dedup();
+        rows
+    }
+
+    /// Parameters of the model that the rows (and what was known before) determine.
+    pub fn determined(&self, prior: Option<&Prior>) -> Result<Vec<bool>, RegressorError> {
+        let model = self.model_size();
+        if let Some(prior) = prior {
+            return Ok((0..model).map(|parameter| prior.parameters.contains(&parameter) || parameter >= self.design.base().count()).collect());
+        }
+        let kept: Vec<usize> = (0..model).collect();
+        let selected = self.train.select(&kept)?;
+        let scale = |group: &phiw_regressor::least_squares::Group| {
+            let square = group.factor.right_hand_side_sum_of_squares() / group.factor.rows().max(1) as f64;
+            if square > 0.0 { 1.0 / square.sqrt() } else { 1.0 }
+        };
+        let weights: Vec<f64> = selected.groups().iter().map(scale).collect();
+        let undetermined = selected.combine(&weights)?.undetermined_columns();
+        Ok((0..model).map(|parameter| !undetermined.contains(&parameter)).collect())
+    }
+
+    /// The evidence with the given weights.
+    pub fn evidence<'a>(
+        &'a self,
+        determined: &[bool],
+        weights: &[f64],
+        prior: Option<&'a Factor>,
+    ) -> Result<Evidence<'a>, RegressorError> {
+        let folds = self.folds.iter().collect();
+        Evidence::new(&self.train, &self.held_out, folds, self.model_size(), determined.to_vec(), weights.to_vec(), prior)
+    }
+
+    /// Refits with every candidate of `which`; those that leave nothing to identify, or break their bounds, are left out.
+    ///
+    /// `inflation` says how many correlated samples make one.
+    pub fn judge(
+        &self,
+        evidence: &Evidence<'_>,
+        before: &Refit,
+        which: &[usize],
+        inflation: f64,
+    ) -> Result<Vec<Judged>, RegressorError> {
+        let judged: Result<Vec<Option<Judged>>, RegressorError> = which
+            .par_iter()
+            .map(|&candidate| {
+                let parameters = self.parameters(candidate);
+                let Some(refit) = evidence.refit(&parameters, &self.rows(candidate))? else { return Ok(None) };
+                if !self.within_bounds(candidate, &refit) {
+                    return Ok(None);
+                }
+                let (train, held_out) = evidence.gain(before, &refit);
+                let count = parameters.len() + self.candidates[candidate].constants;
+                let rows = self.rows(candidate).iter().map(|&row| self.train.groups()[row].factor.rows()).sum::<u64>();
+                let penalty = 0.5 * (rows as f64 / inflation).max(2.0).ln() * count as f64;
+                let score = (train + held_out) / inflation - penalty;
+                Ok(Some(Judged { candidate, refit, score, held_out_gain: held_out / inflation, parameters }))
+            })
+            .collect();
+        let mut judged: Vec<Judged> = judged?.into_iter().flatten().collect();
+        judged.sort_by(|a, b| b.score.total_cmp(&a.score));
+        Ok(judged)
+    }
+
+    fn within_bounds(&self, candidate: usize, refit: &Refit) -> bool {
+        let effects = self.candidates[candidate].effects.clone();
+        effects.map(|effect| self.model_effects + effect).all(|effect| {
+            let info = self.design.effects()[effect].parameters();
+            self.design.effect_parameters(effect).zip(info).all(|(parameter, info)| {
+                let value = refit.parameters[parameter];
+                info.bounds.0 <= value && value <= info.bounds.1
+            })
+        })
+    }
+}

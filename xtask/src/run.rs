@@ -1,0 +1,97 @@
+//! `cargo xtask run`: the best main job that there is so far, on a log that this program makes itself.
+//!
+//! Here: `phiw identify`, with report. The outcome on the example is the same on every machine; where logs of a real robot lie beside the
+//! workspace, they are identified as well.
+
+mod synthetic;
+pub mod synthetic_log;
+
+use crate::environment;
+use anyhow::Context;
+use phiw::arguments::SessionArguments;
+use phiw::console::Console;
+use phiw::identify::{Outcome, identify};
+use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use synthetic::Plant;
+
+/// What an arm with gears is declared to have beside its rigid body.
+const DECLARED: [&str; 3] = ["viscous_friction", "coulomb_friction", "rotor_inertia"];
+/// Length of an example log \[s\] and its rows per second.
+const EXAMPLE: (f64, f64) = (20.0, 500.0);
+
+/// Command line of `cargo xtask run`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Open the report in the browser.
+    #[arg(long)]
+    open: bool,
+    /// Folder for the results, seen from the workspace.
+    #[arg(long, default_value = "out/run")]
+    out: PathBuf,
+}
+
+/// Identifies the example, and a real robot where its logs are there.
+///
+/// # Errors
+/// Files cannot be read or written, or the identification fails.
+pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let root = environment::workspace_root()?;
+    let out = root.join(&arguments.out);
+    let mut reports = vec![run(&example(&root, &out)?)?];
+    let tx40 = root.join("../shared/data/logs/tx40");
+    if tx40.exists() {
+        let log = |name: &str| vec![tx40.join(name)];
+        reports.push(run(&session(&tx40.join("tx40.urdf"), log("train.csv"), log("validate.csv"), out.join("tx40")))?);
+    }
+    for report in &reports {
+        println!("report: {}", report.display());
+    }
+    if arguments.open {
+        reports.iter().try_for_each(|report| open(report))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A PUMA-560-like arm on three Fourier motions, two to train on.
+fn example(root: &Path, out: &Path) -> anyhow::Result<SessionArguments> {
+    let urdf = root.join("models/puma560.urdf");
+    let tree = read_urdf_file(&urdf, &UrdfOptions::default())?.tree;
+    let plant = Plant::new(tree);
+    let folder = out.join("example");
+    std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let mut logs = Vec::new();
+    for (seed, name) in [(1, "train_a.csv"), (2, "train_b.csv"), (3, "validate.csv")] {
+        let path = folder.join(name);
+        let (seconds, rate) = EXAMPLE;
+        plant.write_log(&path, seed, (seconds * rate) as u64, rate, &mut |_| ())?;
+        logs.push(path);
+    }
+    let validate = logs.split_off(2);
+    Ok(session(&urdf, logs, validate, folder))
+}
+
+fn session(urdf: &Path, train: Vec<PathBuf>, validate: Vec<PathBuf>, out: PathBuf) -> SessionArguments {
+    let declare = DECLARED.map(str::to_owned).to_vec();
+    SessionArguments { urdf: urdf.to_owned(), train, validate, declare, out, ..SessionArguments::default() }
+}
+
+fn run(arguments: &SessionArguments) -> anyhow::Result<PathBuf> {
+    println!("{}\n", arguments.command_line("identify"));
+    let Outcome { summary, warnings, report_html, .. } = identify(arguments, &Console::of_terminal(false))?;
+    warnings.iter().for_each(|warning| println!("warning: {warning}"));
+    println!("{summary}");
+    Ok(report_html)
+}
+
+/// Shows a file with what the desktop opens it with.
+fn open(path: &Path) -> anyhow::Result<()> {
+    let opener = match std::env::consts::OS {
+        "macos" => "open",
+        "windows" => "explorer",
+        _ => "xdg-open",
+    };
+    Command::new(opener).arg(path).spawn().with_context(|| format!("cannot start {opener}; open {} yourself", path.display()))?;
+    Ok(())
+}

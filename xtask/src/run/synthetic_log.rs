@@ -1,0 +1,56 @@
+//! `cargo xtask synthetic-log`: a log as long as wanted, to see that memory does not grow with it.
+
+use super::synthetic::Plant;
+use crate::environment;
+use anyhow::ensure;
+use phiw_dynamics::Tree;
+use phiw_dynamics::random_tree::{RandomTreeOptions, random_urdf};
+use phiw_dynamics::urdf::{UrdfOptions, read_urdf, read_urdf_file};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Command line of `cargo xtask synthetic-log`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Rows of the log.
+    #[arg(long, default_value_t = 5_000_000)]
+    rows: u64,
+    /// Joints of the robot; with 18 it is models/upper_body18.urdf, else a random one, written beside the log.
+    #[arg(long, default_value_t = 18)]
+    joints: usize,
+    /// Rows a second.
+    #[arg(long, default_value_t = 500.0)]
+    rate: f64,
+    /// Seed of motion and noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// The log.
+    #[arg(long)]
+    out: PathBuf,
+}
+
+/// Writes the log, in constant memory.
+///
+/// # Errors
+/// The robot cannot be read, or the log not written.
+pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    ensure!(arguments.rate > 0.0, "--rate {} is no rate", arguments.rate);
+    let (tree, urdf) = robot(arguments)?;
+    let bar = indicatif::ProgressBar::new(arguments.rows);
+    let mut progress = |row| bar.set_position(row);
+    Plant::new(tree).write_log(&arguments.out, arguments.seed, arguments.rows, arguments.rate, &mut progress)?;
+    bar.finish_and_clear();
+    println!("{}, of the robot {}", arguments.out.display(), urdf.display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn robot(arguments: &Arguments) -> anyhow::Result<(Tree, PathBuf)> {
+    let model = environment::workspace_root()?.join("models/upper_body18.urdf");
+    if arguments.joints == 18 {
+        return Ok((read_urdf_file(&model, &UrdfOptions::default())?.tree, model));
+    }
+    let xml = random_urdf(arguments.seed, &RandomTreeOptions { joints: arguments.joints, ..RandomTreeOptions::default() });
+    let path = arguments.out.with_extension("urdf");
+    std::fs::write(&path, &xml)?;
+    Ok((read_urdf(&xml, &UrdfOptions::default())?.tree, path))
+}
