@@ -43,7 +43,12 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let tx40 = root.join("../shared/data/logs/tx40");
     if tx40.exists() {
         let log = |name: &str| vec![tx40.join(name)];
-        reports.push(run(&session(&tx40.join("tx40.urdf"), log("train.csv"), log("validate.csv"), out.join("tx40")))?);
+        reports.push(run(&session(
+            &tx40.join("tx40.urdf"),
+            log("train.csv"),
+            log("validate.csv"),
+            out.join("tx40"),
+        ))?);
     }
     for report in &reports {
         println!("report: {}", report.display());
@@ -92,6 +97,9 @@ fn open(path: &Path) -> anyhow::Result<()> {
         "windows" => "explorer",
         _ => "xdg-open",
     };
-    Command::new(opener).arg(path).spawn().with_context(|| format!("cannot start {opener}; open {} yourself", path.display()))?;
+    Command::new(opener)
+        .arg(path)
+        .spawn()
+        .with_context(|| format!("cannot start {opener}; open {} yourself", path.display()))?;
     Ok(())
 }

@@ -97,8 +97,10 @@ fn reduce(
     batch: Vec<Block>,
     merged: &mut [Vec<Option<Factor>>],
 ) -> Result<(), IdentificationError> {
-    let reduced: Result<Vec<Vec<Piece>>, RegressorError> =
-        batch.into_par_iter().map_init(|| Worker::new(design), |worker, block| worker.reduce(folds, block)).collect();
+    let reduced: Result<Vec<Vec<Piece>>, RegressorError> = batch
+        .into_par_iter()
+        .map_init(|| Worker::new(design), |worker, block| worker.reduce(folds, block))
+        .collect();
     for piece in reduced?.into_iter().flatten() {
         let targets = merged[piece.fold].par_iter_mut().zip(piece.factors);
         targets.try_for_each(|(target, factor)| {

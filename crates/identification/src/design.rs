@@ -99,7 +99,19 @@ impl Design {
             rows.push(layout);
         }
         let needs = effects.iter().fold(Needs::default(), |needs, effect| needs.union(effect.needs()));
-        Design { tree, base, regressor, effects, effect_parameters, effect_columns, rows, width: start, needs, reference: None, rest_speeds: Vec::new() }
+        Design {
+            tree,
+            base,
+            regressor,
+            effects,
+            effect_parameters,
+            effect_columns,
+            rows,
+            width: start,
+            needs,
+            reference: None,
+            rest_speeds: Vec::new(),
+        }
     }
 
     /// The same with the speed of each torque's joint below which it stands still \[rad/s, m/s\].
@@ -130,8 +142,13 @@ impl Design {
     /// The design with only the `chosen` effects, in that order.
     pub fn keep(self, chosen: &[usize]) -> Self {
         let mut effects: Vec<Option<Box<dyn Effect>>> = self.effects.into_iter().map(Some).collect();
-        let kept = chosen.iter().filter_map(|&effect| effects.get_mut(effect).and_then(Option::take)).collect();
-        Design { reference: self.reference, rest_speeds: self.rest_speeds, ..Design::new(self.tree, self.base, kept) }
+        let kept =
+            chosen.iter().filter_map(|&effect| effects.get_mut(effect).and_then(Option::take)).collect();
+        Design {
+            reference: self.reference,
+            rest_speeds: self.rest_speeds,
+            ..Design::new(self.tree, self.base, kept)
+        }
     }
 
     /// The robot.
@@ -243,8 +260,13 @@ impl DesignScratch<'_> {
     }
 
     fn evaluate_effects(&mut self, block: &Block, index: usize) {
-        let sample =
-            Sample { block, reference: &self.reference, index, regressor: &self.pairs, statics: &self.statics };
+        let sample = Sample {
+            block,
+            reference: &self.reference,
+            index,
+            regressor: &self.pairs,
+            statics: &self.statics,
+        };
         for (evaluator, range) in self.evaluators.iter_mut().zip(&self.design.effect_columns) {
             evaluator.evaluate(&sample, &mut self.columns[range.clone()]);
         }

@@ -86,9 +86,14 @@ pub fn merge(folds: &[GroupedFactor]) -> Result<GroupedFactor, RegressorError> {
 pub fn torque_error(folds: &[GroupedFactor], parameters: &[f64]) -> Result<TorqueError, RegressorError> {
     let all = merge(folds)?;
     let squares = all.residual_sums_of_squares(parameters)?;
-    let torques: Vec<f64> = all.groups().iter().map(|group| group.factor.right_hand_side_sum_of_squares()).collect();
+    let torques: Vec<f64> =
+        all.groups().iter().map(|group| group.factor.right_hand_side_sum_of_squares()).collect();
     let rms = |squares: &[f64]| -> Vec<f64> {
-        squares.iter().zip(all.groups()).map(|(sum, group)| (sum / group.factor.rows().max(1) as f64).sqrt()).collect()
+        squares
+            .iter()
+            .zip(all.groups())
+            .map(|(sum, group)| (sum / group.factor.rows().max(1) as f64).sqrt())
+            .collect()
     };
     let relative = (squares.iter().sum::<f64>() / torques.iter().sum::<f64>()).sqrt();
     let rows = all.groups().first().map_or(0, |group| group.factor.rows());
@@ -106,7 +111,7 @@ fn check_length(design: &Design, all: &GroupedFactor) -> Result<(), Identificati
     Err(InputError::TooShort { rows, parameters, seconds_missing }.into())
 }
 
-fn undetermined(all: &GroupedFactor) -> Result<Vec<usize>, RegressorError> {
+pub(crate) fn undetermined(all: &GroupedFactor) -> Result<Vec<usize>, RegressorError> {
     let scale = |group: &phiw_regressor::least_squares::Group| {
         let square = group.factor.right_hand_side_sum_of_squares() / group.factor.rows().max(1) as f64;
         if square > 0.0 { 1.0 / square.sqrt() } else { 1.0 }
@@ -117,7 +122,11 @@ fn undetermined(all: &GroupedFactor) -> Result<Vec<usize>, RegressorError> {
 
 /// Standard deviations by the delete-one-fold jackknife (Efron & Stein 1981): folds are long against the residual's correlation, so
 /// correlated samples are not counted as independent ones.
-fn jackknife(folds: &[GroupedFactor], determined: &[usize], weights: &[f64]) -> Result<Vec<f64>, RegressorError> {
+fn jackknife(
+    folds: &[GroupedFactor],
+    determined: &[usize],
+    weights: &[f64],
+) -> Result<Vec<f64>, RegressorError> {
     let absent = vec![f64::NAN; determined.len()];
     if folds.len() < 4 {
         return Ok(absent);

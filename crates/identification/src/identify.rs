@@ -1,7 +1,8 @@
 //! The declared model, identified: constants chosen, parameters fitted, error held out.
 
 use crate::{
-    BlockSource, Design, Effect, Fit, Fold, IdentificationError, TorqueError, accumulate, fit, merge, torque_error,
+    BlockSource, Design, Effect, Fit, Fold, IdentificationError, TorqueError, accumulate, fit, merge,
+    torque_error,
 };
 use phiw_dynamics::Tree;
 use phiw_regressor::factor::FactorBuilder;
@@ -94,8 +95,12 @@ fn choose(
     if slots.iter().all(|slot| slot.len() <= 1) {
         return Ok(chosen);
     }
+    let undetermined = undetermined_with(design, &chosen, factors)?;
     let columns = |chosen: &[usize]| -> Vec<usize> {
-        (0..design.base().count()).chain(chosen.iter().flat_map(|&effect| design.effect_parameters(effect))).collect()
+        (0..design.base().count())
+            .chain(chosen.iter().flat_map(|&effect| design.effect_parameters(effect)))
+            .filter(|parameter| !undetermined.contains(parameter))
+            .collect()
     };
     for _ in 0..SWEEPS {
         let before = chosen.clone();
@@ -105,7 +110,7 @@ fn choose(
                 continue;
             }
             let mut best = (f64::INFINITY, chosen[slot]);
-            let rest = Rest::new(design, factors, &solution, &chosen, slot)?;
+            let rest = Rest::new(design, factors, &solution, &columns(&chosen), chosen[slot])?;
             for variant in variants.clone() {
                 let mut trial = chosen.clone();
                 trial[slot] = variant;
@@ -123,12 +128,26 @@ fn choose(
     Ok(chosen)
 }
 
+/// Parameters that the rows do not determine with the `chosen` effects.
+fn undetermined_with(
+    design: &Design,
+    chosen: &[usize],
+    factors: &GroupedFactor,
+) -> Result<Vec<usize>, RegressorError> {
+    let all: Vec<usize> = (0..design.base().count())
+        .chain(chosen.iter().flat_map(|&effect| design.effect_parameters(effect)))
+        .collect();
+    let undetermined = crate::fit::undetermined(&factors.select(&all)?)?;
+    Ok(undetermined.into_iter().map(|place| all[place]).collect())
+}
+
 /// A weighted fit of what the rows determine; the rest is zero.
 fn solve_determined(factors: &GroupedFactor) -> Result<WeightedSolution, RegressorError> {
     match weighted_least_squares(factors) {
         Err(RegressorError::RankDeficient { undetermined, .. }) => {
-            let kept: Vec<usize> =
-                (0..factors.parameter_count()).filter(|parameter| !undetermined.contains(parameter)).collect();
+            let kept: Vec<usize> = (0..factors.parameter_count())
+                .filter(|parameter| !undetermined.contains(parameter))
+                .collect();
             weighted_least_squares(&factors.select(&kept)?)
         }
         other => other,
@@ -148,15 +167,12 @@ impl Rest {
         design: &Design,
         factors: &GroupedFactor,
         solution: &WeightedSolution,
-        chosen: &[usize],
-        slot: usize,
+        kept: &[usize],
+        effect: usize,
     ) -> Result<Self, RegressorError> {
-        let own: Vec<usize> = design.effects()[chosen[slot]].entries().iter().map(|entry| entry.row).collect();
+        let own: Vec<usize> = design.effects()[effect].entries().iter().map(|entry| entry.row).collect();
         let weights: Vec<f64> = solution.group_std.iter().map(|std| 1.0 / std).collect();
-        let kept: Vec<usize> = (0..design.base().count())
-            .chain(chosen.iter().flat_map(|&effect| design.effect_parameters(effect)))
-            .collect();
-        let selected = factors.select(&kept)?;
+        let selected = factors.select(kept)?;
         let mut builder = FactorBuilder::new(kept.len() + 1);
         for (row, group) in selected.groups().iter().enumerate() {
             if !own.contains(&row) {
@@ -192,11 +208,15 @@ impl Rest {
         let solution = match builder.factor().solve() {
             Ok(solution) => solution.parameters,
             Err(RegressorError::RankDeficient { undetermined, .. }) => {
-                let determined: Vec<usize> = (0..kept.len()).filter(|column| !undetermined.contains(column)).collect();
+                let determined: Vec<usize> =
+                    (0..kept.len()).filter(|column| !undetermined.contains(column)).collect();
                 let named: Vec<usize> = determined.iter().copied().chain([kept.len()]).collect();
                 let part = builder.factor().select(&named)?.solve()?;
                 let mut parameters = vec![0.0; kept.len()];
-                determined.iter().zip(part.parameters).for_each(|(&column, value)| parameters[column] = value);
+                determined
+                    .iter()
+                    .zip(part.parameters)
+                    .for_each(|(&column, value)| parameters[column] = value);
                 parameters
             }
             Err(error) => return Err(error),

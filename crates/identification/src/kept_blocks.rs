@@ -14,7 +14,10 @@ impl<'a> KeptBlocks<'a> {
     ///
     /// # Errors
     /// A log cannot be read.
-    pub fn keep(sources: &[&'a dyn BlockSource], mut budget: usize) -> Result<Vec<Self>, IdentificationError> {
+    pub fn keep(
+        sources: &[&'a dyn BlockSource],
+        mut budget: usize,
+    ) -> Result<Vec<Self>, IdentificationError> {
         let mut all = Vec::with_capacity(sources.len());
         for &source in sources {
             let mut kept = Some(Vec::new());

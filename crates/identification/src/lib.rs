@@ -17,9 +17,7 @@ mod sample;
 pub use accumulate::{BlockSource, Fold, accumulate};
 pub use checks::{InputError, check_logs};
 pub use design::{Design, DesignScratch, RowLayout};
-pub use effect::{
-    Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Entry, Evaluator,
-};
+pub use effect::{Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Entry, Evaluator};
 pub use error::IdentificationError;
 pub use fit::{Fit, TorqueError, fit, merge, torque_error};
 pub use identify::{Data, Identified, Variants, identify};

@@ -41,7 +41,8 @@ impl LogSet {
             let mut report = |done: u64, total: u64| progress(&reading("surveying", path), done, total);
             phiw_telemetry::survey(path, &joints, TorqueColumns::Required, &mut report)
         };
-        let mut surveys = train.iter().chain(validate).map(survey).collect::<Result<Vec<Survey>, LogError>>()?;
+        let mut surveys =
+            train.iter().chain(validate).map(survey).collect::<Result<Vec<Survey>, LogError>>()?;
         phiw_telemetry::arrange_session(&mut surveys);
         let (training, held_out) = surveys.split_at(train.len());
         check_logs(tree, training, held_out)?;
@@ -69,13 +70,18 @@ impl LogSet {
     pub fn same_files(&self) -> Vec<(&Path, &Path)> {
         let (training, held_out) = self.surveys.split_at(self.train);
         let pairs = training.iter().flat_map(|a| held_out.iter().map(move |b| (a, b)));
-        pairs.filter(|(a, b)| a.content_hash == b.content_hash).map(|(a, b)| (a.path.as_path(), b.path.as_path())).collect()
+        pairs
+            .filter(|(a, b)| a.content_hash == b.content_hash)
+            .map(|(a, b)| (a.path.as_path(), b.path.as_path()))
+            .collect()
     }
 
     /// For each joint the speed below which it stands still: a hundredth of its RMS velocity in the training logs \[rad/s, m/s\].
     pub fn rest_speeds(&self) -> Vec<f64> {
         let joints = self.surveys.first().map_or(0, |survey| survey.joints.len());
-        let rms = |joint: usize| self.training().iter().map(|survey| survey.joints[joint].velocity_rms).fold(0.0, f64::max);
+        let rms = |joint: usize| {
+            self.training().iter().map(|survey| survey.joints[joint].velocity_rms).fold(0.0, f64::max)
+        };
         (0..joints).map(|joint| REST_SHARE * rms(joint)).collect()
     }
 
@@ -88,7 +94,11 @@ impl LogSet {
     /// Stretches of time to validate on.
     pub fn held_out_folds(&self) -> Vec<Fold> {
         if self.splits_training_logs() {
-            let ends = self.training().iter().enumerate().map(|(log, survey)| (log, survey, 1.0 - HELD_OUT_SHARE, 1.0));
+            let ends = self
+                .training()
+                .iter()
+                .enumerate()
+                .map(|(log, survey)| (log, survey, 1.0 - HELD_OUT_SHARE, 1.0));
             cut(ends, HELD_OUT_FOLDS)
         } else {
             let logs = self.surveys.iter().enumerate().skip(self.train);
@@ -98,7 +108,10 @@ impl LogSet {
 
     /// The logs as sources of blocks.
     pub fn sources<'a>(&'a self, progress: Progress<'a>) -> Vec<LogFile<'a>> {
-        self.surveys.iter().map(|survey| LogFile { survey, conditioning: &self.conditioning, progress }).collect()
+        self.surveys
+            .iter()
+            .map(|survey| LogFile { survey, conditioning: &self.conditioning, progress })
+            .collect()
     }
 }
 

@@ -1,6 +1,6 @@
 //! An identified model as one thing: rigid body, effects, what it was fitted to; written to `model.json` and read back.
 
-use crate::{Design, Effect, EffectCatalogue, EffectSpec, Fit, IdentificationError};
+use crate::{Design, EffectCatalogue, EffectError, EffectSpec, Fit, IdentificationError, ReferenceModel};
 use phiw_dynamics::{PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree};
 use phiw_regressor::BaseParameters;
 use phiw_regressor::factor::Factor;
@@ -84,7 +84,8 @@ pub struct FactorRows {
 impl FactorRows {
     fn of(factor: &Factor, parameters: Vec<usize>) -> Self {
         let size = factor.columns();
-        let entries = (0..size).flat_map(|row| (row..size).map(move |column| factor.entry(row, column))).collect();
+        let entries =
+            (0..size).flat_map(|row| (row..size).map(move |column| factor.entry(row, column))).collect();
         FactorRows { parameters, rows: factor.rows(), entries }
     }
 
@@ -95,13 +96,17 @@ impl FactorRows {
     pub fn factor(&self) -> Result<Factor, IdentificationError> {
         let size = self.parameters.len() + 1;
         if self.entries.len() != size * (size + 1) / 2 {
-            let message = format!("the model's factor has {} entries, but {} columns", self.entries.len(), size);
+            let message =
+                format!("the model's factor has {} entries, but {} columns", self.entries.len(), size);
             return Err(IdentificationError::Model(message));
         }
         let mut entries = self.entries.iter();
         let mut rows = vec![0.0; size * size];
         for row in 0..size {
-            rows[row * size + row..(row + 1) * size].iter_mut().zip(&mut entries).for_each(|(to, from)| *to = *from);
+            rows[row * size + row..(row + 1) * size]
+                .iter_mut()
+                .zip(&mut entries)
+                .for_each(|(to, from)| *to = *from);
         }
         Ok(Factor::of_rows(size, &rows)?.standing_for(self.rows))
     }
@@ -141,10 +146,12 @@ impl Model {
             let unit = standard_unit(leading % PARAMETERS_PER_BODY);
             named(index, parameter_name(design.tree(), leading), unit.to_owned())
         };
-        let effect = |(index, effect): (usize, &Box<dyn Effect>)| {
+        let effect = |index: usize| {
+            let effect = &design.effects()[index];
             let spec = effect.spec();
             let parameters = design.effect_parameters(index).zip(effect.parameters());
-            let parameters = parameters.map(|(parameter, info)| named(parameter, info.name, info.unit)).collect();
+            let parameters =
+                parameters.map(|(parameter, info)| named(parameter, info.name, info.unit)).collect();
             EffectParameters { declared: declared.contains(&spec.kind), spec, parameters }
         };
         Ok(Model {
@@ -154,8 +161,14 @@ impl Model {
             held: held.to_vec(),
             declared: std::iter::once("rigid_body".to_owned()).chain(declared.iter().cloned()).collect(),
             base_parameters: (0..base.count()).map(base_parameter).collect(),
-            bodies: design.tree().bodies().iter().zip(standard.chunks_exact(PARAMETERS_PER_BODY)).map(body).collect(),
-            effects: design.effects().iter().enumerate().map(effect).collect(),
+            bodies: design
+                .tree()
+                .bodies()
+                .iter()
+                .zip(standard.chunks_exact(PARAMETERS_PER_BODY))
+                .map(body)
+                .collect(),
+            effects: (0..design.effects().len()).map(effect).collect(),
             residual_std: fit.residual_std.clone(),
             factor: FactorRows::of(&fit.factor, fit.determined()),
             cutoff_hz,
@@ -194,14 +207,31 @@ impl Model {
             return Err(IdentificationError::Model(message));
         }
         let effects = self.effects.iter().map(|effect| catalogue.build(&effect.spec, tree));
-        let design = Design::new(tree.clone(), base, effects.collect::<Result<_, _>>()?);
-        let values = self.base_parameters.iter().chain(self.effects.iter().flat_map(|effect| &effect.parameters));
+        let reference = self.reference(tree, catalogue)?;
+        let design =
+            Design::new(tree.clone(), base, effects.collect::<Result<_, _>>()?).with_reference(reference);
+        let values =
+            self.base_parameters.iter().chain(self.effects.iter().flat_map(|effect| &effect.parameters));
         let parameters: Vec<f64> = values.map(|parameter| parameter.value).collect();
         if parameters.len() != design.parameter_count() {
             let message = "an effect of the model has not the parameters that its kind has".to_owned();
             return Err(IdentificationError::Model(message));
         }
         Ok((design, parameters))
+    }
+
+    /// The model as the reference of effects whose columns need torques.
+    fn reference(
+        &self,
+        tree: &Tree,
+        catalogue: &dyn EffectCatalogue,
+    ) -> Result<ReferenceModel, IdentificationError> {
+        let with_values = |effect: &EffectParameters| {
+            let values = effect.parameters.iter().map(|parameter| parameter.value).collect();
+            Ok((catalogue.build(&effect.spec, tree)?, values))
+        };
+        let effects: Result<Vec<_>, EffectError> = self.effects.iter().map(with_values).collect();
+        Ok(ReferenceModel::new(self.identified_tree(tree)?).with_effects(effects?))
     }
 
     /// The tree with the model's standard parameters.

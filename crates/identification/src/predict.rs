@@ -153,7 +153,8 @@ impl<'a> Predictor<'a> {
                     let columns = &evaluation[layout.range.clone()];
                     let terms = columns.iter().zip(&layout.parameters);
                     row[torque] = columns[layout.parameters.len()];
-                    row[torques + torque] = terms.map(|(column, &parameter)| column * parameters[parameter]).sum();
+                    row[torques + torque] =
+                        terms.map(|(column, &parameter)| column * parameters[parameter]).sum();
                     row[2 * torques + torque] = evaluation[design.width() + torque];
                 }
             },

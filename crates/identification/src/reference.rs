@@ -28,7 +28,12 @@ impl ReferenceModel {
     }
 
     /// Fills in what is needed over a block (fixed base; with a floating base there is nothing to fill in).
-    pub(crate) fn evaluate(&self, block: &Block, needs: Needs, out: &mut BlockReference) -> Result<(), DimensionError> {
+    pub(crate) fn evaluate(
+        &self,
+        block: &Block,
+        needs: Needs,
+        out: &mut BlockReference,
+    ) -> Result<(), DimensionError> {
         let joints = block.joints;
         if needs.is_empty() || self.tree.is_floating() {
             return Ok(());
@@ -82,7 +87,8 @@ impl ReferenceModel {
         if samples == 0 {
             return Ok(());
         }
-        let period = if samples > 1 { (block.t[samples - 1] - block.t[0]) / (samples - 1) as f64 } else { 1.0 };
+        let period =
+            if samples > 1 { (block.t[samples - 1] - block.t[0]) / (samples - 1) as f64 } else { 1.0 };
         let stride = ((DERIVATIVE_PERIOD / period) as usize).max(1);
         let mut workspace = Workspace::new(&self.tree);
         let mut state = DualState::new(joints);
@@ -91,9 +97,24 @@ impl ReferenceModel {
         loop {
             state.set(block, sample);
             let at = sample * size..(sample + 1) * size;
-            state.derivatives(&self.tree, &mut workspace, Along::Position, &mut out.by_position[at.clone()])?;
-            state.derivatives(&self.tree, &mut workspace, Along::Velocity, &mut out.by_velocity[at.clone()])?;
-            state.derivatives(&self.tree, &mut workspace, Along::Acceleration, &mut out.by_acceleration[at])?;
+            state.derivatives(
+                &self.tree,
+                &mut workspace,
+                Along::Position,
+                &mut out.by_position[at.clone()],
+            )?;
+            state.derivatives(
+                &self.tree,
+                &mut workspace,
+                Along::Velocity,
+                &mut out.by_velocity[at.clone()],
+            )?;
+            state.derivatives(
+                &self.tree,
+                &mut workspace,
+                Along::Acceleration,
+                &mut out.by_acceleration[at],
+            )?;
             if let Some(first) = before {
                 for values in [&mut out.by_position, &mut out.by_velocity, &mut out.by_acceleration] {
                     interpolate(values, size, first, sample);

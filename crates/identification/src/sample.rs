@@ -143,7 +143,8 @@ impl<'a> Sample<'a> {
     /// The joint torque regressor's pairs of this sample (see `phiw_regressor::JointTorqueRegressor`).
     pub fn regressor_pairs(&self) -> &'a [f64] {
         self.regressor
-    }    /// The same at rest under unit gravity along world x, then y, then z.
+    }
+    /// The same at rest under unit gravity along world x, then y, then z.
     pub fn static_regressor_pairs(&self) -> &'a [f64] {
         self.statics
     }

@@ -23,7 +23,9 @@ fn entries(factors: &[GroupedFactor]) -> Vec<u64> {
     groups
         .flat_map(|group| {
             let size = group.factor.columns();
-            (0..size * size).map(|index| group.factor.entry(index / size, index % size).to_bits()).collect::<Vec<_>>()
+            (0..size * size)
+                .map(|index| group.factor.entry(index / size, index % size).to_bits())
+                .collect::<Vec<_>>()
         })
         .collect()
 }
@@ -83,11 +85,13 @@ fn folds_partition_the_outputs() {
         synthetic::recording(&tree, log as u64, 5.0 + 9.0 * log as f64, 1.0, 0.1, 1).write_csv(path).unwrap();
     }
     for validate in [&paths[2..], &[]] {
-        let logs = LogSet::open(&tree, &paths[..2], validate, &ConditioningOptions::default(), &|_, _, _| ()).unwrap();
+        let logs = LogSet::open(&tree, &paths[..2], validate, &ConditioningOptions::default(), &|_, _, _| ())
+            .unwrap();
         assert_eq!(logs.splits_training_logs(), validate.is_empty());
         let folds = [logs.training_folds(), logs.held_out_folds()].concat();
         let sources = logs.sources(&|_, _, _| ());
-        let sources: Vec<&dyn BlockSource> = sources.iter().map(|source| source as &dyn BlockSource).collect();
+        let sources: Vec<&dyn BlockSource> =
+            sources.iter().map(|source| source as &dyn BlockSource).collect();
         let design = synthetic::design(&tree);
         let mut outputs = 0;
         predict(&design, &synthetic::truth(&tree, 1.0), &sources, &mut |prediction| {

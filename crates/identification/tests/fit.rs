@@ -3,7 +3,9 @@
 mod synthetic;
 
 use phiw_dynamics::Tree;
-use phiw_identification::{BlockSource, Data, Fold, Identified, InputError, IdentificationError, Variants, identify, predict};
+use phiw_identification::{
+    BlockSource, Data, Fold, IdentificationError, Identified, InputError, Variants, identify, predict,
+};
 use phiw_telemetry::{Block, Recording};
 
 const FOLDS: usize = 13;
@@ -35,10 +37,18 @@ fn standard_deviations_are_those_of_repeated_experiments() {
     const EXPERIMENTS: u64 = 40;
     let tree = synthetic::robot(2, 2);
     let fits: Vec<Identified> = (0..EXPERIMENTS)
-        .map(|seed| fit(&tree, &synthetic::blocks(&synthetic::recording(&tree, 1, 40.0, 2.0, 0.5, seed), 4096), 40.0, Vec::new()))
+        .map(|seed| {
+            fit(
+                &tree,
+                &synthetic::blocks(&synthetic::recording(&tree, 1, 40.0, 2.0, 0.5, seed), 4096),
+                40.0,
+                Vec::new(),
+            )
+        })
         .collect();
     for parameter in 0..fits[0].design.parameter_count() {
-        let mean = |value: &dyn Fn(&Identified) -> f64| fits.iter().map(value).sum::<f64>() / EXPERIMENTS as f64;
+        let mean =
+            |value: &dyn Fn(&Identified) -> f64| fits.iter().map(value).sum::<f64>() / EXPERIMENTS as f64;
         let center = mean(&|fit| fit.fit.parameters[parameter]);
         let spread = mean(&|fit| (fit.fit.parameters[parameter] - center).powi(2)).sqrt();
         let claimed = mean(&|fit| fit.fit.standard_deviations[parameter].powi(2)).sqrt();
@@ -65,7 +75,14 @@ fn resting(tree: &Tree) -> Recording {
     for row in half..log.len() {
         let own = row * joints..(row + 1) * joints;
         let [v, a] = [&log.qd, &log.qdd].map(|values| values.as_ref().unwrap()[own.clone()].to_vec());
-        tree.inverse_dynamics(&log.q[own.clone()], &v, &a, &mut phiw_dynamics::Workspace::new(tree), &mut torque).unwrap();
+        tree.inverse_dynamics(
+            &log.q[own.clone()],
+            &v,
+            &a,
+            &mut phiw_dynamics::Workspace::new(tree),
+            &mut torque,
+        )
+        .unwrap();
         for joint in 1..joints {
             log.tau[own.start + joint] = torque[joint] + 2.0 * v[joint];
         }
@@ -79,10 +96,12 @@ fn torque_at_rest_decides_nothing() {
     let blocks = synthetic::blocks(&resting(&tree), 500);
     let data = |rest_speeds| {
         let folds = synthetic::folds(40.0, 20);
-        let all: Vec<Fold> = folds.iter().copied().filter(|fold| !(fold.start..fold.end).contains(&20.0)).collect();
+        let all: Vec<Fold> =
+            folds.iter().copied().filter(|fold| !(fold.start..fold.end).contains(&20.0)).collect();
         Data { train: all.clone(), held_out: all, sources: vec![&blocks as &dyn BlockSource], rest_speeds }
     };
-    let effects = || -> Vec<Variants> { (0..3).map(|joint| vec![synthetic::Viscous::on(&tree, joint)]).collect() };
+    let effects =
+        || -> Vec<Variants> { (0..3).map(|joint| vec![synthetic::Viscous::on(&tree, joint)]).collect() };
     let misled = identify(&tree, effects(), &data(Vec::new())).unwrap();
     let fitted = identify(&tree, effects(), &data(vec![1e-3; 3])).unwrap();
     let rows = |identified: &Identified, joint: usize| -> u64 {
@@ -93,7 +112,12 @@ fn torque_at_rest_decides_nothing() {
     assert!((0.45..0.6).contains(&share), "joint 0 moves half of the time, {share} of its rows count");
     assert!(misled.train.rmse[0] > 1.0);
     // What the filter mixes across the stop is left.
-    assert!(fitted.train.rmse[0] < 0.05 * misled.train.rmse[0], "{:?} {:?}", fitted.train.rmse, misled.train.rmse);
+    assert!(
+        fitted.train.rmse[0] < 0.05 * misled.train.rmse[0],
+        "{:?} {:?}",
+        fitted.train.rmse,
+        misled.train.rmse
+    );
 
     let (mut resting, mut outputs) = (0, 0);
     predict(&fitted.design, &fitted.fit.parameters, &[&blocks], &mut |prediction| {
@@ -129,8 +153,9 @@ fn predictions_have_the_error_that_the_factors_tell() {
 #[test]
 fn too_short_a_log_is_said_to_be() {
     let tree = synthetic::robot(1, 6);
-    let blocks = synthetic::blocks(&synthetic::recording(&tree, 1, 0.6, 2.0, 0.1, 0), 500);
-    let data = synthetic::data(&blocks, synthetic::folds(0.6, 2), Vec::new());
+    let blocks = synthetic::blocks(&synthetic::recording(&tree, 1, 2.0, 2.0, 0.1, 0), 500);
+    let mut data = synthetic::data(&blocks, synthetic::folds(2.0, 20), Vec::new());
+    data.train.truncate(1);
     match identify(&tree, Vec::new(), &data) {
         Err(IdentificationError::Input(InputError::TooShort { rows, parameters, .. })) => {
             assert!(rows < 2 * parameters as u64);

@@ -13,7 +13,8 @@ fn identified(tree: &Tree) -> Identified {
 
 fn model(identified: &Identified) -> Model {
     let declared = ["viscous".to_owned()];
-    Model::of_fit(&identified.design, &identified.fit, &declared, &[("finger".to_owned(), 0.1)], (20.0, 10.0)).unwrap()
+    Model::of_fit(&identified.design, &identified.fit, &declared, &[("finger".to_owned(), 0.1)], (20.0, 10.0))
+        .unwrap()
 }
 
 #[test]
@@ -25,7 +26,9 @@ fn a_model_survives_its_file_to_the_last_bit() {
     assert_eq!(read, model);
     let (design, parameters) = read.design(&tree, &synthetic::OneKind).unwrap();
     assert_eq!(parameters, identified.fit.parameters);
-    let kinds = |design: &phiw_identification::Design| design.effects().iter().map(|effect| effect.spec()).collect::<Vec<_>>();
+    let kinds = |design: &phiw_identification::Design| {
+        design.effects().iter().map(|effect| effect.spec()).collect::<Vec<_>>()
+    };
     assert_eq!(kinds(&design), kinds(&identified.design));
     let (factor, fitted) = (read.factor.factor().unwrap(), &identified.fit.factor);
     assert_eq!(factor.rows(), fitted.rows());
@@ -43,9 +46,13 @@ fn standard_parameters_have_the_base_parameters_that_were_found() {
     let mut empty = tree.clone();
     empty.set_inertial_parameters(&vec![0.0; tree.inertial_parameters().len()]).unwrap();
     for tree in [tree, empty] {
-        let model = Model::of_fit(&synthetic::design(&tree), &identified.fit, &[], &[], (20.0, 10.0)).unwrap();
+        let model =
+            Model::of_fit(&synthetic::design(&tree), &identified.fit, &[], &[], (20.0, 10.0)).unwrap();
         let lifted = model.identified_tree(&tree).unwrap();
-        assert!(lifted.bodies().iter().all(|body| body.inertial[0] != 0.0), "URDF cannot express a body without mass");
+        assert!(
+            lifted.bodies().iter().all(|body| body.inertial[0] != 0.0),
+            "URDF cannot express a body without mass"
+        );
         let found = identified.design.base().from_standard(&lifted.inertial_parameters()).unwrap();
         for (found, fitted) in found.iter().zip(&identified.fit.parameters) {
             assert!((found - fitted).abs() < 1e-8 * (1.0 + fitted.abs()), "{found} {fitted}");

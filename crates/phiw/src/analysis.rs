@@ -50,7 +50,10 @@ impl<'a> Analysis<'a> {
     /// Joints whose held-out error exceeds the noise floor by more than its uncertainty.
     pub fn joints_above_noise(&self) -> Vec<usize> {
         let errors = self.identified.held_out.rmse.iter().zip(&self.noise_floor).enumerate();
-        errors.filter(|(_, (error, floor))| **error > NOISE_MARGIN * **floor).map(|(joint, _)| joint).collect()
+        errors
+            .filter(|(_, (error, floor))| **error > NOISE_MARGIN * **floor)
+            .map(|(joint, _)| joint)
+            .collect()
     }
 
     /// cond of the weighted regressor.
@@ -71,7 +74,9 @@ impl<'a> Analysis<'a> {
         columns.push(undetermined);
         let coefficients = factor.select(&columns)?.solve()?.parameters;
         let norm = factor.column_norm(undetermined);
-        let share = |(&column, coefficient): (&usize, &f64)| (column, coefficient * factor.column_norm(column) / norm);
+        let share = |(&column, coefficient): (&usize, &f64)| {
+            (column, coefficient * factor.column_norm(column) / norm)
+        };
         let mut shares: Vec<(usize, f64)> = columns.iter().zip(&coefficients).map(share).collect();
         shares.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
         Ok(shares)

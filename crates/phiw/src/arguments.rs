@@ -65,13 +65,13 @@ pub struct SessionArguments {
     /// Effects beside the rigid body, on every joint: viscous_friction, coulomb_friction, rotor_inertia, …
     #[arg(long, value_name = "EFFECT,…", value_delimiter = ',')]
     pub declare: Vec<String>,
-    /// Joints of the URDF that do not move, at 0 or at a value [rad, m]; they need no column in the log.
+    /// Joints of the URDF that do not move, at 0 or at a value (rad, m); they need no column in the log.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
     pub hold: Vec<(String, f64)>,
-    /// Cut-off of the low-pass over positions [Hz]; by default chosen from the logs' spectra.
+    /// Cut-off of the low-pass over positions (Hz); by default chosen from the logs' spectra.
     #[arg(long, value_name = "HZ")]
     pub cutoff_hz: Option<f64>,
-    /// Cut-off of the low-pass over the model's columns and the torque alike [Hz]; by default the motion's bandwidth.
+    /// Cut-off of the low-pass over the model's columns and the torque alike (Hz); by default the motion's bandwidth.
     #[arg(long, value_name = "HZ")]
     pub parallel_cutoff_hz: Option<f64>,
     /// Folder for the results; it is made if it is absent.
@@ -92,7 +92,8 @@ impl SessionArguments {
                 words.extend(values.iter().map(|value| quoted(value)));
             }
         };
-        let paths = |paths: &[PathBuf]| paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>();
+        let paths =
+            |paths: &[PathBuf]| paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>();
         let list = |values: Vec<String>| if values.is_empty() { values } else { vec![values.join(",")] };
         let number = |value: Option<f64>| value.iter().map(f64::to_string).collect::<Vec<_>>();
         let held = |(joint, value): &(String, f64)| match *value {
@@ -140,9 +141,23 @@ mod tests {
     #[test]
     fn the_command_line_reads_back() {
         let words = [
-            "phiw", "identify", "--urdf", "a robot.urdf", "--train", "a.csv", "b'.csv", "--validate", "c.csv",
-            "--declare", "viscous_friction,torque_offset", "--hold", "finger,torso=-0.25", "--cutoff-hz", "12.5",
-            "--out", "out",
+            "phiw",
+            "identify",
+            "--urdf",
+            "a robot.urdf",
+            "--train",
+            "a.csv",
+            "b'.csv",
+            "--validate",
+            "c.csv",
+            "--declare",
+            "viscous_friction,torque_offset",
+            "--hold",
+            "finger,torso=-0.25",
+            "--cutoff-hz",
+            "12.5",
+            "--out",
+            "out",
         ];
         let Command::Identify(read) = Arguments::try_parse_from(words).unwrap().command else {
             panic!("`identify` is read as another command");
@@ -158,7 +173,13 @@ mod tests {
     #[test]
     fn wrong_command_lines_are_refused() {
         let identify = ["phiw", "identify", "--urdf", "r.urdf", "--train", "a.csv", "--out", "o"];
-        for more in [&["--hold", "a=b"][..], &["--hold", "=1"], &["--hold", "a=inf"], &["--cutoff-hz", "x"], &["--gold"]] {
+        for more in [
+            &["--hold", "a=b"][..],
+            &["--hold", "=1"],
+            &["--hold", "a=inf"],
+            &["--cutoff-hz", "x"],
+            &["--gold"],
+        ] {
             assert!(Arguments::try_parse_from(identify.iter().chain(more)).is_err(), "{more:?}");
         }
         assert!(Arguments::try_parse_from(&identify[..6]).is_err(), "--out is required");

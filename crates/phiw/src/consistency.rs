@@ -7,10 +7,12 @@ use phiw_dynamics::InertialParameters;
 pub fn is_consistent(parameters: &InertialParameters) -> bool {
     let [m, hx, hy, hz, xx, xy, yy, xz, yz, zz] = *parameters;
     let half = 0.5 * (xx + yy + zz);
-    let mut matrix = [[half - xx, -xy, -xz, hx], [-xy, half - yy, -yz, hy], [-xz, -yz, half - zz, hz], [hx, hy, hz, m]];
+    let mut matrix =
+        [[half - xx, -xy, -xz, hx], [-xy, half - yy, -yz, hy], [-xz, -yz, half - zz, hz], [hx, hy, hz, m]];
     // Cholesky: every pivot is positive, or the matrix is not positive definite.
     for pivot in 0..4 {
-        if !(matrix[pivot][pivot] > 0.0) {
+        // Not `<= 0.0`: a pivot that is not a number is not positive either.
+        if matrix[pivot][pivot].partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
             return false;
         }
         for row in pivot + 1..4 {

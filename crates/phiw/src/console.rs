@@ -11,7 +11,8 @@ impl Console {
     /// Shows progress if standard error is a terminal and `quiet` is not asked for.
     pub fn of_terminal(quiet: bool) -> Self {
         // Standard error is not drawn on where it is no terminal.
-        let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(10) };
+        let target =
+            if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(10) };
         let bar = ProgressBar::with_draw_target(Some(0), target);
         if let Ok(style) = ProgressStyle::with_template("{msg:<40!} {wide_bar} {percent:>3} % {eta:>5}") {
             bar.set_style(style.progress_chars("━╸─"));

@@ -3,7 +3,17 @@
 use std::time::{SystemTime, UNIX_EPOCH};
 
 const MONTHS: [&str; 12] = [
-    "January", "February", "March", "April", "May", "June", "July", "August", "September", "October", "November",
+    "January",
+    "February",
+    "March",
+    "April",
+    "May",
+    "June",
+    "July",
+    "August",
+    "September",
+    "October",
+    "November",
     "December",
 ];
 
@@ -21,7 +31,12 @@ fn written(seconds: u64) -> String {
     let month = (5 * day_of_year + 2) / 153;
     let day = day_of_year - (153 * month + 2) / 5 + 1;
     let year = 400 * era + year + u64::from(month >= 10);
-    format!("{day} {} {year}, {:02}:{:02} UTC", MONTHS[((month + 2) % 12) as usize], minutes / 60, minutes % 60)
+    format!(
+        "{day} {} {year}, {:02}:{:02} UTC",
+        MONTHS[((month + 2) % 12) as usize],
+        minutes / 60,
+        minutes % 60
+    )
 }
 
 #[cfg(test)]

@@ -11,7 +11,9 @@ use crate::session::Session;
 use crate::{Error, summary};
 use phiw_identification::{Data, Identified, Model, TorqueError, identify};
 use phiw_report::ReportJson;
-use phiw_report::json::{EffectJson, JointMap, ParameterJson, RemainingJson, RivalJson, TorqueErrors, Verdict};
+use phiw_report::json::{
+    EffectJson, JointMap, ParameterJson, RemainingJson, RivalJson, TorqueErrors, Verdict,
+};
 use phiw_residual::SignalRanges;
 use phiw_residual::trace::{self, HeldModel, TraceInput, TraceOptions, Tracing, noise_floor, trace};
 use std::fmt::Write;
@@ -54,7 +56,8 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
     drop(sources);
     if arguments.model.is_some() {
         // What the held model declared is declared here too.
-        session.declared = start.model.declared.iter().filter(|kind| *kind != "rigid_body").cloned().collect();
+        session.declared =
+            start.model.declared.iter().filter(|kind| *kind != "rigid_body").cloned().collect();
     }
 
     let sources = session.logs.sources(&progress);
@@ -118,7 +121,9 @@ fn floor(session: &Session, data: &Data<'_>, model: &Model) -> Result<Vec<f64>, 
     let tree = model.identified_tree(&session.tree)?;
     let mut rotor = vec![0.0; tree.joint_count()];
     for effect in model.effects.iter().filter(|effect| effect.spec.kind == "rotor_inertia") {
-        if let (Some(joint), Some(inertia)) = (tree.joint_index(&effect.spec.joints[0]), effect.parameters.first()) {
+        if let (Some(joint), Some(inertia)) =
+            (tree.joint_index(&effect.spec.joints[0]), effect.parameters.first())
+        {
             rotor[joint] += inertia.value;
         }
     }
@@ -148,9 +153,13 @@ fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
         for (named, info) in effect.parameters.iter().zip(info) {
             // What was fitted by linearisation stands partly in the constant of the same name.
             let base = found.spec.constants.get(&named.name).copied().unwrap_or_default();
-            let value =
-                ParameterJson { value: base + named.value, std: named.std.unwrap_or(f64::NAN), unit: named.unit.clone() };
-            let of_joint: &mut indexmap::IndexMap<String, ParameterJson> = parameters.entry(info.joint).or_default();
+            let value = ParameterJson {
+                value: base + named.value,
+                std: named.std.unwrap_or(f64::NAN),
+                unit: named.unit.clone(),
+            };
+            let of_joint: &mut indexmap::IndexMap<String, ParameterJson> =
+                parameters.entry(info.joint).or_default();
             of_joint.insert(named.name.clone(), value);
         }
         EffectJson {

@@ -83,7 +83,12 @@ fn describe(tracing: &Tracing) -> String {
     for joint in &remaining.joints {
         let best = remaining.depends_on.iter().find(|dependence| &dependence.joint == joint);
         if let Some(best) = best {
-            follows.push(format!("{} follows {} ({} % of its variance)", joint, signal_in_words(&best.signal), percent(best.share)));
+            follows.push(format!(
+                "{} follows {} ({} % of its variance)",
+                joint,
+                signal_in_words(&best.signal),
+                percent(best.share)
+            ));
         }
     }
     if follows.is_empty() {
@@ -118,8 +123,12 @@ fn place(tracing: &Tracing, index: usize) -> usize {
 fn sentence_of(tracing: &Tracing, index: usize) -> String {
     let place = place(tracing, index);
     let effect = &tracing.model.design.effects()[place];
-    let fitted: Vec<f64> =
-        tracing.model.design.effect_parameters(place).map(|parameter| tracing.model.fit.parameters[parameter]).collect();
+    let fitted: Vec<f64> = tracing
+        .model
+        .design
+        .effect_parameters(place)
+        .map(|parameter| tracing.model.fit.parameters[parameter])
+        .collect();
     sentence(&effect.spec(), &effect.parameters(), &fitted)
 }
 
@@ -133,13 +142,16 @@ fn section(
     let place = place(tracing, index);
     let info = analysis.identified.design.effects()[place].parameters();
     let named = &analysis.model.effects[place].parameters;
-    let parameter = |(named, info): (&phiw_identification::NamedParameter, phiw_identification::EffectParameter)| EffectParameter {
-        joint: info.joint,
-        name: named.name.clone(),
-        value: found.spec.constants.get(&named.name).copied().unwrap_or_default() + named.value,
-        std: named.std.unwrap_or(f64::NAN),
-        unit: named.unit.clone(),
-    };
+    let parameter =
+        |(named, info): (&phiw_identification::NamedParameter, phiw_identification::EffectParameter)| {
+            EffectParameter {
+                joint: info.joint,
+                name: named.name.clone(),
+                value: found.spec.constants.get(&named.name).copied().unwrap_or_default() + named.value,
+                std: named.std.unwrap_or(f64::NAN),
+                unit: named.unit.clone(),
+            }
+        };
     let telling = |kind: &str| {
         let kind = analysis.session.catalogue.kind(kind);
         kind.map(|kind| kind.telling_motion().to_owned()).unwrap_or_default()
@@ -294,15 +306,19 @@ impl Scatters {
             before: Line { x: &before.x, y: &before.y },
             after: Line { x: &after.x, y: &after.y },
         });
-        vec![Picture { caption: "Residual of the declared model and of the final one; the line is the median.".to_owned(), svg }]
+        vec![Picture {
+            caption: "Residual of the declared model and of the final one; the line is the median."
+                .to_owned(),
+            svg,
+        }]
     }
 }
 
 /// The signal that an effect's torque is best seen against.
 fn signal_of(kind: &str) -> Signal {
     match kind {
-        "joint_spring" | "gravity_balancer" | "torque_ripple" | "end_stop" | "encoder_offset" | "payload" | "gravity_tilt"
-        | "external_force" | "torque_offset" => Signal::Position,
+        "joint_spring" | "gravity_balancer" | "torque_ripple" | "end_stop" | "encoder_offset" | "payload"
+        | "gravity_tilt" | "external_force" | "torque_offset" => Signal::Position,
         "rotor_inertia" | "joint_elasticity" => Signal::Acceleration,
         "torque_gain" | "actuator_saturation" | "load_dependent_friction" => Signal::Torque,
         "thermal_drift" => Signal::Time,

@@ -40,7 +40,8 @@ pub fn identify(arguments: &SessionArguments, console: &Console) -> Result<Outco
     console.finish();
 
     let report = report_json(&analysis);
-    let files = outputs(&analysis, &report, page::page(&analysis, arguments.command_line("identify")).render())?;
+    let files =
+        outputs(&analysis, &report, page::page(&analysis, arguments.command_line("identify")).render())?;
     write_folder(&arguments.out, &files)?;
     Ok(Outcome {
         summary: summary::summary(&analysis, &arguments.out, &files),

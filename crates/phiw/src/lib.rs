@@ -2,14 +2,14 @@
 
 pub mod analysis;
 pub mod arguments;
-pub mod console;
 mod consistency;
+pub mod console;
 mod date;
 mod error;
 pub mod explain;
 mod explain_page;
-pub mod identify;
 pub mod identified_urdf;
+pub mod identify;
 mod not_identified;
 pub mod output;
 pub mod page;

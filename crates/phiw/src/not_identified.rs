@@ -11,8 +11,13 @@ const NAMED: usize = 3;
 
 /// A line for each thing that the logs cannot tell.
 pub fn lines(analysis: &Analysis<'_>) -> Vec<String> {
-    let mut lines: Vec<String> =
-        analysis.identified.fit.undetermined.iter().map(|&parameter| undetermined(analysis, parameter)).collect();
+    let mut lines: Vec<String> = analysis
+        .identified
+        .fit
+        .undetermined
+        .iter()
+        .map(|&parameter| undetermined(analysis, parameter))
+        .collect();
     lines.extend(poor(analysis));
     lines.extend(unfelt(analysis));
     lines
@@ -28,8 +33,13 @@ fn undetermined(analysis: &Analysis<'_>, parameter: usize) -> String {
     if alike.is_empty() {
         return format!("{name}: the training motion does not excite it");
     }
-    let named: Vec<String> = alike.iter().take(NAMED).map(|&column| parameters::name(analysis, column)).collect();
-    let more = if alike.len() > NAMED { format!(" and {} more together", alike.len() - NAMED) } else { String::new() };
+    let named: Vec<String> =
+        alike.iter().take(NAMED).map(|&column| parameters::name(analysis, column)).collect();
+    let more = if alike.len() > NAMED {
+        format!(" and {} more together", alike.len() - NAMED)
+    } else {
+        String::new()
+    };
     let rigid = alike.iter().all(|&column| column < base);
     let from = if rigid { "the rigid body" } else { "them" };
     format!("{name} acts like {}{more}: not separable from {from}, which takes its part", named.join(", "))
@@ -39,8 +49,12 @@ fn undetermined(analysis: &Analysis<'_>, parameter: usize) -> String {
 fn poor(analysis: &Analysis<'_>) -> Option<String> {
     let fit = &analysis.identified.fit;
     let is_poor = |&parameter: &usize| fit.standard_deviations[parameter] > fit.parameters[parameter].abs();
-    let poor: Vec<String> =
-        fit.determined().into_iter().filter(is_poor).map(|parameter| parameters::name(analysis, parameter)).collect();
+    let poor: Vec<String> = fit
+        .determined()
+        .into_iter()
+        .filter(is_poor)
+        .map(|parameter| parameters::name(analysis, parameter))
+        .collect();
     (!poor.is_empty()).then(|| {
         format!(
             "{} of {} parameters have a standard deviation above their value: {}",
@@ -57,7 +71,8 @@ fn unfelt(analysis: &Analysis<'_>) -> Vec<String> {
     let unfelt = design.base().unidentifiable();
     let of_body = |(body, joint): (usize, &phiw_dynamics::Body)| {
         let own = unfelt.iter().filter(|&&parameter| parameter / PARAMETERS_PER_BODY == body);
-        let names: Vec<&str> = own.map(|parameter| PARAMETER_NAMES[parameter % PARAMETERS_PER_BODY]).collect();
+        let names: Vec<&str> =
+            own.map(|parameter| PARAMETER_NAMES[parameter % PARAMETERS_PER_BODY]).collect();
         (!names.is_empty()).then(|| format!("{}: no torque feels {}", joint.joint, names.join(", ")))
     };
     design.tree().bodies().iter().enumerate().filter_map(of_body).collect()

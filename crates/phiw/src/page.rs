@@ -24,7 +24,9 @@ pub fn page(analysis: &Analysis<'_>, command_line: String) -> IdentificationPage
         verdict: None,
         warnings: analysis.warnings.clone(),
         errors: errors(analysis),
-        joints: (0..analysis.session.tree.joint_count()).map(|joint| joint_section(analysis, joint)).collect(),
+        joints: (0..analysis.session.tree.joint_count())
+            .map(|joint| joint_section(analysis, joint))
+            .collect(),
         conditioning: Conditioning { entries: conditioning_entries(analysis), pictures: spectra(analysis) },
         parameters: parameters::parameters(analysis),
         base_parameters: parameters::base_parameters(analysis),
@@ -62,7 +64,8 @@ fn headline(analysis: &Analysis<'_>) -> Vec<String> {
             declared_in_words(analysis)
         ),
         format!(
-            "{base} base parameters and {} of effects from {} s of {} joints in {}.",
+            "{} and {} of effects from {} s of {} joints in {}.",
+            counted(base, "base parameter"),
             identified.design.parameter_count() - base,
             significant(seconds, 3),
             joints.len(),
@@ -127,7 +130,7 @@ pub fn errors_note(analysis: &Analysis<'_>) -> String {
     let held_out = if analysis.session.logs.splits_training_logs() {
         format!(
             "Held out: the last {} % of each training log, since no log was given to validate on.",
-            percent(HELD_OUT_SHARE)
+            100.0 * HELD_OUT_SHARE
         )
     } else {
         "Held out: the logs given to validate on.".to_owned()
@@ -142,7 +145,8 @@ pub fn errors_note(analysis: &Analysis<'_>) -> String {
 fn joint_section(analysis: &Analysis<'_>, joint: usize) -> JointSection {
     let session = analysis.session;
     let unit = session.torque_unit(joint);
-    let traces = |role| analysis.traces.of_joint(role, joint, |log| file_name(&session.logs.surveys()[log].path));
+    let traces =
+        |role| analysis.traces.of_joint(role, joint, |log| file_name(&session.logs.surveys()[log].path));
     JointSection {
         joint: session.tree.joint(joint).joint.clone(),
         unit: unit.into(),
@@ -174,7 +178,10 @@ pub fn conditioning_entries(analysis: &Analysis<'_>) -> Vec<(String, String)> {
         )
     };
     let zero_phase = "zero-phase windowed sinc, −6 dB at";
-    entry("Low-pass of positions", format!("{zero_phase} {} Hz ({origin})", significant(conditioning.cutoff_hz, 3)));
+    entry(
+        "Low-pass of positions",
+        format!("{zero_phase} {} Hz ({origin})", significant(conditioning.cutoff_hz, 3)),
+    );
     let parallel = significant(conditioning.parallel_cutoff_hz, 3);
     entry("Low-pass of columns and torque", format!("{zero_phase} {parallel} Hz, the same over both"));
     for survey in session.logs.surveys() {
@@ -192,18 +199,21 @@ pub fn conditioning_entries(analysis: &Analysis<'_>) -> Vec<(String, String)> {
     let rests = if rests.is_empty() { "none".to_owned() } else { rests.join(", ") };
     entry(
         "Rest",
-        format!("rows where a joint is slower than 1 % of its RMS speed in half of the filter's window do not count for its torque: {rests}"),
+        format!(
+            "rows where a joint is slower than 1 % of its RMS speed in half of the filter's window do not count for its torque: {rests}"
+        ),
     );
     entries
 }
 
 fn log_conditioning(survey: &Survey, plan: &LogPlan) -> String {
-    let derivatives = match (plan.measured_velocity.contains(&true), plan.measured_acceleration.contains(&true)) {
-        (false, false) => "velocities and accelerations differentiated from positions",
-        (true, false) => "velocities measured, accelerations differentiated",
-        (false, true) => "accelerations measured, velocities differentiated",
-        (true, true) => "velocities and accelerations measured",
-    };
+    let derivatives =
+        match (plan.measured_velocity.contains(&true), plan.measured_acceleration.contains(&true)) {
+            (false, false) => "velocities and accelerations differentiated from positions",
+            (true, false) => "velocities measured, accelerations differentiated",
+            (false, true) => "accelerations measured, velocities differentiated",
+            (true, true) => "velocities and accelerations measured",
+        };
     format!("{plan}; jitter {} %; {derivatives}", percent(survey.jitter))
 }
 
@@ -216,8 +226,12 @@ fn spectra(analysis: &Analysis<'_>) -> Vec<Picture> {
     }
     let bins = found.torque[0].len();
     let frequency: Vec<f64> = (1..bins).map(|bin| bin as f64 * found.resolution_hz).collect();
-    let amplitudes: Vec<Vec<f64>> =
-        found.torque.iter().take(SPECTRA).map(|density| density[1..].iter().map(|power| power.sqrt()).collect()).collect();
+    let amplitudes: Vec<Vec<f64>> = found
+        .torque
+        .iter()
+        .take(SPECTRA)
+        .map(|density| density[1..].iter().map(|power| power.sqrt()).collect())
+        .collect();
     let joints = analysis.joints();
     let lines: Vec<SpectrumLine<'_>> = joints
         .iter()
@@ -225,11 +239,18 @@ fn spectra(analysis: &Analysis<'_>) -> Vec<Picture> {
         .map(|(name, y)| SpectrumLine { name, line: Line { x: &frequency, y } })
         .collect();
     let cut_off = Some(analysis.session.logs.conditioning().parallel_cutoff_hz);
-    let svg = spectrum(&Spectrum { lines: &lines, y_label: "torque [N·m/√Hz]", cut_off });
-    let caption = format!("Torque in {} before the filter, whose cut-off is the upright line.", file_name(&survey.path));
+    let units: Vec<&str> = (0..lines.len()).map(|joint| analysis.session.torque_unit(joint)).collect();
+    let unit = if units.iter().all(|unit| *unit == units[0]) { units[0] } else { "N·m or N" };
+    let y_label = &format!("torque [{unit}/√Hz]");
+    let svg = spectrum(&Spectrum { lines: &lines, y_label, cut_off });
+    let caption = format!(
+        "Torque in {} before the filter, whose cut-off is the upright line.",
+        file_name(&survey.path)
+    );
     vec![Picture { caption, svg }]
 }
 
-fn counted(count: usize, thing: &str) -> String {
+/// `1 log`, `2 logs`.
+pub(crate) fn counted(count: usize, thing: &str) -> String {
     if count == 1 { format!("1 {thing}") } else { format!("{count} {thing}s") }
 }

@@ -5,7 +5,9 @@ use crate::page::conditioning_entries;
 use crate::traces::Role;
 use phiw_identification::TorqueError;
 use phiw_report::ReportJson;
-use phiw_report::json::{JointMap, ProgramJson, RelativeErrors, RemainingJson, SCHEMA, TorqueErrors, Verdict};
+use phiw_report::json::{
+    JointMap, ProgramJson, RelativeErrors, RemainingJson, SCHEMA, TorqueErrors, Verdict,
+};
 
 /// The report of a model to which nothing was added: after is before.
 ///
@@ -13,7 +15,8 @@ use phiw_report::json::{JointMap, ProgramJson, RelativeErrors, RemainingJson, SC
 pub fn report_json(analysis: &Analysis<'_>) -> ReportJson {
     let joints = analysis.joints();
     let errors = errors(analysis);
-    let above: Vec<String> = analysis.joints_above_noise().into_iter().map(|joint| joints[joint].clone()).collect();
+    let above: Vec<String> =
+        analysis.joints_above_noise().into_iter().map(|joint| joints[joint].clone()).collect();
     ReportJson {
         schema: SCHEMA,
         robot: analysis.session.tree.name().to_owned(),

@@ -73,7 +73,8 @@ impl Session {
 /// Each declared kind once, if all are known.
 fn declared(names: &[String], catalogue: &Catalogue) -> Result<Vec<String>, EffectError> {
     let mut declared: Vec<String> = Vec::new();
-    for name in names.iter().map(|name| name.trim()).filter(|name| !name.is_empty() && *name != "rigid_body") {
+    for name in names.iter().map(|name| name.trim()).filter(|name| !name.is_empty() && *name != "rigid_body")
+    {
         if catalogue.kind(name)?.declared_constants().is_none() {
             return Err(EffectError::NotDeclarable { kind: name.to_owned() });
         }
@@ -86,9 +87,11 @@ fn declared(names: &[String], catalogue: &Catalogue) -> Result<Vec<String>, Effe
 
 fn read_robot(arguments: &SessionArguments) -> Result<(Tree, String, Vec<Finding>), Error> {
     let path = || arguments.urdf.clone();
-    let xml = std::fs::read_to_string(&arguments.urdf).map_err(|source| Error::Unreadable { path: path(), source })?;
+    let xml = std::fs::read_to_string(&arguments.urdf)
+        .map_err(|source| Error::Unreadable { path: path(), source })?;
     let options = UrdfOptions { held: arguments.hold.clone(), ..UrdfOptions::default() };
-    let reading = read_urdf(&xml, &options).map_err(|source| Error::Urdf { path: path(), source: Box::new(source) })?;
+    let reading =
+        read_urdf(&xml, &options).map_err(|source| Error::Urdf { path: path(), source: Box::new(source) })?;
     if reading.tree.is_floating() {
         return Err(Error::FloatingBase { path: path() });
     }

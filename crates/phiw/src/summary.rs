@@ -3,7 +3,7 @@
 use crate::analysis::Analysis;
 use crate::identified_urdf::not_expressed;
 use crate::output::OutputFile;
-use crate::page::declared_in_words;
+use crate::page::{counted, declared_in_words};
 use crate::traces::Role;
 use phiw_identification::HELD_OUT_SHARE;
 use phiw_report::number::{percent, significant};
@@ -45,7 +45,7 @@ fn errors(analysis: &Analysis<'_>, text: &mut String) -> std::fmt::Result {
         percent(analysis.traces.relative_with_rests(Role::HeldOut))
     )?;
     if analysis.session.logs.splits_training_logs() {
-        let share = percent(HELD_OUT_SHARE);
+        let share = 100.0 * HELD_OUT_SHARE;
         writeln!(text, "held out is the last {share} % of each training log, since no --validate was given")?;
     }
     Ok(())
@@ -64,8 +64,15 @@ fn effects(analysis: &Analysis<'_>, text: &mut String) -> std::fmt::Result {
                 true => "not separable".to_owned(),
                 false => significant(named.value, 4),
             };
-            let std = named.std.map_or(String::new(), |std| format!("± {} {}", significant(std, 2), named.unit));
-            rows.push([effect.spec.kind.clone(), effect.spec.joints.join(", "), named.name.clone(), value, std]);
+            let std =
+                named.std.map_or(String::new(), |std| format!("± {} {}", significant(std, 2), named.unit));
+            rows.push([
+                effect.spec.kind.clone(),
+                effect.spec.joints.join(", "),
+                named.name.clone(),
+                value,
+                std,
+            ]);
         }
     }
     writeln!(text)?;
@@ -73,9 +80,19 @@ fn effects(analysis: &Analysis<'_>, text: &mut String) -> std::fmt::Result {
     write_table(text, &rows, 3)
 }
 
-fn closing(analysis: &Analysis<'_>, folder: &Path, files: &[OutputFile], text: &mut String) -> std::fmt::Result {
+fn closing(
+    analysis: &Analysis<'_>,
+    folder: &Path,
+    files: &[OutputFile],
+    text: &mut String,
+) -> std::fmt::Result {
     let base = analysis.identified.design.base().count();
-    writeln!(text, "\n{base} base parameters, cond {}", significant(analysis.condition_number(), 3))?;
+    writeln!(
+        text,
+        "\n{}, cond {}",
+        counted(base, "base parameter"),
+        significant(analysis.condition_number(), 3)
+    )?;
     let not_expressed = not_expressed(analysis);
     if !not_expressed.is_empty() {
         writeln!(text, "identified.urdf cannot express {}: model.json has all", not_expressed.join(", "))?;

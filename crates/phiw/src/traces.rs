@@ -56,7 +56,8 @@ impl Traces {
         let mut traces = Traces { parts: Vec::new(), train: sums.clone(), held_out: sums };
         let [train, held_out] = folds;
         predict(design, parameters, sources, &mut |prediction| {
-            let within = |folds: &[Fold]| folds.iter().any(|fold| fold.contains(prediction.log, prediction.t));
+            let within =
+                |folds: &[Fold]| folds.iter().any(|fold| fold.contains(prediction.log, prediction.t));
             if within(train) {
                 traces.push(Role::Train, prediction);
             } else if within(held_out) {

@@ -36,10 +36,17 @@ pub fn file_name(path: &Path) -> String {
 }
 
 fn twice_in_training(training: &[Survey]) -> Vec<String> {
-    let pairs = training.iter().enumerate().flat_map(|(index, a)| training[index + 1..].iter().map(move |b| (a, b)));
+    let pairs =
+        training.iter().enumerate().flat_map(|(index, a)| training[index + 1..].iter().map(move |b| (a, b)));
     let same = pairs.filter(|(a, b)| a.content_hash == b.content_hash);
-    same.map(|(a, b)| format!("{} and {} have the same content: its samples count twice", a.path.display(), b.path.display()))
-        .collect()
+    same.map(|(a, b)| {
+        format!(
+            "{} and {} have the same content: its samples count twice",
+            a.path.display(),
+            b.path.display()
+        )
+    })
+    .collect()
 }
 
 /// Skipped rows, jumps, short stretches, unknown columns.
@@ -49,14 +56,21 @@ fn of_log(survey: &Survey) -> Vec<String> {
         let (count, line) = (gap.count, gap.first_line);
         let rows = if count == 1 { "row" } else { "rows" };
         match gap.reason {
-            GapReason::TimeJump if count == 1 => format!("{name}: time jumps at line {line}; the log is split there"),
-            GapReason::TimeJump => format!("{name}: time jumps {count} times, first at line {line}; the log is split there"),
-            reason => format!("{name}: {count} {rows} skipped ({reason}), first at line {line}; the log is split there"),
+            GapReason::TimeJump if count == 1 => {
+                format!("{name}: time jumps at line {line}; the log is split there")
+            }
+            GapReason::TimeJump => {
+                format!("{name}: time jumps {count} times, first at line {line}; the log is split there")
+            }
+            reason => format!(
+                "{name}: {count} {rows} skipped ({reason}), first at line {line}; the log is split there"
+            ),
         }
     };
     let mut warnings: Vec<String> = survey.gaps.iter().map(gap).collect();
     if survey.short_segments > 0 {
-        warnings.push(format!("{name}: {} stretches between gaps are too short to use", survey.short_segments));
+        warnings
+            .push(format!("{name}: {} stretches between gaps are too short to use", survey.short_segments));
     }
     if !survey.ignored_columns.is_empty() {
         let quoted: Vec<String> = survey.ignored_columns.iter().map(|column| format!("`{column}`")).collect();

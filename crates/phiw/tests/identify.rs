@@ -87,7 +87,10 @@ fn the_truth_is_found_within_its_standard_deviations() {
     }
     for (effect, truth) in model.effects.iter().zip(synthetic::VISCOUS) {
         let fv = &effect.parameters[0];
-        assert!((fv.value - truth).abs() < 5.0 * fv.std.unwrap() && fv.std.unwrap() < 0.01 * truth, "{fv:?}, in truth {truth}");
+        assert!(
+            (fv.value - truth).abs() < 5.0 * fv.std.unwrap() && fv.std.unwrap() < 0.01 * truth,
+            "{fv:?}, in truth {truth}"
+        );
     }
 }
 
@@ -157,11 +160,22 @@ fn assert_same_torques(tree: &Tree, parameters: &[f64]) {
         regressor.compute(tree, &state.q, &state.v, &state.a, &mut regressor.scratch(), &mut pairs).unwrap();
         regressor.scatter(&pairs, &mut phi).unwrap();
         for (torque, row) in torque.iter().zip(phi.chunks_exact(regressor.columns())) {
-            let terms = base.independent().iter().zip(parameters).map(|(&column, parameter)| row[column] * parameter);
+            let terms =
+                base.independent().iter().zip(parameters).map(|(&column, parameter)| row[column] * parameter);
             let of_model: f64 = terms.sum();
             assert!((torque - of_model).abs() < 1e-6 * (1.0 + torque.abs()), "{torque} or {of_model}");
         }
     }
+}
+
+/// The rotor of the first joint turns with the first link: their sum is all that a torque feels.
+#[test]
+fn what_cannot_be_separated_is_said_with_what_it_acts_like() {
+    let identification = Identification::new(&["viscous_friction", "rotor_inertia"], unspoiled);
+    let page = identification.text("report.html");
+    assert!(page.contains("joint_1.Ia acts like joint_1.Izz: not separable from the rigid body"));
+    assert!(page.contains("joint_1: no torque feels m, mcx, mcy, mcz, Ixx, Ixy, Iyy, Ixz, Iyz"));
+    assert!(identification.outcome.summary.contains("rotor_inertia     joint_1  Ia  not separable"));
 }
 
 #[test]
@@ -170,18 +184,26 @@ fn results_are_replaced_and_nothing_else_is_left() {
     identify(&identification.arguments, &Console::silent()).unwrap();
     let names = |folder: &Path| -> Vec<String> {
         let entries = folder.read_dir().unwrap();
-        let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
         names.sort();
         names
     };
-    assert_eq!(names(&identification.arguments.out), ["identified.urdf", "model.json", "report.html", "report.json"]);
+    assert_eq!(
+        names(&identification.arguments.out),
+        ["identified.urdf", "model.json", "report.html", "report.json"]
+    );
 }
 
 #[test]
 fn a_held_joint_needs_no_column() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    std::fs::write(path("robot.urdf"), synthetic::URDF.replace("name=\"flange\" type=\"fixed\"", "name=\"finger\" type=\"continuous\"")).unwrap();
+    std::fs::write(
+        path("robot.urdf"),
+        synthetic::URDF.replace("name=\"flange\" type=\"fixed\"", "name=\"finger\" type=\"continuous\""),
+    )
+    .unwrap();
     synthetic::recording(1, 30.0).write_csv(&path("train.csv")).unwrap();
     let arguments = SessionArguments {
         urdf: path("robot.urdf"),

@@ -16,8 +16,18 @@ fn check(train: &str, validate: &str, warnings: &[&str]) {
         .unwrap()
         .arg("identify")
         .args([path("--urdf").file_name().unwrap(), path("robot.urdf").as_os_str()])
-        .args(["--declare".as_ref(), "rigid_body,viscous_friction".as_ref(), "--train".as_ref(), path("train.csv").as_os_str()])
-        .args(["--validate".as_ref(), path("validate.csv").as_os_str(), "--out".as_ref(), path("out").as_os_str()])
+        .args([
+            "--declare".as_ref(),
+            "rigid_body,viscous_friction".as_ref(),
+            "--train".as_ref(),
+            path("train.csv").as_os_str(),
+        ])
+        .args([
+            "--validate".as_ref(),
+            path("validate.csv").as_os_str(),
+            "--out".as_ref(),
+            path("out").as_os_str(),
+        ])
         .output()
         .unwrap();
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -59,7 +69,12 @@ fn rows_that_cannot_be_used_are_skipped_counted_and_reported() {
 #[test]
 fn jumps_in_time_split_the_log() {
     let lines: Vec<String> = log(1).lines().map(str::to_owned).collect();
-    let train: String = lines.iter().enumerate().filter(|(row, _)| !(1000..1050).contains(row)).map(|(_, line)| format!("{line}\n")).collect();
+    let train: String = lines
+        .iter()
+        .enumerate()
+        .filter(|(row, _)| !(1000..1050).contains(row))
+        .map(|(_, line)| format!("{line}\n"))
+        .collect();
     check(&train, &log(2), &["train.csv: time jumps at line 1001; the log is split there"]);
 }
 
@@ -70,7 +85,9 @@ fn training_on_the_validation_log_is_told() {
 
 #[test]
 fn unknown_columns_are_told() {
-    let extra = |(row, line): (usize, &str)| format!("{line},{}\n", if row == 0 { "battery voltage" } else { "24.1" });
+    let extra = |(row, line): (usize, &str)| {
+        format!("{line},{}\n", if row == 0 { "battery voltage" } else { "24.1" })
+    };
     let train: String = log(1).lines().enumerate().map(extra).collect();
     check(&train, &log(2), &["train.csv: unknown column is ignored: `battery voltage`"]);
 }

@@ -46,7 +46,8 @@ impl Scene {
     /// The training log with one line (counted from 1) changed.
     fn line(&mut self, number: usize, change: impl Fn(&str) -> String) {
         let lines = self.train.lines().enumerate();
-        let lines = lines.map(|(index, line)| if index + 1 == number { change(line) } else { line.to_owned() });
+        let lines =
+            lines.map(|(index, line)| if index + 1 == number { change(line) } else { line.to_owned() });
         self.train = lines.map(|line| line + "\n").collect();
     }
 
@@ -95,7 +96,8 @@ fn files_that_are_not_there_or_not_what_they_should_be() {
 
 #[test]
 fn robots_that_cannot_be_identified() {
-    let floating = |urdf: &str| urdf.replace("name=\"joint_1\" type=\"revolute\"", "name=\"joint_1\" type=\"floating\"");
+    let floating =
+        |urdf: &str| urdf.replace("name=\"joint_1\" type=\"revolute\"", "name=\"joint_1\" type=\"floating\"");
     check(|scene| scene.urdf = floating(&scene.urdf), &["robot.urdf: the robot's base floats", "fixed"]);
     let fixed = |urdf: &str| urdf.replace("\"revolute\"", "\"fixed\"");
     check(|scene| scene.urdf = fixed(&scene.urdf), &["robot.urdf: no joint of the URDF moves"]);
@@ -127,8 +129,14 @@ fn rows_that_cannot_be_read() {
         |scene| scene.line(11, cell(2, "abc")),
         &["train.csv, line 11, column `q.joint_2`: `abc` is not a number", "leave the cell empty"],
     );
-    check(|scene| scene.line(11, cell(0, "0.001")), &["line 11, column `t`: time runs backwards", "sort the rows"]);
-    check(|scene| scene.line(11, |line| format!("{line},1")), &["train.csv, line 11: 8 cells, but the header has 7"]);
+    check(
+        |scene| scene.line(11, cell(0, "0.001")),
+        &["line 11, column `t`: time runs backwards", "sort the rows"],
+    );
+    check(
+        |scene| scene.line(11, |line| format!("{line},1")),
+        &["train.csv, line 11: 8 cells, but the header has 7"],
+    );
     check(|scene| scene.record(|log| log.q.fill(f64::NAN)), &["train.csv: no usable row"]);
 }
 
@@ -172,7 +180,10 @@ fn options_that_make_no_sense() {
         &["there is no effect `viscous_frction`", "did you mean `viscous_friction`"],
     );
     check(|scene| scene.more("--declare payload"), &["`payload` cannot be declared for all joints at once"]);
-    check(|scene| scene.more("--cutoff-hz 90"), &["train.csv: a cut-off of 90 Hz does not fit a sample rate of 200.0 Hz", "up to 70.0 Hz"]);
+    check(
+        |scene| scene.more("--cutoff-hz 90"),
+        &["train.csv: a cut-off of 90 Hz does not fit a sample rate of 200.0 Hz", "up to 70.0 Hz"],
+    );
     check(|scene| scene.more("--parallel-cutoff-hz 0"), &["a cut-off of 0 Hz", "choose one above 0"]);
     check(|scene| scene.more("--hold joint_1=left"), &["`left` is not a position"]);
     check(|scene| scene.more("--tarin other.csv"), &["unexpected argument '--tarin'", "--train"]);

@@ -76,7 +76,9 @@ proptest! {
     #[test]
     fn base_parameters_say_all_that_standard_ones_say((tree, state, _) in trees()) {
         let base = BaseParameters::of_tree(&tree, BaseParametersOptions::default()).unwrap();
-        prop_assert!(base.rank_gap() > 1e3, "rank gap {}", base.rank_gap());
+        // Joints that follow one coordinate at different ratios are analytic functions of it, whose independence fades
+        // without a gap.
+        prop_assert!(tree.has_mimic() || base.rank_gap() > 1e3, "rank gap {}", base.rank_gap());
         let standard = tree.inertial_parameters();
         let parameters = base.from_standard(&standard).unwrap();
         let phi = dense_regressor(&tree, &state);

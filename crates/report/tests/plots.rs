@@ -39,7 +39,10 @@ fn pictures(x: &[f64], y: &[f64]) -> Vec<(&'static str, Svg)> {
     let spectra = [SpectrumLine { name, line }];
     let mut all = vec![
         ("torque", torque_panel(&TorquePanel { measured: line, predicted: line, unit: name })),
-        ("residual", residual_panel(&ResidualPanel { residual: line, torque: line, noise_floor: floor, unit: name })),
+        (
+            "residual",
+            residual_panel(&ResidualPanel { residual: line, torque: line, noise_floor: floor, unit: name }),
+        ),
         ("bars", joint_bars(&JointBars { groups: &groups, label: name })),
         ("spectrum", spectrum(&Spectrum { lines: &spectra, y_label: name, cut_off: floor })),
     ];
@@ -95,7 +98,8 @@ fn a_line_breaks_at_a_gap() {
     let subpaths = |y: &[f64]| {
         let line = Line { x: &[0.0, 1.0, 2.0, 3.0, 4.0], y };
         let svg =
-            residual_panel(&ResidualPanel { residual: line, torque: line, noise_floor: None, unit: "N·m" }).to_string();
+            residual_panel(&ResidualPanel { residual: line, torque: line, noise_floor: None, unit: "N·m" })
+                .to_string();
         let path = svg.lines().rfind(|line| line.starts_with("<path")).unwrap().to_string();
         path.matches('M').count()
     };

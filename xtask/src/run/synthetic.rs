@@ -116,7 +116,11 @@ impl Joint {
     fn motion(&self, random: &mut ChaCha8Rng) -> Sines {
         let mut sines: Sines = std::array::from_fn(|harmonic| {
             let frequency = FREQUENCY * ((harmonic + 1) as f64 + random.random_range(-0.3..0.3));
-            [random.random_range(0.3..1.0) / (harmonic + 1) as f64, TAU * frequency, random.random_range(0.0..TAU)]
+            [
+                random.random_range(0.3..1.0) / (harmonic + 1) as f64,
+                TAU * frequency,
+                random.random_range(0.0..TAU),
+            ]
         });
         let way: f64 = sines.iter().map(|[amplitude, ..]| amplitude).sum();
         let speed: f64 = sines.iter().map(|[amplitude, omega, _]| amplitude * omega).sum();

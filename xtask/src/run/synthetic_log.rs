@@ -38,7 +38,13 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let (tree, urdf) = robot(arguments)?;
     let bar = indicatif::ProgressBar::new(arguments.rows);
     let mut progress = |row| bar.set_position(row);
-    Plant::new(tree).write_log(&arguments.out, arguments.seed, arguments.rows, arguments.rate, &mut progress)?;
+    Plant::new(tree).write_log(
+        &arguments.out,
+        arguments.seed,
+        arguments.rows,
+        arguments.rate,
+        &mut progress,
+    )?;
     bar.finish_and_clear();
     println!("{}, of the robot {}", arguments.out.display(), urdf.display());
     Ok(ExitCode::SUCCESS)
@@ -49,7 +55,10 @@ fn robot(arguments: &Arguments) -> anyhow::Result<(Tree, PathBuf)> {
     if arguments.joints == 18 {
         return Ok((read_urdf_file(&model, &UrdfOptions::default())?.tree, model));
     }
-    let xml = random_urdf(arguments.seed, &RandomTreeOptions { joints: arguments.joints, ..RandomTreeOptions::default() });
+    let xml = random_urdf(
+        arguments.seed,
+        &RandomTreeOptions { joints: arguments.joints, ..RandomTreeOptions::default() },
+    );
     let path = arguments.out.with_extension("urdf");
     std::fs::write(&path, &xml)?;
     Ok((read_urdf(&xml, &UrdfOptions::default())?.tree, path))

@@ -6,8 +6,8 @@
 use phiw_dynamics::random_tree::{RandomNumbers, RandomTreeOptions, random_tree};
 use phiw_dynamics::{Tree, Workspace};
 use phiw_identification::{
-    BlockSource, Data, Design, Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Entry, Evaluator,
-    Fold, Sample,
+    BlockSource, Data, Design, Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Entry,
+    Evaluator, Fold, Sample,
 };
 use phiw_regressor::BaseParameters;
 use phiw_telemetry::{Block, Conditioning, ConditioningOptions, Recording};
@@ -88,7 +88,11 @@ pub fn recording(tree: &Tree, motion: u64, seconds: f64, viscous: f64, noise: f6
     let joints = tree.joint_count();
     let mut sines = || -> [[f64; 3]; 4] {
         std::array::from_fn(|k| {
-            [motion.uniform(0.1, 0.4), TAU * (0.15 * (k + 1) as f64 + motion.uniform(0.0, 0.1)), motion.uniform(0.0, TAU)]
+            [
+                motion.uniform(0.1, 0.4),
+                TAU * (0.15 * (k + 1) as f64 + motion.uniform(0.0, 0.1)),
+                motion.uniform(0.0, TAU),
+            ]
         })
     };
     let sines: Vec<_> = (0..joints).map(|_| sines()).collect();

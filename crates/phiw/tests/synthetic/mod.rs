@@ -48,7 +48,8 @@ pub fn recording(seed: u64, seconds: f64) -> Recording {
             })
         })
         .collect();
-    let mut recording = Recording { joints: tree.joint_names().map(str::to_owned).collect(), ..Recording::default() };
+    let mut recording =
+        Recording { joints: tree.joint_names().map(str::to_owned).collect(), ..Recording::default() };
     let mut workspace = Workspace::new(&tree);
     let mut torque = vec![0.0; joints];
     for row in 0..(seconds * RATE) as usize {
@@ -60,7 +61,8 @@ pub fn recording(seed: u64, seconds: f64) -> Recording {
         let v = sum(&|[a, w, p]| a * w * (w * t + p).cos());
         let a = sum(&|[a, w, p]| -a * w * w * (w * t + p).sin());
         tree.inverse_dynamics(&q, &v, &a, &mut workspace, &mut torque).unwrap();
-        let measured = |joint: usize| torque[joint] + VISCOUS[joint] * v[joint] + NOISE[joint] * gauss(&mut random);
+        let measured =
+            |joint: usize| torque[joint] + VISCOUS[joint] * v[joint] + NOISE[joint] * gauss(&mut random);
         recording.tau.extend((0..joints).map(measured).collect::<Vec<_>>());
         recording.t.push(t);
         recording.q.extend(q);

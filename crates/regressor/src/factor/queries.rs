@@ -44,7 +44,7 @@ impl Factor {
         let mut basis: Vec<Vec<f64>> = Vec::new();
         let mut undetermined = Vec::new();
         for column in 0..size {
-            let mut rest: Vec<f64> = (0..size).map(|row| self.entry(row, column)).collect();
+            let mut rest: Vec<f64> = self.column(column)[..size].to_vec();
             for _ in 0..2 {
                 for direction in &basis {
                     let along = dot(direction, &rest);
@@ -88,11 +88,13 @@ impl Factor {
     pub fn residual_sum_of_squares(&self, w: &[f64]) -> Result<f64, RegressorError> {
         let size = self.parameters();
         check_size("parameters", w.len(), size)?;
-        let residual = |row: usize| {
-            let fitted: f64 = (row..size).map(|column| self.entry(row, column) * w[column]).sum();
-            fitted - self.entry(row, size)
-        };
-        Ok((0..self.columns()).map(|row| residual(row).powi(2)).sum())
+        // Column by column, as R is stored; parameters that are zero cost nothing.
+        let mut residual: Vec<f64> = (0..self.columns()).map(|row| -self.entry(row, size)).collect();
+        for (column, &value) in w.iter().enumerate().filter(|(_, value)| **value != 0.0) {
+            let entries = self.column(column);
+            residual.iter_mut().zip(&entries[..=column]).for_each(|(sum, entry)| *sum += value * entry);
+        }
+        Ok(dot(&residual, &residual))
     }
 
     /// Sum of squares of the right-hand side, ‖f‖².

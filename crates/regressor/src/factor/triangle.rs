@@ -69,6 +69,11 @@ impl Factor {
         self.r[(row, column)]
     }
 
+    /// A column of R.
+    pub(super) fn column(&self, column: usize) -> &[f64] {
+        self.r.col_as_slice(column)
+    }
+
     /// R as a matrix.
     pub fn as_mat(&self) -> MatRef<'_, f64> {
         self.r.as_ref()
@@ -76,7 +81,7 @@ impl Factor {
 
     /// Euclidean norm of a column of \[Φ f\].
     pub fn column_norm(&self, column: usize) -> f64 {
-        (0..=column).map(|row| self.r[(row, column)].powi(2)).sum::<f64>().sqrt()
+        self.column(column)[..=column].iter().map(|entry| entry * entry).sum::<f64>().sqrt()
     }
 
     /// The factor of the rows of both.

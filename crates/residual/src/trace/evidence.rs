@@ -21,6 +21,8 @@ pub(super) struct Evidence<'a> {
     pub prior: Option<&'a Factor>,
     /// For each torque, the model's rows of all the others and the prior.
     others: Vec<Factor>,
+    /// For each torque the factor over the model's columns alone: training, held out.
+    alone: [Vec<Factor>; 2],
 }
 
 /// A refit of the model together with some columns.
@@ -45,7 +47,8 @@ impl<'a> Evidence<'a> {
         prior: Option<&'a Factor>,
     ) -> Result<Self, RegressorError> {
         let mut evidence =
-            Evidence { train, held_out, folds, model, determined, weights, prior, others: Vec::new() };
+            Evidence { train, held_out, folds, model, determined, weights, prior, others: Vec::new(), alone: [Vec::new(), Vec::new()] };
+        evidence.alone = [model_alone(train, model)?, model_alone(held_out, model)?];
         evidence.others = evidence.model_rows_of_others()?;
         Ok(evidence)
     }
@@ -116,10 +119,29 @@ impl<'a> Evidence<'a> {
         }
         added.iter().zip(&solution[count..]).for_each(|(&parameter, value)| parameters[parameter] = *value);
         Ok(Some(Refit {
-            train: self.train.residual_sums_of_squares(&parameters)?,
-            held_out: self.held_out.residual_sums_of_squares(&parameters)?,
+            train: self.squares(self.train, &self.alone[0], &parameters, rows, added)?,
+            held_out: self.squares(self.held_out, &self.alone[1], &parameters, rows, added)?,
             parameters,
         }))
+    }
+
+    /// Residual sum of squares of each torque; those that the added columns do not act on need the model's columns only.
+    fn squares(
+        &self,
+        factors: &GroupedFactor,
+        alone: &[Factor],
+        parameters: &[f64],
+        rows: &[usize],
+        added: &[usize],
+    ) -> Result<Vec<f64>, RegressorError> {
+        let of_row = |(row, (group, alone)): (usize, (&Group, &Factor))| {
+            let whole = rows.contains(&row) && !added.is_empty();
+            let columns = if whole { group.parameters.as_slice() } else { &group.parameters[..alone.parameters()] };
+            let own: Vec<f64> = columns.iter().map(|&parameter| parameters[parameter]).collect();
+            let factor = if whole { &group.factor } else { alone };
+            factor.residual_sum_of_squares(&own)
+        };
+        factors.groups().iter().zip(alone).enumerate().map(of_row).collect()
     }
 
     /// Gain in log-likelihood of each torque's rows over `before`, with each torque's noise unknown: rows/2·ln(RSS⁰/RSS), training and held out.
@@ -200,6 +222,16 @@ impl<'a> Evidence<'a> {
         };
         Ok((count..columns).map(z).fold(0.0, f64::max))
     }
+}
+
+/// For each torque the factor over the model's columns, which come first, and the right-hand side.
+fn model_alone(factors: &GroupedFactor, model: usize) -> Result<Vec<Factor>, RegressorError> {
+    let of_group = |group: &Group| {
+        let own = group.parameters.partition_point(|&parameter| parameter < model);
+        let columns: Vec<usize> = (0..own).chain([group.factor.parameters()]).collect();
+        group.factor.select(&columns)
+    };
+    factors.groups().iter().map(of_group).collect()
 }
 
 /// A column with less than this share left after the model's columns are taken out is not identifiable.

@@ -204,7 +204,7 @@ impl Search<'_> {
         let mut parameters = self.input.parameters.clone();
         loop {
             let mut ranges = self.input.ranges.clone();
-            let design = self.design(&self.specs)?;
+            let design = self.design(&self.specs)?.with_reference(self.fixed.reference(&self.specs, &parameters)?);
             let positions: Vec<(f64, f64)> = ranges.joints.iter().map(|joint| joint.position).collect();
             let data = self.input.data;
             let all = [data.train.as_slice(), &data.held_out].concat();
@@ -333,7 +333,8 @@ impl Search<'_> {
             let errors = evidence.fold_errors(&other.refit, &std)?;
             let lost: f64 = errors.iter().zip(&reference).map(|(a, b)| a - b).sum();
             let t = paired_t(&errors, &reference);
-            if t < INDISTINGUISHABLE || lost < NEGLIGIBLE * total {
+            let near = best.score - other.score < NEAR_SCORE.max(NEAR_SHARE * best.score);
+            if (t < INDISTINGUISHABLE && near) || lost < NEGLIGIBLE * total {
                 equals.push(other.clone());
             }
         }
@@ -342,9 +343,10 @@ impl Search<'_> {
         let significance = evidence.significance(&chosen.refit, &chosen.parameters)?;
         let weigh = |judged: &Judged| (judged.score - best.score).max(-700.0).exp();
         let sum: f64 = equals.iter().map(weigh).sum();
+        let share = |judged: &Judged| (judged.candidate, weigh(judged) / sum);
         let rivals: Vec<(usize, f64)> =
-            equals.iter().skip(1).map(|judged| (judged.candidate, weigh(judged) / sum)).collect();
-        let confidence = 1.0 - rivals.iter().map(|(_, share)| share).sum::<f64>();
+            equals.iter().skip(1).map(share).filter(|(_, share)| *share >= LEAST_RIVAL).collect();
+        let confidence = weigh(&chosen) / sum;
         let believed = self.believed(fitted, &chosen, significance);
         Ok((believed.then_some(Choice { judged: chosen, significance, confidence, rivals }), ranking))
     }
@@ -531,6 +533,7 @@ impl Search<'_> {
         let after =
             (torque_error(&train_folds, &final_fit.parameters)?, torque_error(&held_out_folds, &final_fit.parameters)?);
         let remaining = self.remaining(&final_fit.parameters, &after.1, ranking, shape)?;
+        let design = design.with_reference(self.fixed.reference(&self.specs, &final_fit.parameters)?);
         let verdict = match (self.found.is_empty(), remaining.joints.is_empty()) {
             (true, true) => Verdict::Sufficient,
             (true, false) => Verdict::Unexplained,
@@ -591,6 +594,11 @@ const FINALISTS: usize = 60;
 const INDISTINGUISHABLE: f64 = 2.5;
 /// Share of the gain that a simpler candidate may lose.
 const NEGLIGIBLE: f64 = 0.01;
+/// Log-likelihood, and share of the best one's, by which a simpler candidate may be worse and still be taken.
+const NEAR_SCORE: f64 = 6.0;
+const NEAR_SHARE: f64 = 0.02;
+/// A rival that is less probable is none.
+const LEAST_RIVAL: f64 = 0.01;
 /// Passes to refine constants.
 const REFINEMENTS: usize = 3;
 
