@@ -80,6 +80,8 @@ pub fn identify(
     })
 }
 
+/// Share of a torque's residual variance that a variant must save over a simpler one.
+const WORTH_A_VARIANT: f64 = 0.1;
 /// Sweeps over the effects; more have never changed a choice.
 const SWEEPS: usize = 2;
 
@@ -109,17 +111,17 @@ fn choose(
             if variants.len() <= 1 {
                 continue;
             }
-            let mut best = (f64::INFINITY, chosen[slot]);
             let rest = Rest::new(design, factors, &solution, &columns(&chosen), chosen[slot])?;
+            let mut merits = Vec::with_capacity(variants.len());
             for variant in variants.clone() {
                 let mut trial = chosen.clone();
                 trial[slot] = variant;
-                let merit = rest.log_error(factors, &columns(&trial))?;
-                if merit < best.0 {
-                    best = (merit, variant);
-                }
+                merits.push(rest.log_error(factors, &columns(&trial))?);
             }
-            chosen[slot] = best.1;
+            let best = merits.iter().copied().fold(f64::INFINITY, f64::min);
+            let margin = 0.5 * rest.own_rows(factors) * WORTH_A_VARIANT;
+            let simplest = merits.iter().position(|merit| *merit <= best + margin).unwrap_or_default();
+            chosen[slot] = variants.start + simplest;
         }
         if chosen == before {
             break;
@@ -182,6 +184,11 @@ impl Rest {
             }
         }
         Ok(Rest { own, others: builder.factor(), weights })
+    }
+
+    /// Rows of the torques that the effect acts on.
+    fn own_rows(&self, factors: &GroupedFactor) -> f64 {
+        self.own.iter().map(|&row| factors.groups()[row].factor.rows() as f64).sum()
     }
 
     /// Σ rows·log(RMSE) of the fit with `kept` columns, whose numbering is that of the slot's own variant.

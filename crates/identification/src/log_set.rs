@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 /// Share of each training log that is held out when no log is given for validation.
 pub const HELD_OUT_SHARE: f64 = 0.3;
 /// Stretches of time that the training logs are cut into: long against the residual's correlation, enough for a standard deviation.
-const TRAINING_FOLDS: usize = 12;
-const HELD_OUT_FOLDS: usize = 10;
+const TRAINING_FOLDS: usize = 10;
+const HELD_OUT_FOLDS: usize = 8;
 /// Speed of a joint at rest over its RMS speed.
 const REST_SHARE: f64 = 0.01;
 

@@ -76,7 +76,7 @@ impl ReferenceModel {
         }
     }
 
-    /// The derivatives are as smooth as the motion: computed a hundred times a second, and linear in between.
+    /// The derivatives are as smooth as the motion: computed fifty times a second, and linear in between.
     fn derivatives(&self, block: &Block, out: &mut BlockReference) -> Result<(), DimensionError> {
         let joints = block.joints;
         let size = joints * joints;
@@ -148,7 +148,7 @@ impl ReferenceModel {
 }
 
 /// Time between two evaluations of the derivatives \[s\].
-const DERIVATIVE_PERIOD: f64 = 0.01;
+const DERIVATIVE_PERIOD: f64 = 0.02;
 
 /// What a torque is differentiated by.
 #[derive(Clone, Copy)]

@@ -22,9 +22,9 @@ pub struct FactorBuilder {
 impl FactorBuilder {
     /// For rows of `columns` numbers, the right-hand side included (as the last).
     pub fn new(columns: usize) -> Self {
-        // Four triangles' worth of rows for each QR: the triangle that is factored again costs a fifth, and the block
-        // stays in the second-level cache.
-        let capacity = (4 * columns).max(64);
+        // Twice a triangle's rows for each QR: the triangle that is factored again costs a third, and the block stays in the
+        // second-level cache.
+        let capacity = (2 * columns).max(64);
         let size = columns + capacity;
         let block = recommended_block_size::<f64>(size, columns.max(1)).max(1);
         FactorBuilder {

@@ -201,8 +201,14 @@ impl EffectKind for ActuatorSaturation {
         "actuator_saturation"
     }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
-        let peak = ranges.joints[site[0]].torque_peak;
-        values(LIMIT, (0..8).map(|step| peak * (0.95 - 0.08 * f64::from(step))))
+        // A drive that clips most of the time would be no drive: and below the torque's own level the column is the torque itself.
+        let range = ranges.joints[site[0]];
+        let (lowest, highest) = (1.2 * range.torque_rms, 0.97 * range.torque_peak);
+        if lowest >= highest {
+            return Vec::new();
+        }
+        let step = (highest / lowest).powf(1.0 / 7.0);
+        values(LIMIT, (0..8).map(|power| lowest * step.powi(power)))
     }
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
         let Some(&limit) = found.get(LIMIT) else { return Vec::new() };
@@ -221,7 +227,7 @@ impl EffectKind for ActuatorSaturation {
             let torque = sample.tau().get(joint).copied().unwrap_or_default();
             out[0] = torque.signum() * (torque.abs() - limit).max(0.0);
         };
-        let parameters = [("clipped_share", ParameterKind::Ratio, 0.0)];
+        let parameters = [("clipped_share", ParameterKind::Ratio, 0.3)];
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
     }
 }

@@ -36,7 +36,7 @@ impl Default for TraceOptions {
     fn default() -> Self {
         TraceOptions {
             most_effects: 12,
-            least_significance: 4.0,
+            least_significance: 3.0,
             least_share: 0.1,
             least_size: 0.01,
             floor_margin: 1.15,
@@ -201,7 +201,8 @@ struct Fitted {
 
 impl Search<'_> {
     fn run(mut self) -> Result<Tracing, IdentificationError> {
-        let mut parameters = self.input.parameters.clone();
+        // The constants of the declared effects come from a grid.
+        let mut parameters = self.refine(self.input.parameters.clone())?;
         loop {
             let mut ranges = self.input.ranges.clone();
             let design = self.design(&self.specs)?.with_reference(self.fixed.reference(&self.specs, &parameters)?);
@@ -421,6 +422,9 @@ impl Search<'_> {
     fn refine(&mut self, mut parameters: Vec<f64>) -> Result<Vec<f64>, IdentificationError> {
         for step in 0..REFINEMENTS {
             let (places, candidates) = self.near(step)?;
+            if candidates.list.is_empty() && !self.fixed.build(&self.specs)?.iter().any(|effect| !effect.needs().is_empty()) {
+                break;
+            }
             let fitted = self.fitted(candidates, &parameters)?;
             let mut changed = false;
             let mut refit = fitted.refit.clone();
@@ -442,18 +446,21 @@ impl Search<'_> {
         Ok(parameters)
     }
 
-    /// Constants near those of the effect found last and of the Coulomb friction of its joints, as candidates beside the model.
+    /// Constants to try in the place of those of the effects found and of the declared ones whose constants the data chose: each missing effect has
+    /// bent the choice. All of the kind's scan first, then closer and closer to the best.
     fn near(&self, step: usize) -> Result<(Vec<usize>, Candidates), IdentificationError> {
-        let last = self.specs.len() - 1;
-        let joints = &self.specs[last].joints;
-        let friction = |spec: &EffectSpec| spec.kind == "coulomb_friction" && joints.contains(&spec.joints[0]);
-        let mut places: Vec<usize> = (0..last).filter(|&place| friction(&self.specs[place]) && !self.is_held(place)).collect();
-        places.push(last);
+        let declared = self.input.declared.len();
+        let places: Vec<usize> = (0..self.specs.len()).filter(|&place| !self.is_held(place)).collect();
         let mut candidates = Candidates { list: Vec::new(), effects: Vec::new() };
         for &place in &places {
             let spec = &self.specs[place];
-            let near = self.fixed.catalogue.kind(&spec.kind)?.refine(&spec.constants, step);
-            for constants in near {
+            let kind = self.fixed.catalogue.kind(&spec.kind)?;
+            let mut near = kind.refine(&spec.constants, step);
+            if step == 0 && place < declared && !spec.constants.is_empty() {
+                let site: Vec<usize> = spec.joints.iter().filter_map(|joint| self.fixed.tree.joint_index(joint)).collect();
+                near.extend(kind.scan(&site, &self.input.ranges));
+            }
+            for constants in near.into_iter().filter(|constants| *constants != spec.constants) {
                 let variant = EffectSpec { constants, ..spec.clone() };
                 let first = candidates.effects.len();
                 candidates.effects.push(self.fixed.catalogue.build(&variant, self.fixed.tree)?);
