@@ -47,6 +47,7 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
         ranges: SignalRanges::of_surveys(session.logs.training()),
         declared: start.specs.clone(),
         parameters: start.parameters.clone(),
+        residual_std: start.model.residual_std.clone(),
         held: start.held,
         noise_floor: floor.clone(),
         rows_per_independent: (plan.output_rate_hz() / (2.0 * conditioning.parallel_cutoff_hz)).max(1.0),

@@ -54,6 +54,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ranges,
         declared: identified.design.effects().iter().map(|effect| effect.spec()).collect(),
         parameters: identified.fit.parameters.clone(),
+        residual_std: identified.fit.residual_std.clone(),
         held: None,
         noise_floor: floor,
         rows_per_independent: plan.output_rate_hz() / (2.0 * logs.conditioning().parallel_cutoff_hz),

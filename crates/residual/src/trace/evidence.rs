@@ -4,6 +4,7 @@ use faer::Mat;
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, FactorBuilder, leave_one_out};
 use phiw_regressor::least_squares::{Group, GroupedFactor};
+use std::sync::OnceLock;
 
 /// The model's columns in the factors of a larger design, whose candidates' columns follow them.
 pub(super) struct Evidence<'a> {
@@ -19,8 +20,10 @@ pub(super) struct Evidence<'a> {
     pub weights: Vec<f64>,
     /// What was known before (a held model), over the model's parameters.
     pub prior: Option<&'a Factor>,
-    /// For each torque, the model's rows of all the others and the prior.
-    others: Vec<Factor>,
+    /// For each torque, the model's rows (the prior behind them).
+    rows: Vec<Factor>,
+    /// For each torque, the model's rows of all the others and the prior; filled in when it is first asked for.
+    others: Vec<OnceLock<Factor>>,
     /// For each torque the factor over the model's columns alone: training, held out.
     alone: [Vec<Factor>; 2],
 }
@@ -47,9 +50,10 @@ impl<'a> Evidence<'a> {
         prior: Option<&'a Factor>,
     ) -> Result<Self, RegressorError> {
         let mut evidence =
-            Evidence { train, held_out, folds, model, determined, weights, prior, others: Vec::new(), alone: [Vec::new(), Vec::new()] };
+            Evidence { train, held_out, folds, model, determined, weights, prior, rows: Vec::new(), others: Vec::new(), alone: [Vec::new(), Vec::new()] };
         evidence.alone = [model_alone(train, model)?, model_alone(held_out, model)?];
-        evidence.others = evidence.model_rows_of_others()?;
+        evidence.rows = evidence.model_rows()?;
+        evidence.others = (0..train.groups().len()).map(|_| OnceLock::new()).collect();
         Ok(evidence)
     }
 
@@ -66,7 +70,7 @@ impl<'a> Evidence<'a> {
         (places, count)
     }
 
-    fn model_rows_of_others(&self) -> Result<Vec<Factor>, RegressorError> {
+    fn model_rows(&self) -> Result<Vec<Factor>, RegressorError> {
         let (places, count) = self.places();
         let mut rows = Vec::new();
         for (group, weight) in self.train.groups().iter().zip(&self.weights) {
@@ -74,12 +78,27 @@ impl<'a> Evidence<'a> {
             push_group(&mut builder, group, self.model, &places, &[], *weight)?;
             rows.push(builder.factor());
         }
-        if let Some(prior) = self.prior {
-            rows.push(prior.clone());
+        rows.extend(self.prior.cloned());
+        Ok(rows)
+    }
+
+    /// Makes ready for candidates on every torque: cheaper together than one by one.
+    pub fn prepare(&self) -> Result<(), RegressorError> {
+        for (other, factor) in self.others.iter().zip(leave_one_out(&self.rows)?) {
+            other.get_or_init(|| factor);
         }
-        let mut others = leave_one_out(&rows)?;
-        others.truncate(self.train.groups().len());
-        Ok(others)
+        Ok(())
+    }
+
+    fn others(&self, row: usize) -> Result<&Factor, RegressorError> {
+        if let Some(factor) = self.others[row].get() {
+            return Ok(factor);
+        }
+        let rest = self.rows.iter().enumerate().filter(|(other, _)| *other != row);
+        let merged = Factor::merge_all(rest.map(|(_, factor)| factor))?;
+        // A robot with a single joint has no others.
+        let merged = if merged.columns() == 0 { Factor::empty(self.rows[row].columns()) } else { merged };
+        Ok(self.others[row].get_or_init(|| merged))
     }
 
     /// Refits the model with `added` parameters of the design; `rows` are the torques that they act on.
@@ -92,7 +111,7 @@ impl<'a> Evidence<'a> {
         // The candidate's columns stand last, the right-hand side behind them.
         let model_columns: Vec<usize> = (0..count).chain([columns]).collect();
         if let [row] = rows {
-            builder.push_factor(&self.others[*row], &model_columns, 1.0)?;
+            builder.push_factor(self.others(*row)?, &model_columns, 1.0)?;
             push_group(&mut builder, &self.train.groups()[*row], self.model, &places, added, self.weights[*row])?;
         } else {
             for (group, weight) in self.train.groups().iter().zip(&self.weights) {

@@ -69,6 +69,8 @@ pub struct TraceInput<'a> {
     pub declared: Vec<EffectSpec>,
     /// The declared model's parameters, fitted (or held).
     pub parameters: Vec<f64>,
+    /// Standard deviation of each torque's residual under them \[N·m, N\].
+    pub residual_std: Vec<f64>,
     /// The model that is held, if one is.
     pub held: Option<HeldModel>,
     /// Noise floor of each torque \[N·m, N\].
@@ -178,7 +180,8 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         weights: held.residual_std.iter().map(|std| 1.0 / std.max(f64::MIN_POSITIVE)).collect(),
     });
     let fixed = Fixed { tree: input.tree, base, catalogue: input.catalogue, data: input.data, prior };
-    Search { fixed, specs: input.declared.clone(), found: Vec::new(), before: None, input: &input, options }.run()
+    let residual_std = input.residual_std.clone();
+    Search { fixed, specs: input.declared.clone(), found: Vec::new(), before: None, residual_std, input: &input, options }.run()
 }
 
 struct Search<'a> {
@@ -186,6 +189,8 @@ struct Search<'a> {
     specs: Vec<EffectSpec>,
     found: Vec<FoundEffect>,
     before: Option<(TorqueError, TorqueError)>,
+    /// Standard deviation of each torque's residual under the present model.
+    residual_std: Vec<f64>,
     input: &'a TraceInput<'a>,
     options: &'a TraceOptions,
 }
@@ -310,16 +315,14 @@ impl Search<'_> {
         let inflation = self.input.rows_per_independent;
         let all: Vec<usize> = (0..stage.candidates.len()).collect();
         let evidence = stage.evidence(&fitted.determined, &fitted.weights, fitted.prior.as_ref())?;
+        evidence.prepare()?;
         let judged = stage.judge(&evidence, &fitted.refit, &all, inflation)?;
         let Some(first) = judged.first() else { return Ok((None, Vec::new())) };
         // With the best candidate in, the torques' noise is better known: judge the others by it.
         let weights = weights_of(&stage.train, &first.refit.train);
         let evidence = stage.evidence(&fitted.determined, &weights, fitted.prior.as_ref())?;
-        let every: Vec<usize> = (0..stage.train.groups().len()).collect();
-        let Some(before) = evidence.refit(&[], &every)? else { return Ok((None, Vec::new())) };
         let near: Vec<usize> = judged.iter().take(FINALISTS).map(|judged| judged.candidate).collect();
         let judged = stage.judge(&evidence, &fitted.refit, &near, inflation)?;
-        let _ = before;
         let best_of_each = best_of_each(stage, judged);
         let ranking: Vec<Ranked> = best_of_each.iter().take(10).map(|judged| self.ranked(stage, judged)).collect();
         let Some(best) = best_of_each.first() else { return Ok((None, ranking)) };
@@ -436,6 +439,8 @@ impl Search<'_> {
                 }
             }
             parameters = refit.parameters[..fitted.stage.model_size()].to_vec();
+            self.residual_std =
+                weights_of(&fitted.stage.train, &refit.train).iter().map(|weight| 1.0 / weight).collect();
             changed |= self.relinearise(&mut parameters)?;
             // Columns that need torques had those of the last step.
             changed |= step == 0 && self.fixed.build(&self.specs)?.iter().any(|effect| !effect.needs().is_empty());
@@ -450,7 +455,14 @@ impl Search<'_> {
     /// bent the choice. All of the kind's scan first, then closer and closer to the best.
     fn near(&self, step: usize) -> Result<(Vec<usize>, Candidates), IdentificationError> {
         let declared = self.input.declared.len();
-        let places: Vec<usize> = (0..self.specs.len()).filter(|&place| !self.is_held(place)).collect();
+        // A torque that is down to its noise has nothing to say about a constant.
+        let noisy = |spec: &EffectSpec| {
+            let joints = spec.joints.iter().filter_map(|joint| self.fixed.tree.joint_index(joint));
+            joints.into_iter().any(|joint| self.residual_std[joint] > DOWN_TO_NOISE * self.input.noise_floor[joint])
+        };
+        let places: Vec<usize> = (0..self.specs.len())
+            .filter(|&place| !self.is_held(place) && (place >= declared || noisy(&self.specs[place])))
+            .collect();
         let mut candidates = Candidates { list: Vec::new(), effects: Vec::new() };
         for &place in &places {
             let spec = &self.specs[place];
@@ -606,6 +618,8 @@ const NEAR_SCORE: f64 = 6.0;
 const NEAR_SHARE: f64 = 0.02;
 /// A rival that is less probable is none.
 const LEAST_RIVAL: f64 = 0.01;
+/// A residual over the noise floor by less than this says nothing about a constant.
+const DOWN_TO_NOISE: f64 = 1.05;
 /// Passes to refine constants.
 const REFINEMENTS: usize = 3;
 
