@@ -1,16 +1,17 @@
 //! `cargo xtask run`: the best main job that there is so far, on a log that this program makes itself.
 //!
-//! Here: `phiw identify`, with report. The outcome on the example is the same on every machine; where logs of a real robot lie beside the
-//! workspace, they are identified as well.
+//! Here: `phiw explain`, with report, on an arm whose wrist has a differential that nobody declared. The outcome on the example is the same on
+//! every machine; where logs of a real robot lie beside the workspace, they are explained as well.
 
 mod synthetic;
 pub mod synthetic_log;
 
 use crate::environment;
 use anyhow::Context;
-use phiw::arguments::SessionArguments;
+use phiw::arguments::{ExplainArguments, SessionArguments};
 use phiw::console::Console;
-use phiw::identify::{Outcome, identify};
+use phiw::explain::{command_line, explain};
+use phiw::identify::Outcome;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -18,6 +19,8 @@ use synthetic::Plant;
 
 /// What an arm with gears is declared to have beside its rigid body.
 const DECLARED: [&str; 3] = ["viscous_friction", "coulomb_friction", "rotor_inertia"];
+/// Joints of the example whose motors turn with their sum: joint_5 and joint_6.
+const DIFFERENTIAL: [usize; 2] = [4, 5];
 /// Length of an example log \[s\] and its rows per second.
 const EXAMPLE: (f64, f64) = (20.0, 500.0);
 
@@ -32,7 +35,7 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-/// Identifies the example, and a real robot where its logs are there.
+/// Explains the example, and a real robot where its logs are there.
 ///
 /// # Errors
 /// Files cannot be read or written, or the identification fails.
@@ -63,7 +66,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 fn example(root: &Path, out: &Path) -> anyhow::Result<SessionArguments> {
     let urdf = root.join("models/puma560.urdf");
     let tree = read_urdf_file(&urdf, &UrdfOptions::default())?.tree;
-    let plant = Plant::new(tree);
+    let plant = Plant::new(tree).with_shared_motor(DIFFERENTIAL);
     let folder = out.join("example");
     std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let mut logs = Vec::new();
@@ -83,8 +86,9 @@ fn session(urdf: &Path, train: Vec<PathBuf>, validate: Vec<PathBuf>, out: PathBu
 }
 
 fn run(arguments: &SessionArguments) -> anyhow::Result<PathBuf> {
-    println!("{}\n", arguments.command_line("identify"));
-    let Outcome { summary, warnings, report_html, .. } = identify(arguments, &Console::of_terminal(false))?;
+    let arguments = ExplainArguments { session: arguments.clone(), model: None };
+    println!("{}\n", command_line(&arguments));
+    let Outcome { summary, warnings, report_html, .. } = explain(&arguments, &Console::of_terminal(false))?;
     warnings.iter().for_each(|warning| println!("warning: {warning}"));
     println!("{summary}");
     Ok(report_html)

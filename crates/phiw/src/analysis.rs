@@ -37,7 +37,7 @@ impl<'a> Analysis<'a> {
         let model = Model::of_fit(design, fit, &session.declared, &session.arguments.hold, cutoffs)?;
         let folds = [data.train.as_slice(), data.held_out.as_slice()];
         let traces = Traces::collect(design, &fit.parameters, folds, &data.sources)?;
-        let noise_floor = white_noise_floor(session)?;
+        let noise_floor = noise_floor(session, data, &model)?;
         let warnings = warnings::all(session, identified);
         Ok(Analysis { session, identified, model, traces, noise_floor, warnings })
     }
@@ -83,18 +83,19 @@ impl<'a> Analysis<'a> {
     }
 }
 
-/// RMS of the torque noise that passes the parallel filter, if it is white: σ·√Σtaps², over all logs.
-fn white_noise_floor(session: &Session) -> Result<Vec<f64>, Error> {
-    let mut squares = vec![0.0; session.tree.joint_count()];
-    let mut rows = 0.0;
-    for survey in session.logs.surveys() {
-        let plan = session.logs.conditioning().plan(survey)?;
-        let gain: f64 = plan.parallel.taps().iter().map(|tap| tap * tap).sum();
-        rows += survey.used_rows as f64;
-        for (square, joint) in squares.iter_mut().zip(&survey.joints) {
-            let noise = joint.torque.map_or(f64::NAN, |torque| torque.noise_std);
-            *square += survey.used_rows as f64 * gain * noise * noise;
+/// What the sensors' noise alone would leave under the model's inertia \[N·m, N\].
+///
+/// # Errors
+/// A log cannot be read any more.
+pub fn noise_floor(session: &Session, data: &Data<'_>, model: &Model) -> Result<Vec<f64>, Error> {
+    let tree = model.identified_tree(&session.tree)?;
+    let mut rotor = vec![0.0; tree.joint_count()];
+    for effect in model.effects.iter().filter(|effect| effect.spec.kind == "rotor_inertia") {
+        let joint = effect.spec.joints.first().and_then(|joint| tree.joint_index(joint));
+        if let (Some(joint), Some(inertia)) = (joint, effect.parameters.first()) {
+            rotor[joint] += inertia.value;
         }
     }
-    Ok(squares.into_iter().map(|square| (square / rows).sqrt()).collect())
+    let (surveys, conditioning) = (session.logs.surveys(), session.logs.conditioning());
+    Ok(phiw_residual::trace::noise_floor(&tree, &rotor, surveys, conditioning, &data.sources)?)
 }

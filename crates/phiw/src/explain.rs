@@ -1,6 +1,6 @@
 //! `phiw explain`: the declared model, what it lacks, and the error before and after.
 
-use crate::analysis::Analysis;
+use crate::analysis::{Analysis, noise_floor};
 use crate::arguments::ExplainArguments;
 use crate::console::Console;
 use crate::explain_page;
@@ -15,7 +15,7 @@ use phiw_report::json::{
     EffectJson, JointMap, ParameterJson, RemainingJson, RivalJson, TorqueErrors, Verdict,
 };
 use phiw_residual::SignalRanges;
-use phiw_residual::trace::{self, HeldModel, TraceInput, TraceOptions, Tracing, noise_floor, trace};
+use phiw_residual::trace::{self, HeldModel, TraceInput, TraceOptions, Tracing, trace};
 use std::fmt::Write;
 
 /// A model to start from: its effects' specs, its parameters, and what was known if it is held.
@@ -37,7 +37,7 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
     let start = start(arguments, &session, &data)?;
-    let floor = floor(&session, &data, &start.model)?;
+    let floor = noise_floor(&session, &data, &start.model)?;
     let conditioning = session.logs.conditioning();
     let plan = conditioning.plan(&session.logs.surveys()[0])?;
     let input = TraceInput {
@@ -83,7 +83,8 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
     })
 }
 
-fn command_line(arguments: &ExplainArguments) -> String {
+/// The command line that gives these arguments to `phiw explain`.
+pub fn command_line(arguments: &ExplainArguments) -> String {
     let mut line = arguments.session.command_line("explain");
     if let Some(model) = &arguments.model {
         line.push_str(&format!(" --model {}", model.display()));
@@ -115,20 +116,6 @@ fn start(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Re
     };
     let specs = design.effects().iter().map(|effect| effect.spec()).collect();
     Ok(Start { model, specs, parameters, held: Some(held) })
-}
-
-/// The noise floor under the model's inertia.
-fn floor(session: &Session, data: &Data<'_>, model: &Model) -> Result<Vec<f64>, Error> {
-    let tree = model.identified_tree(&session.tree)?;
-    let mut rotor = vec![0.0; tree.joint_count()];
-    for effect in model.effects.iter().filter(|effect| effect.spec.kind == "rotor_inertia") {
-        if let (Some(joint), Some(inertia)) =
-            (tree.joint_index(&effect.spec.joints[0]), effect.parameters.first())
-        {
-            rotor[joint] += inertia.value;
-        }
-    }
-    Ok(noise_floor(&tree, &rotor, session.logs.surveys(), session.logs.conditioning(), &data.sources)?)
 }
 
 fn verdict(verdict: trace::Verdict) -> Verdict {

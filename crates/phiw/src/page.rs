@@ -137,7 +137,7 @@ pub fn errors_note(analysis: &Analysis<'_>) -> String {
     };
     format!(
         "{held_out} Errors are of the filtered torque while the joint moves; with rests included the pooled held-out error is {} %. \
-         The noise floor is the torque's noise in the filter's band, taken as white.",
+         The noise floor is what the sensors' noise alone would leave: the torque's in the filter's band, and the positions' through differentiation and inertia, both taken as white.",
         percent(analysis.traces.relative_with_rests(Role::HeldOut))
     )
 }

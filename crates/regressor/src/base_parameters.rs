@@ -153,7 +153,9 @@ impl BaseParameters {
     /// `standard` has the wrong length.
     pub fn from_standard(&self, standard: &[f64]) -> Result<Vec<f64>, RegressorError> {
         check_size("standard parameters", standard.len(), self.standard_size)?;
-        let dot = |row: usize| (0..self.standard_size).map(|column| self.map[(row, column)] * standard[column]).sum();
+        let dot = |row: usize| {
+            (0..self.standard_size).map(|column| self.map[(row, column)] * standard[column]).sum()
+        };
         Ok((0..self.count()).map(dot).collect())
     }
 
@@ -208,9 +210,15 @@ fn random_state(tree: &Tree, random: &mut ChaCha8Rng) -> (Vec<f64>, Vec<f64>, Ve
         let span = if body.joint_type == JointType::Prismatic { 1.0 } else { std::f64::consts::PI };
         let (lower, upper) = (body.limits.lower.max(-span), body.limits.upper.min(span));
         // A range too narrow to excite anything (or upside down) is taken as absent.
-        q.push(if upper - lower > 1e-3 { random.random_range(lower..upper) } else { random.random_range(-span..span) });
+        q.push(if upper - lower > 1e-3 {
+            random.random_range(lower..upper)
+        } else {
+            random.random_range(-span..span)
+        });
     }
-    let mut rates = |size: usize| (0..tree.velocity_size()).map(|_| random.random_range(-1.0..1.0) * size as f64).collect();
+    let mut rates = |size: usize| {
+        (0..tree.velocity_size()).map(|_| random.random_range(-1.0..1.0) * size as f64).collect()
+    };
     let (v, a) = (rates(3), rates(10));
     (q, v, a)
 }

@@ -1,6 +1,8 @@
 //! The joint torque regressor φ(q, q̇, q̈): τ = φ · π with π the standard parameters of all bodies (paper, equation 2).
 
-use phiw_dynamics::{BodyMotion, DimensionError, Lanes, PARAMETERS_PER_BODY, Scalar, Spatial, Tree, check_size};
+use phiw_dynamics::{
+    BodyMotion, DimensionError, Lanes, PARAMETERS_PER_BODY, Scalar, Spatial, Tree, check_size,
+};
 
 /// Which bodies act on which torque, and the kernel that fills in their numbers.
 ///
@@ -239,9 +241,8 @@ fn axis_row<T: Scalar>(axis: Spatial<T>, motion: &BodyMotion<T>) -> [T; PARAMETE
     let (omega, alpha, acceleration) =
         (motion.angular_velocity, motion.angular_acceleration, motion.proper_acceleration);
     // Transposed cross products: s·(α × x) = (s × α)·x, s·(ω × (ω × x)) = ((s × ω) × ω)·x, s·(x × a) = (a × s)·x.
-    let first_moment = force_axis.cross(alpha)
-        + force_axis.cross(omega).cross(omega)
-        + acceleration.cross(moment_axis);
+    let first_moment =
+        force_axis.cross(alpha) + force_axis.cross(omega).cross(omega) + acceleration.cross(moment_axis);
     let gyroscopic = moment_axis.cross(omega);
     let (u, x) = (moment_axis.0, alpha.0);
     let (g, w) = (gyroscopic.0, omega.0);

@@ -31,7 +31,9 @@ fn dense_regressor(tree: &Tree, state: &RandomState) -> Vec<f64> {
 }
 
 fn times(phi: &[f64], parameters: &[f64]) -> Vec<f64> {
-    phi.chunks_exact(parameters.len()).map(|row| row.iter().zip(parameters).map(|(a, b)| a * b).sum()).collect()
+    phi.chunks_exact(parameters.len())
+        .map(|row| row.iter().zip(parameters).map(|(a, b)| a * b).sum())
+        .collect()
 }
 
 fn inverse_dynamics(tree: &Tree, state: &RandomState) -> Vec<f64> {
@@ -127,7 +129,12 @@ fn base_parameters_of(path: &str, held: &[&str]) -> Option<(Tree, BaseParameters
     let held = held.iter().map(|joint| (joint.to_string(), 0.0)).collect();
     let tree = read_urdf_file(&file, &UrdfOptions { held, ..Default::default() }).unwrap().tree;
     let base = BaseParameters::of_tree(&tree, BaseParametersOptions::default()).unwrap();
-    println!("{path}: {} joints, {} base parameters, rank gap {:.1e}", tree.joint_count(), base.count(), base.rank_gap());
+    println!(
+        "{path}: {} joints, {} base parameters, rank gap {:.1e}",
+        tree.joint_count(),
+        base.count(),
+        base.rank_gap()
+    );
     Some((tree, base))
 }
 
@@ -149,8 +156,10 @@ fn talos_upper_body_has_120_base_parameters() {
     let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..").join(path);
     let Ok(xml) = std::fs::read_to_string(&file) else { return println!("skipped: {path} is absent") };
     let upper_body = |joint: &str| {
-        joint.starts_with("torso_") || joint.starts_with("head_")
-            || ((joint.starts_with("arm_left_") || joint.starts_with("arm_right_")) && joint.ends_with("_joint"))
+        joint.starts_with("torso_")
+            || joint.starts_with("head_")
+            || ((joint.starts_with("arm_left_") || joint.starts_with("arm_right_"))
+                && joint.ends_with("_joint"))
     };
     let all = phiw_dynamics::urdf::read_urdf(&xml, &UrdfOptions::default()).unwrap().tree;
     let held: Vec<&str> = all.joint_names().filter(|joint| !upper_body(joint)).collect();

@@ -14,7 +14,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [urdf, declare, train, rest @ ..] = arguments.as_slice() else {
         return Err("usage: trace_logs URDF EFFECT,… TRAIN,… [VALIDATE,…]".into());
     };
-    let list = |text: &str| text.split(',').filter(|part| !part.is_empty()).map(str::to_owned).collect::<Vec<_>>();
+    let list =
+        |text: &str| text.split(',').filter(|part| !part.is_empty()).map(str::to_owned).collect::<Vec<_>>();
     let paths = |text: &str| list(text).into_iter().map(PathBuf::from).collect::<Vec<_>>();
     let tree = read_urdf_file(urdf, &UrdfOptions::default())?.tree;
     let validate = rest.first().map(|text| paths(text)).unwrap_or_default();
@@ -37,7 +38,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let begin = std::time::Instant::now();
     let identified = identify(&tree, effects, &data)?;
     println!("identified in {:.2?}: held out {:.2} %", begin.elapsed(), 100.0 * identified.held_out.relative);
-    let model = phiw_identification::Model::of_fit(&identified.design, &identified.fit, &[], &[], (0.0, 0.0))?;
+    let model =
+        phiw_identification::Model::of_fit(&identified.design, &identified.fit, &[], &[], (0.0, 0.0))?;
     let floor = noise_floor(
         &model.identified_tree(&tree)?,
         &vec![0.0; tree.joint_count()],
@@ -63,24 +65,63 @@ fn main() -> Result<(), Box<dyn Error>> {
     for effect in &tracing.effects {
         println!(
             "{} {:?} {:?}: {:.2} % -> {:.2} %, explains {:.2}, z {:.1}, confidence {:.3}",
-            effect.spec.kind, effect.spec.joints, effect.spec.constants,
-            100.0 * effect.relative_before, 100.0 * effect.relative, effect.explains, effect.significance, effect.confidence
+            effect.spec.kind,
+            effect.spec.joints,
+            effect.spec.constants,
+            100.0 * effect.relative_before,
+            100.0 * effect.relative,
+            effect.explains,
+            effect.significance,
+            effect.confidence
         );
         for rival in &effect.rivals {
-            println!("    rival {} {:?} {:?} {:.3}", rival.spec.kind, rival.spec.joints, rival.spec.constants, rival.confidence);
+            println!(
+                "    rival {} {:?} {:?} {:.3}",
+                rival.spec.kind, rival.spec.joints, rival.spec.constants, rival.confidence
+            );
         }
         for ranked in effect.ranking.iter().take(4) {
-            println!("    {:.3} % {} {:?} {:?}", 100.0 * ranked.held_out, ranked.spec.kind, ranked.spec.joints, ranked.spec.constants);
+            println!(
+                "    {:.3} % {} {:?} {:?}",
+                100.0 * ranked.held_out,
+                ranked.spec.kind,
+                ranked.spec.joints,
+                ranked.spec.constants
+            );
         }
     }
     for ranked in tracing.remaining.ranking.iter().take(5) {
-        println!("  next {:.3} % {} {:?} {:?}", 100.0 * ranked.held_out, ranked.spec.kind, ranked.spec.joints, ranked.spec.constants);
+        println!(
+            "  next {:.3} % {} {:?} {:?}",
+            100.0 * ranked.held_out,
+            ranked.spec.kind,
+            ranked.spec.joints,
+            ranked.spec.constants
+        );
     }
-    println!("{:?}: held out {:.2} -> {:.2} %", tracing.verdict, 100.0 * tracing.before.1.relative, 100.0 * tracing.model.held_out.relative);
-    println!("rmse {:.4?}\nstructured {:?} {:?}", tracing.model.held_out.rmse, tracing.remaining.joints, tracing.remaining.depends_on);
+    println!(
+        "{:?}: held out {:.2} -> {:.2} %",
+        tracing.verdict,
+        100.0 * tracing.before.1.relative,
+        100.0 * tracing.model.held_out.relative
+    );
+    println!(
+        "rmse {:.4?}\nstructured {:?} {:?}",
+        tracing.model.held_out.rmse, tracing.remaining.joints, tracing.remaining.depends_on
+    );
     for (index, effect) in tracing.model.design.effects().iter().enumerate() {
-        let values: Vec<String> = tracing.model.design.effect_parameters(index).zip(effect.parameters())
-            .map(|(p, info)| format!("{} {:.4}±{:.4}", info.name, tracing.model.fit.parameters[p], tracing.model.fit.standard_deviations[p])).collect();
+        let values: Vec<String> = tracing
+            .model
+            .design
+            .effect_parameters(index)
+            .zip(effect.parameters())
+            .map(|(p, info)| {
+                format!(
+                    "{} {:.4}±{:.4}",
+                    info.name, tracing.model.fit.parameters[p], tracing.model.fit.standard_deviations[p]
+                )
+            })
+            .collect();
         println!("  {} {:?}: {}", effect.spec().kind, effect.spec().joints, values.join(", "));
     }
     println!("traced in {:.2?}", begin.elapsed());

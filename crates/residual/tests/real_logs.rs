@@ -7,7 +7,13 @@ use phiw_telemetry::ConditioningOptions;
 use std::path::PathBuf;
 
 /// Identifies one of the robots of the shared data; `None` where the data are absent.
-fn identify_set(set: &str, urdf: &str, train: &[&str], validate: &[&str], declared: &[&str]) -> Option<Identified> {
+fn identify_set(
+    set: &str,
+    urdf: &str,
+    train: &[&str],
+    validate: &[&str],
+    declared: &[&str],
+) -> Option<Identified> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/logs").join(set);
     if !folder.exists() {
         println!("skipped: ../shared/data/logs/{set} is absent");
@@ -15,8 +21,7 @@ fn identify_set(set: &str, urdf: &str, train: &[&str], validate: &[&str], declar
     }
     let tree = read_urdf_file(folder.join(urdf), &UrdfOptions::default()).unwrap().tree;
     let paths = |names: &[&str]| names.iter().map(|name| folder.join(name)).collect::<Vec<_>>();
-    let env = |name: &str| std::env::var(name).ok().and_then(|value| value.parse().ok());
-    let options = ConditioningOptions { cutoff_hz: env("CUT"), parallel_cutoff_hz: env("PAR"), ..Default::default() };
+    let options = ConditioningOptions::default();
     let logs = LogSet::open(&tree, &paths(train), &paths(validate), &options, &|_, _, _| ()).unwrap();
     let ranges = SignalRanges::of_surveys(logs.training());
     let catalogue = Catalogue::default();
@@ -31,13 +36,21 @@ fn identify_set(set: &str, urdf: &str, train: &[&str], validate: &[&str], declar
     };
     let identified = identify(&tree, effects, &data).unwrap();
     println!("{set}: {}", logs.conditioning());
-    println!("  train {:.2} %, held out {:.2} %", 100.0 * identified.train.relative, 100.0 * identified.held_out.relative);
+    println!(
+        "  train {:.2} %, held out {:.2} %",
+        100.0 * identified.train.relative,
+        100.0 * identified.held_out.relative
+    );
     println!("  rmse {:.3?} of {:.3?}", identified.held_out.rmse, identified.held_out.rms_torque);
     for (index, effect) in identified.design.effects().iter().enumerate() {
         let spec = effect.spec();
         for (parameter, info) in identified.design.effect_parameters(index).zip(effect.parameters()) {
-            let (value, std) = (identified.fit.parameters[parameter], identified.fit.standard_deviations[parameter]);
-            println!("  {} {}: {value:.4} ± {std:.4} {} {:?}", info.joint, info.name, info.unit, spec.constants);
+            let (value, std) =
+                (identified.fit.parameters[parameter], identified.fit.standard_deviations[parameter]);
+            println!(
+                "  {} {}: {value:.4} ± {std:.4} {} {:?}",
+                info.joint, info.name, info.unit, spec.constants
+            );
         }
     }
     Some(identified)
@@ -47,7 +60,9 @@ fn identify_set(set: &str, urdf: &str, train: &[&str], validate: &[&str], declar
 fn value(identified: &Identified, kind: &str, joint: usize) -> f64 {
     let name = identified.design.tree().joint(joint).joint.clone();
     let effects = identified.design.effects();
-    let place = effects.iter().position(|effect| effect.spec().kind == kind && effect.spec().joints == [name.clone()]);
+    let place = effects
+        .iter()
+        .position(|effect| effect.spec().kind == kind && effect.spec().joints == [name.clone()]);
     identified.fit.parameters[identified.design.effect_parameters(place.unwrap()).start]
 }
 
@@ -58,7 +73,8 @@ fn assert_within(found: f64, expected: f64, share: f64, what: &str) {
 #[test]
 fn tx40_has_its_published_friction() {
     let declared = ["viscous_friction", "coulomb_friction", "rotor_inertia"];
-    let Some(identified) = identify_set("tx40", "tx40.urdf", &["train.csv"], &["validate.csv"], &declared) else {
+    let Some(identified) = identify_set("tx40", "tx40.urdf", &["train.csv"], &["validate.csv"], &declared)
+    else {
         return;
     };
     for (joint, published) in [8.11, 5.60, 1.98, 1.11].into_iter().enumerate() {
@@ -70,7 +86,8 @@ fn tx40_has_its_published_friction() {
 #[test]
 fn emps_has_its_published_parameters() {
     let declared = ["viscous_friction", "coulomb_friction", "torque_offset"];
-    let Some(identified) = identify_set("emps", "emps.urdf", &["train.csv"], &["validate.csv"], &declared) else {
+    let Some(identified) = identify_set("emps", "emps.urdf", &["train.csv"], &["validate.csv"], &declared)
+    else {
         return;
     };
     assert_eq!(identified.design.base().count(), 1);

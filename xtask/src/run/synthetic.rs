@@ -27,10 +27,15 @@ const REVERSAL: f64 = 0.005;
 /// Limits of a joint whose URDF names none \[rad or m; rad/s or m/s; N·m or N\].
 const UNLIMITED: [f64; 3] = [2.0, 2.0, 50.0];
 
+/// Friction of a motor that two joints share, over the smaller of their torque limits.
+const SHARED: f64 = 0.06;
+
 /// A robot with viscous and Coulomb friction and rotor inertia on every joint.
 pub struct Plant {
     tree: Tree,
     joints: Vec<Joint>,
+    /// Two joints whose motors turn with the sum of their speeds, which nobody declares.
+    shared: Option<[usize; 2]>,
 }
 
 /// What the motion and the gear of a joint go by.
@@ -50,7 +55,13 @@ impl Plant {
     /// A robot whose gears go by its limits.
     pub fn new(tree: Tree) -> Self {
         let joints = (0..tree.joint_count()).map(|joint| Joint::of(&tree, joint)).collect();
-        Plant { tree, joints }
+        Plant { tree, joints, shared: None }
+    }
+
+    /// The same with a differential behind two joints.
+    pub fn with_shared_motor(mut self, joints: [usize; 2]) -> Self {
+        self.shared = Some(joints);
+        self
     }
 
     /// Writes a log of `rows` rows at `rate` Hz in constant memory; `progress` is told the rows done now and then.
@@ -83,6 +94,15 @@ impl Plant {
                 }
             }
             self.tree.inverse_dynamics(&q, &v, &a, &mut workspace, &mut tau)?;
+            if let Some([first, second]) = self.shared {
+                let gear = |joint: usize| (self.joints[joint].effort, self.joints[joint].speed);
+                let ((effort, speed), (other_effort, other_speed)) = (gear(first), gear(second));
+                let (effort, speed) = (effort.min(other_effort), speed.min(other_speed));
+                let sum = v[first] + v[second];
+                let torque = SHARED * effort * (sum / speed + (sum / (REVERSAL * speed)).tanh());
+                tau[first] += torque;
+                tau[second] += torque;
+            }
             for (index, joint) in self.joints.iter().enumerate() {
                 tau[index] += joint.gear(v[index], a[index]) + TORQUE_NOISE * joint.effort * noise();
                 q[index] += POSITION_NOISE * noise();

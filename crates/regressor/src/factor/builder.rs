@@ -33,7 +33,13 @@ impl FactorBuilder {
             work: Mat::zeros(size, columns),
             waiting: 0,
             householder: Mat::zeros(block, columns),
-            stack: MemBuffer::new(qr_in_place_scratch::<f64>(size, columns, block, Par::Seq, Default::default())),
+            stack: MemBuffer::new(qr_in_place_scratch::<f64>(
+                size,
+                columns,
+                block,
+                Par::Seq,
+                Default::default(),
+            )),
         }
     }
 
@@ -93,7 +99,12 @@ impl FactorBuilder {
     ///
     /// # Errors
     /// `columns` does not name a column of this builder for each column of `factor`.
-    pub fn push_factor(&mut self, factor: &Factor, columns: &[usize], weight: f64) -> Result<(), RegressorError> {
+    pub fn push_factor(
+        &mut self,
+        factor: &Factor,
+        columns: &[usize],
+        weight: f64,
+    ) -> Result<(), RegressorError> {
         check_size("columns of the merged factor", columns.len(), factor.columns())?;
         let rows = self.rows + factor.rows();
         let mut row = vec![0.0; self.columns];

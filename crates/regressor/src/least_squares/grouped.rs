@@ -3,8 +3,8 @@
 //! The torque of joint j feels only the bodies that j moves: its factor holds only their columns, which is smaller and
 //! quicker than one factor of all columns, and lets the joints' weights change without going back to the rows.
 
-use crate::factor::{Factor, FactorBuilder};
 use crate::RegressorError;
+use crate::factor::{Factor, FactorBuilder};
 use phiw_dynamics::check_size;
 
 /// The rows of one torque.
@@ -32,7 +32,11 @@ impl GroupedFactor {
         for group in &groups {
             check_size("parameters of a group", group.parameters.len(), group.factor.parameters())?;
             let largest = group.parameters.iter().copied().max().unwrap_or_default();
-            check_size("parameter index", largest.max(parameter_count.saturating_sub(1)) + 1, parameter_count.max(1))?;
+            check_size(
+                "parameter index",
+                largest.max(parameter_count.saturating_sub(1)) + 1,
+                parameter_count.max(1),
+            )?;
         }
         Ok(GroupedFactor { parameter_count, groups })
     }
@@ -87,7 +91,11 @@ impl GroupedFactor {
     pub fn select(&self, kept: &[usize]) -> Result<Self, RegressorError> {
         let mut renumbered = vec![None; self.parameter_count];
         for (new, &old) in kept.iter().enumerate() {
-            check_size("parameter index", old.max(self.parameter_count.saturating_sub(1)) + 1, self.parameter_count)?;
+            check_size(
+                "parameter index",
+                old.max(self.parameter_count.saturating_sub(1)) + 1,
+                self.parameter_count,
+            )?;
             renumbered[old] = Some(new);
         }
         let restrict = |group: &Group| {
@@ -118,7 +126,8 @@ impl GroupedFactor {
             check_size("parameters of a group", theirs.parameters.len(), mine.parameters.len())?;
             Ok(Group { parameters: mine.parameters.clone(), factor: mine.factor.merge(&theirs.factor)? })
         };
-        let groups: Result<Vec<Group>, RegressorError> = self.groups.iter().zip(&other.groups).map(merge).collect();
+        let groups: Result<Vec<Group>, RegressorError> =
+            self.groups.iter().zip(&other.groups).map(merge).collect();
         Self::new(self.parameter_count, groups?)
     }
 }

@@ -111,7 +111,8 @@ impl LogHistogram {
     const OFFSET: f64 = 2300.0;
 
     fn add(&mut self, value: f64) {
-        let bin = (value.max(1e-20).ln() / Self::STEP + Self::OFFSET).clamp(0.0, (self.counts.len() - 1) as f64);
+        let bin =
+            (value.max(1e-20).ln() / Self::STEP + Self::OFFSET).clamp(0.0, (self.counts.len() - 1) as f64);
         self.counts[bin as usize] += 1;
     }
 

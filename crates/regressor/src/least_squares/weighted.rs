@@ -35,9 +35,13 @@ pub fn ordinary_least_squares(factor: &GroupedFactor) -> Result<Solution, Regres
 /// # Errors
 /// The rows do not determine all parameters.
 pub fn weighted_least_squares(factor: &GroupedFactor) -> Result<WeightedSolution, RegressorError> {
-    let group_rms: Vec<f64> = factor.groups().iter().map(|group| {
-        (group.factor.right_hand_side_sum_of_squares() / group.factor.rows().max(1) as f64).sqrt()
-    }).collect();
+    let group_rms: Vec<f64> = factor
+        .groups()
+        .iter()
+        .map(|group| {
+            (group.factor.right_hand_side_sum_of_squares() / group.factor.rows().max(1) as f64).sqrt()
+        })
+        .collect();
     let smallest: Vec<f64> = group_rms.iter().map(|rms| (1e-9 * rms).max(f64::MIN_POSITIVE.sqrt())).collect();
     // The first weights make every group count alike.
     let mut std: Vec<f64> = group_rms.iter().zip(&smallest).map(|(rms, least)| rms.max(*least)).collect();
@@ -48,9 +52,8 @@ pub fn weighted_least_squares(factor: &GroupedFactor) -> Result<WeightedSolution
         let solution = combined.solve()?;
         let sums = factor.residual_sums_of_squares(&solution.parameters)?;
         let freedom = degrees_of_freedom(factor);
-        let renewed: Vec<f64> = (0..sums.len())
-            .map(|group| (sums[group] / freedom[group]).sqrt().max(smallest[group]))
-            .collect();
+        let renewed: Vec<f64> =
+            (0..sums.len()).map(|group| (sums[group] / freedom[group]).sqrt().max(smallest[group])).collect();
         let change = std.iter().zip(&renewed).map(|(old, new)| (new / old - 1.0).abs()).fold(0.0, f64::max);
         iterations += 1;
         std = renewed;
@@ -70,6 +73,12 @@ fn degrees_of_freedom(factor: &GroupedFactor) -> Vec<f64> {
     for group in factor.groups() {
         group.parameters.iter().for_each(|&parameter| users[parameter] += 1.0);
     }
-    let used = |parameters: &[usize]| parameters.iter().map(|&parameter| 1.0 / users[parameter].max(1.0)).sum::<f64>();
-    factor.groups().iter().map(|group| (group.factor.rows() as f64 - used(&group.parameters)).max(1.0)).collect()
+    let used = |parameters: &[usize]| {
+        parameters.iter().map(|&parameter| 1.0 / users[parameter].max(1.0)).sum::<f64>()
+    };
+    factor
+        .groups()
+        .iter()
+        .map(|group| (group.factor.rows() as f64 - used(&group.parameters)).max(1.0))
+        .collect()
 }

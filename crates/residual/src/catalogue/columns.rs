@@ -98,7 +98,11 @@ impl<F: Formula> OwnTorque<F> {
         };
         OwnTorque {
             parameters: parameters.iter().map(describe).collect(),
-            spec: EffectSpec { kind: kind.to_owned(), joints: vec![name.clone()], constants: constants.clone() },
+            spec: EffectSpec {
+                kind: kind.to_owned(),
+                joints: vec![name.clone()],
+                constants: constants.clone(),
+            },
             joint,
             needs: Needs::default(),
             formula,

@@ -18,13 +18,16 @@ const TERMS_CONSTANT: &str = "terms";
 /// Joints further apart than this along the tree do not share a transmission.
 const LARGEST_DISTANCE: usize = 2;
 
+/// A column computed from the motion of both joints.
+type MotionColumn = fn(&Motion) -> f64;
+
 #[derive(Clone, Copy)]
 struct Term {
     name: &'static str,
     dimension: ParameterKind,
     lower: f64,
     /// Columns in the torques of the first and the second joint of the pair, of the velocities and accelerations of both, and the sign's width.
-    columns: [Option<fn(&Motion) -> f64>; 2],
+    columns: [Option<MotionColumn>; 2],
 }
 
 struct Motion {
@@ -94,7 +97,8 @@ const TERMS: [Term; 8] = [
 ];
 
 /// Sets of terms to try, simplest first: single terms, then the differential's.
-const COMBINATIONS: [u32; 14] = [1, 2, 4, 8, 16, 32, 64, 128, 1 | 4, 1 | 8, 1 | 2 | 4, 1 | 2 | 8, 16 | 64, 32 | 128];
+const COMBINATIONS: [u32; 14] =
+    [1, 2, 4, 8, 16, 32, 64, 128, 1 | 4, 1 | 8, 1 | 2 | 4, 1 | 2 | 8, 16 | 64, 32 | 128];
 
 impl EffectKind for TransmissionCoupling {
     fn name(&self) -> &str {
@@ -126,8 +130,12 @@ impl EffectKind for TransmissionCoupling {
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let chosen = constant(constants, TERMS_CONSTANT, 7.0) as u32;
-        let terms: Vec<Term> =
-            TERMS.iter().enumerate().filter(|(bit, _)| chosen >> bit & 1 == 1).map(|(_, term)| *term).collect();
+        let terms: Vec<Term> = TERMS
+            .iter()
+            .enumerate()
+            .filter(|(bit, _)| chosen >> bit & 1 == 1)
+            .map(|(_, term)| *term)
+            .collect();
         let describe = |term: &Term| EffectParameter {
             joint: tree.joint(site[0]).joint.clone(),
             name: term.name.to_owned(),
@@ -176,7 +184,9 @@ impl Effect for Coupling {
     fn entries(&self) -> Vec<Entry> {
         let of_term = |(parameter, term): (usize, &Term)| {
             let rows = self.site.into_iter().zip(term.columns);
-            rows.filter(|(_, column)| column.is_some()).map(|(row, _)| Entry { row, parameter }).collect::<Vec<_>>()
+            rows.filter(|(_, column)| column.is_some())
+                .map(|(row, _)| Entry { row, parameter })
+                .collect::<Vec<_>>()
         };
         self.terms.iter().enumerate().flat_map(of_term).collect()
     }

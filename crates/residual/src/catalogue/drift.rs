@@ -45,7 +45,11 @@ impl EffectKind for ThermalDrift {
                 (-sample.time() / time_constant).exp()
             } else {
                 let temperature = sample.temperature().get(joint).copied().unwrap_or(f64::NAN);
-                if temperature.is_finite() { (ROOM_TEMPERATURE - temperature) / TEMPERATURE_SPAN } else { 0.0 }
+                if temperature.is_finite() {
+                    (ROOM_TEMPERATURE - temperature) / TEMPERATURE_SPAN
+                } else {
+                    0.0
+                }
             };
             let velocity = sample.qd()[joint];
             out[0] = factor * velocity;

@@ -40,9 +40,16 @@ impl EffectKind for Payload {
         };
         Box::new(BodyColumns {
             rows: pairs.iter().map(|&(row, _)| row).collect(),
-            places: pairs.iter().map(|&(_, place)| (0..count).map(|column| place + column).collect()).collect(),
+            places: pairs
+                .iter()
+                .map(|&(_, place)| (0..count).map(|column| place + column).collect())
+                .collect(),
             parameters: PARAMETER_NAMES[..count].iter().map(parameter).collect(),
-            spec: EffectSpec { kind: self.name().to_owned(), joints: vec![joint], constants: constants.clone() },
+            spec: EffectSpec {
+                kind: self.name().to_owned(),
+                joints: vec![joint],
+                constants: constants.clone(),
+            },
             needs: Needs::default(),
         })
     }
@@ -70,19 +77,36 @@ impl EffectKind for ExternalForce {
         let pairs = pairs_of(&regressor, body_of(tree, site[0]));
         let joint = tree.joint(site[0]).joint.clone();
         // Force first, then its products with the point, so that the simple part leads.
-        let order: Vec<(usize, usize)> =
-            (0..3).map(|axis| (axis, 0)).chain((0..3).flat_map(|axis| (1..4).map(move |at| (axis, at)))).collect();
+        let order: Vec<(usize, usize)> = (0..3)
+            .map(|axis| (axis, 0))
+            .chain((0..3).flat_map(|axis| (1..4).map(move |at| (axis, at))))
+            .collect();
         let parameter = |&(axis, at): &(usize, usize)| {
             let force = ["Fx", "Fy", "Fz"][axis];
-            let (name, unit) = if at == 0 { (force.to_owned(), "N") } else { (format!("{force}_p{}", ["x", "y", "z"][at - 1]), "N·m") };
-            EffectParameter { joint: joint.clone(), name, unit: unit.to_owned(), bounds: (f64::NEG_INFINITY, f64::INFINITY) }
+            let (name, unit) = if at == 0 {
+                (force.to_owned(), "N")
+            } else {
+                (format!("{force}_p{}", ["x", "y", "z"][at - 1]), "N·m")
+            };
+            EffectParameter {
+                joint: joint.clone(),
+                name,
+                unit: unit.to_owned(),
+                bounds: (f64::NEG_INFINITY, f64::INFINITY),
+            }
         };
-        let places = |&(_, place): &(usize, usize)| order.iter().map(|&(axis, at)| (axis + 1) * size + place + at).collect();
+        let places = |&(_, place): &(usize, usize)| {
+            order.iter().map(|&(axis, at)| (axis + 1) * size + place + at).collect()
+        };
         Box::new(BodyColumns {
             rows: pairs.iter().map(|&(row, _)| row).collect(),
             places: pairs.iter().map(places).collect(),
             parameters: order.iter().map(parameter).collect(),
-            spec: EffectSpec { kind: self.name().to_owned(), joints: vec![joint], constants: constants.clone() },
+            spec: EffectSpec {
+                kind: self.name().to_owned(),
+                joints: vec![joint],
+                constants: constants.clone(),
+            },
             needs: Needs { statics: true, ..Needs::default() },
         })
     }

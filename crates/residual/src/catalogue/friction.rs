@@ -11,7 +11,8 @@ pub(super) const WIDTH: &str = "sign_width";
 /// Speeds over which a sign may turn: the plain sign, then up to 0.064 rad/s (m/s), but no more than half of the joint's RMS speed.
 pub(super) fn sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
     let largest = 0.5 * ranges.joints[joint].velocity_rms;
-    let widths = (0..15).map(|step| 0.0005 * 2.0_f64.powf(0.5 * f64::from(step))).filter(|&width| width <= largest);
+    let widths =
+        (0..15).map(|step| 0.0005 * 2.0_f64.powf(0.5 * f64::from(step))).filter(|&width| width <= largest);
     values(WIDTH, [0.0].into_iter().chain(widths))
 }
 
@@ -60,7 +61,8 @@ impl EffectKind for Coulomb {
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));
-        let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = smooth_sign(sample.qd()[joint], width);
+        let columns =
+            move |sample: &Sample<'_>, out: &mut [f64]| out[0] = smooth_sign(sample.qd()[joint], width);
         let parameters = [("fc", ParameterKind::Torque, 0.0)];
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
     }

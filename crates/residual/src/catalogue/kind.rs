@@ -90,7 +90,8 @@ impl SignalRanges {
     pub fn of_surveys(surveys: &[Survey]) -> Self {
         let count = surveys.first().map_or(0, |survey| survey.joints.len());
         let joint = |index: usize| {
-            let mut range = JointRange { position: (f64::INFINITY, f64::NEG_INFINITY), ..JointRange::default() };
+            let mut range =
+                JointRange { position: (f64::INFINITY, f64::NEG_INFINITY), ..JointRange::default() };
             for joint in surveys.iter().map(|survey| &survey.joints[index]) {
                 range.position = (range.position.0.min(joint.q_min), range.position.1.max(joint.q_max));
                 range.velocity_rms = range.velocity_rms.max(joint.velocity_rms);
@@ -102,7 +103,10 @@ impl SignalRanges {
             range
         };
         let moment = |pick: fn((f64, f64)) -> f64, fold: fn(f64, f64) -> f64| {
-            surveys.iter().map(|survey| pick(survey.time_range()) + survey.session.offset).fold(f64::NAN, fold)
+            surveys
+                .iter()
+                .map(|survey| pick(survey.time_range()) + survey.session.offset)
+                .fold(f64::NAN, fold)
         };
         SignalRanges {
             joints: (0..count).map(joint).collect(),

@@ -14,8 +14,8 @@ mod sensing;
 mod sentence;
 
 pub use columns::{Formula, OwnTorque, ParameterKind, smooth_sign};
-pub use sentence::sentence;
 pub use kind::{Constants, EffectKind, JointRange, SignalRanges};
+pub use sentence::sentence;
 
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, EffectCatalogue, EffectError, EffectSpec, Variants};
@@ -87,7 +87,12 @@ impl Catalogue {
     ///
     /// # Errors
     /// The kind is unknown, or cannot be declared for all joints at once.
-    pub fn declare(&self, name: &str, tree: &Tree, ranges: &SignalRanges) -> Result<Vec<Variants>, EffectError> {
+    pub fn declare(
+        &self,
+        name: &str,
+        tree: &Tree,
+        ranges: &SignalRanges,
+    ) -> Result<Vec<Variants>, EffectError> {
         let kind = self.kind(name)?;
         let Some(declared) = kind.declared_constants() else {
             return Err(EffectError::NotDeclarable { kind: name.to_owned() });

@@ -21,7 +21,8 @@ impl EffectKind for JointSpring {
             out[0] = sample.q()[joint];
             out[1] = -1.0;
         };
-        let parameters = [("k", ParameterKind::Stiffness, 0.0), ("k_q0", ParameterKind::Torque, f64::NEG_INFINITY)];
+        let parameters =
+            [("k", ParameterKind::Stiffness, 0.0), ("k_q0", ParameterKind::Torque, f64::NEG_INFINITY)];
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
     }
 }
@@ -45,8 +46,12 @@ impl EffectKind for GravityBalancer {
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
-        let columns = move |sample: &Sample<'_>, out: &mut [f64]| (out[0], out[1]) = sample.q()[joint].sin_cos();
-        let parameters = [("sine", ParameterKind::Torque, f64::NEG_INFINITY), ("cosine", ParameterKind::Torque, f64::NEG_INFINITY)];
+        let columns =
+            move |sample: &Sample<'_>, out: &mut [f64]| (out[0], out[1]) = sample.q()[joint].sin_cos();
+        let parameters = [
+            ("sine", ParameterKind::Torque, f64::NEG_INFINITY),
+            ("cosine", ParameterKind::Torque, f64::NEG_INFINITY),
+        ];
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
     }
 }

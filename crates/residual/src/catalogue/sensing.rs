@@ -171,7 +171,12 @@ impl Effect for Offset {
         Box::new(OffsetColumns(self))
     }
     fn correct(&self, block: &mut Block) {
-        block.q.iter_mut().skip(self.joint).step_by(self.joints).for_each(|position| *position += self.offset);
+        block
+            .q
+            .iter_mut()
+            .skip(self.joint)
+            .step_by(self.joints)
+            .for_each(|position| *position += self.offset);
     }
     fn relinearised(&self, fitted: &[f64]) -> Option<Box<dyn Effect>> {
         let offset = self.offset + fitted.first().copied().unwrap_or_default();
@@ -213,7 +218,9 @@ impl EffectKind for ActuatorSaturation {
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
         let Some(&limit) = found.get(LIMIT) else { return Vec::new() };
         let spread = 0.04 * 0.5_f64.powi(step as i32);
-        [1.0 - spread, 1.0 + spread].map(|factor| Constants::from([(LIMIT.to_owned(), limit * factor)])).to_vec()
+        [1.0 - spread, 1.0 + spread]
+            .map(|factor| Constants::from([(LIMIT.to_owned(), limit * factor)]))
+            .to_vec()
     }
     fn declared_constants(&self) -> Option<Constants> {
         None

@@ -49,7 +49,11 @@ pub(super) fn enumerate(
             if present.iter().any(|spec| spec.kind == kind.name() && spec.joints == joints) && !held_model {
                 continue;
             }
-            if held_model && present.iter().any(|spec| spec.kind == kind.name() && spec.joints == joints && !grows(kind)) {
+            if held_model
+                && present
+                    .iter()
+                    .any(|spec| spec.kind == kind.name() && spec.joints == joints && !grows(kind))
+            {
                 continue;
             }
             for constants in scan(kind, &site, ranges, present, &joints) {
@@ -104,17 +108,20 @@ fn add_pairs(
     present: &[EffectSpec],
     all: &mut Candidates,
 ) {
-    let (Ok(viscous), Ok(coulomb)) = (catalogue.kind("viscous_friction"), catalogue.kind("coulomb_friction")) else {
+    let (Ok(viscous), Ok(coulomb)) = (catalogue.kind("viscous_friction"), catalogue.kind("coulomb_friction"))
+    else {
         return;
     };
     for site in coulomb.sites(tree) {
         let joint = &tree.joint(site[0]).joint;
-        let is_friction = |spec: &EffectSpec| spec.kind == "viscous_friction" || spec.kind == "coulomb_friction";
+        let is_friction =
+            |spec: &EffectSpec| spec.kind == "viscous_friction" || spec.kind == "coulomb_friction";
         if present.iter().any(|spec| is_friction(spec) && spec.joints.contains(joint)) {
             continue;
         }
         for constants in coulomb.scan(&site, ranges) {
-            let pair = vec![viscous.build(tree, &site, &Constants::new()), coulomb.build(tree, &site, &constants)];
+            let pair =
+                vec![viscous.build(tree, &site, &Constants::new()), coulomb.build(tree, &site, &constants)];
             all.push(1, pair, constants.len());
         }
     }

@@ -49,8 +49,18 @@ impl<'a> Evidence<'a> {
         weights: Vec<f64>,
         prior: Option<&'a Factor>,
     ) -> Result<Self, RegressorError> {
-        let mut evidence =
-            Evidence { train, held_out, folds, model, determined, weights, prior, rows: Vec::new(), others: Vec::new(), alone: [Vec::new(), Vec::new()] };
+        let mut evidence = Evidence {
+            train,
+            held_out,
+            folds,
+            model,
+            determined,
+            weights,
+            prior,
+            rows: Vec::new(),
+            others: Vec::new(),
+            alone: [Vec::new(), Vec::new()],
+        };
         evidence.alone = [model_alone(train, model)?, model_alone(held_out, model)?];
         evidence.rows = evidence.model_rows()?;
         evidence.others = (0..train.groups().len()).map(|_| OnceLock::new()).collect();
@@ -112,7 +122,14 @@ impl<'a> Evidence<'a> {
         let model_columns: Vec<usize> = (0..count).chain([columns]).collect();
         if let [row] = rows {
             builder.push_factor(self.others(*row)?, &model_columns, 1.0)?;
-            push_group(&mut builder, &self.train.groups()[*row], self.model, &places, added, self.weights[*row])?;
+            push_group(
+                &mut builder,
+                &self.train.groups()[*row],
+                self.model,
+                &places,
+                added,
+                self.weights[*row],
+            )?;
         } else {
             for (group, weight) in self.train.groups().iter().zip(&self.weights) {
                 push_group(&mut builder, group, self.model, &places, added, *weight)?;
@@ -155,7 +172,8 @@ impl<'a> Evidence<'a> {
     ) -> Result<Vec<f64>, RegressorError> {
         let of_row = |(row, (group, alone)): (usize, (&Group, &Factor))| {
             let whole = rows.contains(&row) && !added.is_empty();
-            let columns = if whole { group.parameters.as_slice() } else { &group.parameters[..alone.parameters()] };
+            let columns =
+                if whole { group.parameters.as_slice() } else { &group.parameters[..alone.parameters()] };
             let own: Vec<f64> = columns.iter().map(|&parameter| parameters[parameter]).collect();
             let factor = if whole { &group.factor } else { alone };
             factor.residual_sum_of_squares(&own)
@@ -168,11 +186,18 @@ impl<'a> Evidence<'a> {
         let gain = |factors: &GroupedFactor, before: &[f64], after: &[f64]| -> f64 {
             let of_group = |row: usize| {
                 let rows = factors.groups()[row].factor.rows() as f64;
-                if before[row] > 0.0 && after[row] > 0.0 { 0.5 * rows * (before[row] / after[row]).ln() } else { 0.0 }
+                if before[row] > 0.0 && after[row] > 0.0 {
+                    0.5 * rows * (before[row] / after[row]).ln()
+                } else {
+                    0.0
+                }
             };
             (0..before.len()).map(of_group).sum()
         };
-        (gain(self.train, &before.train, &after.train), gain(self.held_out, &before.held_out, &after.held_out))
+        (
+            gain(self.train, &before.train, &after.train),
+            gain(self.held_out, &before.held_out, &after.held_out),
+        )
     }
 
     /// For each fold the weighted error of `refit`, with σ of each torque as given.
@@ -219,12 +244,14 @@ impl<'a> Evidence<'a> {
             let r = builder.factor();
             let residual: Vec<f64> = (0..=columns)
                 .map(|row| {
-                    let fitted: f64 = (row..columns).map(|column| r.entry(row, column) * solution[column]).sum();
+                    let fitted: f64 =
+                        (row..columns).map(|column| r.entry(row, column) * solution[column]).sum();
                     r.entry(row, columns) - fitted
                 })
                 .collect();
-            let score: Vec<f64> =
-                (0..columns).map(|column| (0..=column).map(|row| r.entry(row, column) * residual[row]).sum()).collect();
+            let score: Vec<f64> = (0..columns)
+                .map(|column| (0..=column).map(|row| r.entry(row, column) * residual[row]).sum())
+                .collect();
             for row in 0..columns {
                 for column in 0..columns {
                     meat[(row, column)] += score[row] * score[column];
@@ -299,10 +326,9 @@ fn push_group(
     let mut short = vec![0.0; tail.len()];
     let last = tail.iter().map(|&(column, _)| column).max().unwrap_or(right);
     for index in own..=last {
-        short
-            .iter_mut()
-            .zip(&tail)
-            .for_each(|(value, &(column, _))| *value = if column >= index { factor.entry(index, column) } else { 0.0 });
+        short.iter_mut().zip(&tail).for_each(|(value, &(column, _))| {
+            *value = if column >= index { factor.entry(index, column) } else { 0.0 }
+        });
         rest.push_row(&short)?;
     }
     let targets: Vec<usize> = tail.iter().map(|&(_, place)| place).collect();

@@ -78,7 +78,8 @@ fn mean_squared_mass_matrix(
         source.blocks(&mut |block| {
             let step = (block.t.len() / (POSES / sources.len().max(1) / 4).max(1)).max(1);
             for sample in (0..block.t.len()).step_by(step) {
-                if let Err(error) = tree.mass_matrix(&block.q[block.row(sample)], &mut workspace, &mut matrix) {
+                if let Err(error) = tree.mass_matrix(&block.q[block.row(sample)], &mut workspace, &mut matrix)
+                {
                     failure.get_or_insert(error);
                     return;
                 }

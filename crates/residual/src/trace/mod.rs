@@ -14,4 +14,6 @@ mod stage;
 pub use floor::noise_floor;
 pub use probe::Dependence;
 pub use residuals::{ResidualShape, residual_shape};
-pub use search::{FoundEffect, HeldModel, Ranked, Remaining, RivalEffect, TraceInput, TraceOptions, Tracing, Verdict, trace};
+pub use search::{
+    FoundEffect, HeldModel, Ranked, Remaining, RivalEffect, TraceInput, TraceOptions, Tracing, Verdict, trace,
+};

@@ -76,8 +76,13 @@ fn fit_residual(
     row: usize,
 ) -> Result<Option<Refit>, IdentificationError> {
     let group = &factors.groups()[row];
-    let columns: Vec<usize> =
-        group.parameters.iter().enumerate().filter(|(_, p)| added.contains(p)).map(|(column, _)| column).collect();
+    let columns: Vec<usize> = group
+        .parameters
+        .iter()
+        .enumerate()
+        .filter(|(_, p)| added.contains(p))
+        .map(|(column, _)| column)
+        .collect();
     let right = group.factor.parameters();
     // [added columns, f − Φw] as linear combinations of the group's columns.
     let map = faer::Mat::from_fn(right + 1, columns.len() + 1, |column, target| {
@@ -92,15 +97,21 @@ fn fit_residual(
     let reduced = group.factor.combine(map.as_ref())?;
     let Ok(solution) = reduced.solve() else { return Ok(None) };
     let mut fitted = parameters.to_vec();
-    columns.iter().zip(&solution.parameters).for_each(|(&column, value)| fitted[group.parameters[column]] += value);
+    columns
+        .iter()
+        .zip(&solution.parameters)
+        .for_each(|(&column, value)| fitted[group.parameters[column]] += value);
     Ok(Some(Refit { parameters: fitted, train: Vec::new(), held_out: Vec::new() }))
 }
+
+/// Writes the columns of one sample.
+type ProbeColumns = Box<dyn Fn(&Sample<'_>, &mut [f64]) + Send + Sync>;
 
 /// Smooth functions of each signal, for one torque.
 fn probes(fixed: &Fixed<'_>, row: usize, ranges: &SignalRanges) -> Vec<(String, Box<dyn Effect>)> {
     let tree = fixed.tree;
     let mut probes: Vec<(String, Box<dyn Effect>)> = Vec::new();
-    let mut add = |signal: String, count: usize, formula: Box<dyn Fn(&Sample<'_>, &mut [f64]) + Send + Sync>| {
+    let mut add = |signal: String, count: usize, formula: ProbeColumns| {
         let parameters = vec![("coefficient", ParameterKind::Torque, f64::NEG_INFINITY); count];
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| formula(sample, out);
         let effect = OwnTorque::new("probe", tree, row, &Constants::new(), &parameters, columns);
@@ -110,42 +121,64 @@ fn probes(fixed: &Fixed<'_>, row: usize, ranges: &SignalRanges) -> Vec<(String, 
     let joints = ranges.joints.len();
     for other in 0..joints {
         let own = other == row;
-        let name = |signal: &str| if own { signal.to_owned() } else { format!("{signal}.{}", tree.joint(other).joint) };
+        let name = |signal: &str| {
+            if own { signal.to_owned() } else { format!("{signal}.{}", tree.joint(other).joint) }
+        };
         let (lower, upper) = ranges.joints[other].position;
         let scale = PI / (upper - lower).max(1e-9);
         let waves = if own { 4 } else { 2 };
-        add(name("q"), 2 * waves, Box::new(move |sample, out| {
-            let angle = scale * (sample.q()[other] - lower);
-            for wave in 0..waves {
-                (out[2 * wave], out[2 * wave + 1]) = ((wave + 1) as f64 * angle).sin_cos();
-            }
-        }));
+        add(
+            name("q"),
+            2 * waves,
+            Box::new(move |sample, out| {
+                let angle = scale * (sample.q()[other] - lower);
+                for wave in 0..waves {
+                    (out[2 * wave], out[2 * wave + 1]) = ((wave + 1) as f64 * angle).sin_cos();
+                }
+            }),
+        );
         let speed = ranges.joints[other].velocity_rms.max(1e-9);
-        add(name("qd"), 5, Box::new(move |sample, out| {
-            let velocity = sample.qd()[other] / speed;
-            let bend = velocity.clamp(-4.0, 4.0);
-            out.copy_from_slice(&[
-                velocity,
-                bend * bend.abs(),
-                smooth_sign(velocity, 0.05),
-                smooth_sign(velocity, 0.05) * (-velocity.abs() / 0.2).exp(),
-                velocity.abs(),
-            ]);
-        }));
+        add(
+            name("qd"),
+            5,
+            Box::new(move |sample, out| {
+                let velocity = sample.qd()[other] / speed;
+                let bend = velocity.clamp(-4.0, 4.0);
+                out.copy_from_slice(&[
+                    velocity,
+                    bend * bend.abs(),
+                    smooth_sign(velocity, 0.05),
+                    smooth_sign(velocity, 0.05) * (-velocity.abs() / 0.2).exp(),
+                    velocity.abs(),
+                ]);
+            }),
+        );
     }
-    add("qdd".to_owned(), 2, Box::new(move |sample, out| {
-        let acceleration = sample.qdd()[row];
-        out.copy_from_slice(&[acceleration, acceleration.abs()]);
-    }));
+    add(
+        "qdd".to_owned(),
+        2,
+        Box::new(move |sample, out| {
+            let acceleration = sample.qdd()[row];
+            out.copy_from_slice(&[acceleration, acceleration.abs()]);
+        }),
+    );
     let own_speed = 0.05 * ranges.joints[row].velocity_rms.max(1e-9);
-    add("tau".to_owned(), 2, Box::new(move |sample, out| {
-        let torque = sample.reference_torque().get(row).copied().unwrap_or_default();
-        out.copy_from_slice(&[torque, torque.abs() * smooth_sign(sample.qd()[row], own_speed)]);
-    }));
+    add(
+        "tau".to_owned(),
+        2,
+        Box::new(move |sample, out| {
+            let torque = sample.reference_torque().get(row).copied().unwrap_or_default();
+            out.copy_from_slice(&[torque, torque.abs() * smooth_sign(sample.qd()[row], own_speed)]);
+        }),
+    );
     let (start, end) = ranges.session;
-    add("t".to_owned(), 3, Box::new(move |sample, out| {
-        let x = (sample.time() - start) / (end - start).max(1e-9);
-        out.copy_from_slice(&[1.0, x, x * x]);
-    }));
+    add(
+        "t".to_owned(),
+        3,
+        Box::new(move |sample, out| {
+            let x = (sample.time() - start) / (end - start).max(1e-9);
+            out.copy_from_slice(&[1.0, x, x * x]);
+        }),
+    );
     probes
 }

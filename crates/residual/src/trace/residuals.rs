@@ -43,7 +43,8 @@ impl Grid {
         let width = (range.1 - range.0).max(1e-6);
         let first = 1.5 * std::f64::consts::TAU / width;
         let step = 0.25 * std::f64::consts::TAU / width;
-        let count = if first < HIGHEST_FREQUENCY { ((HIGHEST_FREQUENCY - first) / step) as usize + 1 } else { 0 };
+        let count =
+            if first < HIGHEST_FREQUENCY { ((HIGHEST_FREQUENCY - first) / step) as usize + 1 } else { 0 };
         // Short strokes have few bins; very long ones (linear axes in mm) are not followed without end.
         Grid { first, step, sums: vec![(0.0, 0.0); count.min(2000)] }
     }
@@ -54,7 +55,8 @@ impl Grid {
         for sum in &mut self.sums {
             sum.0 += residual * cosine;
             sum.1 += residual * sine;
-            (sine, cosine) = (sine * step_cosine + cosine * step_sine, cosine * step_cosine - sine * step_sine);
+            (sine, cosine) =
+                (sine * step_cosine + cosine * step_sine, cosine * step_cosine - sine * step_sine);
         }
     }
 
@@ -135,7 +137,9 @@ pub fn residual_shape(
                             .parameters
                             .iter()
                             .zip(row_of)
-                            .map(|(&parameter, column)| parameters.get(parameter).map_or(0.0, |value| value * column))
+                            .map(|(&parameter, column)| {
+                                parameters.get(parameter).map_or(0.0, |value| value * column)
+                            })
                             .sum();
                         let measured = row_of[layout.parameters.len()];
                         residual[torque] = if design.counts(row, torque) { measured - fitted } else { 0.0 };

@@ -8,8 +8,8 @@ use super::stage::{Fixed, Judged, Prior, Stage};
 use crate::catalogue::{Catalogue, SignalRanges};
 use phiw_dynamics::Tree;
 use phiw_identification::{
-    BlockSource, Data, Design, EffectCatalogue, EffectSpec, IdentificationError, Identified, KeptBlocks, TorqueError, fit,
-    torque_error,
+    BlockSource, Data, Design, EffectCatalogue, EffectSpec, IdentificationError, Identified, KeptBlocks,
+    TorqueError, fit, torque_error,
 };
 use phiw_regressor::factor::Factor;
 use phiw_regressor::least_squares::GroupedFactor;
@@ -181,7 +181,16 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
     });
     let fixed = Fixed { tree: input.tree, base, catalogue: input.catalogue, data: input.data, prior };
     let residual_std = input.residual_std.clone();
-    Search { fixed, specs: input.declared.clone(), found: Vec::new(), before: None, residual_std, input: &input, options }.run()
+    Search {
+        fixed,
+        specs: input.declared.clone(),
+        found: Vec::new(),
+        before: None,
+        residual_std,
+        input: &input,
+        options,
+    }
+    .run()
 }
 
 struct Search<'a> {
@@ -210,7 +219,8 @@ impl Search<'_> {
         let mut parameters = self.refine(self.input.parameters.clone())?;
         loop {
             let mut ranges = self.input.ranges.clone();
-            let design = self.design(&self.specs)?.with_reference(self.fixed.reference(&self.specs, &parameters)?);
+            let design =
+                self.design(&self.specs)?.with_reference(self.fixed.reference(&self.specs, &parameters)?);
             let positions: Vec<(f64, f64)> = ranges.joints.iter().map(|joint| joint.position).collect();
             let data = self.input.data;
             let all = [data.train.as_slice(), &data.held_out].concat();
@@ -324,11 +334,13 @@ impl Search<'_> {
         let near: Vec<usize> = judged.iter().take(FINALISTS).map(|judged| judged.candidate).collect();
         let judged = stage.judge(&evidence, &fitted.refit, &near, inflation)?;
         let best_of_each = best_of_each(stage, judged);
-        let ranking: Vec<Ranked> = best_of_each.iter().take(10).map(|judged| self.ranked(stage, judged)).collect();
+        let ranking: Vec<Ranked> =
+            best_of_each.iter().take(10).map(|judged| self.ranked(stage, judged)).collect();
         let Some(best) = best_of_each.first() else { return Ok((None, ranking)) };
 
         // The simplest that the folds cannot tell from the best.
-        let std: Vec<f64> = weights_of(&stage.train, &best.refit.train).iter().map(|weight| 1.0 / weight).collect();
+        let std: Vec<f64> =
+            weights_of(&stage.train, &best.refit.train).iter().map(|weight| 1.0 / weight).collect();
         let reference = evidence.fold_errors(&best.refit, &std)?;
         let nothing = evidence.fold_errors(&fitted.refit, &std)?;
         let total: f64 = nothing.iter().zip(&reference).map(|(a, b)| a - b).sum();
@@ -425,7 +437,9 @@ impl Search<'_> {
     fn refine(&mut self, mut parameters: Vec<f64>) -> Result<Vec<f64>, IdentificationError> {
         for step in 0..REFINEMENTS {
             let (places, candidates) = self.near(step)?;
-            if candidates.list.is_empty() && !self.fixed.build(&self.specs)?.iter().any(|effect| !effect.needs().is_empty()) {
+            if candidates.list.is_empty()
+                && !self.fixed.build(&self.specs)?.iter().any(|effect| !effect.needs().is_empty())
+            {
                 break;
             }
             let fitted = self.fitted(candidates, &parameters)?;
@@ -443,7 +457,8 @@ impl Search<'_> {
                 weights_of(&fitted.stage.train, &refit.train).iter().map(|weight| 1.0 / weight).collect();
             changed |= self.relinearise(&mut parameters)?;
             // Columns that need torques had those of the last step.
-            changed |= step == 0 && self.fixed.build(&self.specs)?.iter().any(|effect| !effect.needs().is_empty());
+            changed |=
+                step == 0 && self.fixed.build(&self.specs)?.iter().any(|effect| !effect.needs().is_empty());
             if !changed {
                 break;
             }
@@ -458,7 +473,9 @@ impl Search<'_> {
         // A torque that is down to its noise has nothing to say about a constant.
         let noisy = |spec: &EffectSpec| {
             let joints = spec.joints.iter().filter_map(|joint| self.fixed.tree.joint_index(joint));
-            joints.into_iter().any(|joint| self.residual_std[joint] > DOWN_TO_NOISE * self.input.noise_floor[joint])
+            joints
+                .into_iter()
+                .any(|joint| self.residual_std[joint] > DOWN_TO_NOISE * self.input.noise_floor[joint])
         };
         let places: Vec<usize> = (0..self.specs.len())
             .filter(|&place| !self.is_held(place) && (place >= declared || noisy(&self.specs[place])))
@@ -469,14 +486,20 @@ impl Search<'_> {
             let kind = self.fixed.catalogue.kind(&spec.kind)?;
             let mut near = kind.refine(&spec.constants, step);
             if step == 0 && place < declared && !spec.constants.is_empty() {
-                let site: Vec<usize> = spec.joints.iter().filter_map(|joint| self.fixed.tree.joint_index(joint)).collect();
+                let site: Vec<usize> =
+                    spec.joints.iter().filter_map(|joint| self.fixed.tree.joint_index(joint)).collect();
                 near.extend(kind.scan(&site, &self.input.ranges));
             }
             for constants in near.into_iter().filter(|constants| *constants != spec.constants) {
                 let variant = EffectSpec { constants, ..spec.clone() };
                 let first = candidates.effects.len();
                 candidates.effects.push(self.fixed.catalogue.build(&variant, self.fixed.tree)?);
-                candidates.list.push(Candidate { specs: vec![variant], rank: place, effects: first..first + 1, constants: 0 });
+                candidates.list.push(Candidate {
+                    specs: vec![variant],
+                    rank: place,
+                    effects: first..first + 1,
+                    constants: 0,
+                });
             }
         }
         Ok((places, candidates))
@@ -496,8 +519,9 @@ impl Search<'_> {
         let prior = self.prior_over(&determined)?;
         let weights = weights_of(&stage.train, &now.train);
         let evidence = stage.evidence(&determined, &weights, prior.as_ref())?;
-        let mine: Vec<usize> =
-            (0..stage.candidates.len()).filter(|&candidate| stage.candidates[candidate].rank == place).collect();
+        let mine: Vec<usize> = (0..stage.candidates.len())
+            .filter(|&candidate| stage.candidates[candidate].rank == place)
+            .collect();
         let judged = stage.judge(&evidence, now, &mine, self.input.rows_per_independent)?;
         let gain = |refit: &Refit| {
             let (train, held_out) = evidence.gain(now, refit);
@@ -523,7 +547,8 @@ impl Search<'_> {
         let design = self.design(&self.specs)?;
         let mut changed = false;
         for (place, effect) in design.effects().iter().enumerate() {
-            let own: Vec<f64> = design.effect_parameters(place).map(|parameter| parameters[parameter]).collect();
+            let own: Vec<f64> =
+                design.effect_parameters(place).map(|parameter| parameters[parameter]).collect();
             if let Some(moved) = effect.relinearised(&own) {
                 changed |= own.iter().any(|value| value.abs() > 0.0);
                 self.specs[place] = moved.spec();
@@ -533,7 +558,12 @@ impl Search<'_> {
         Ok(changed)
     }
 
-    fn finish(self, fitted: Fitted, ranking: Vec<Ranked>, shape: &ResidualShape) -> Result<Tracing, IdentificationError> {
+    fn finish(
+        self,
+        fitted: Fitted,
+        ranking: Vec<Ranked>,
+        shape: &ResidualShape,
+    ) -> Result<Tracing, IdentificationError> {
         let stage = fitted.stage;
         let model = stage.model_size();
         let kept: Vec<usize> = (0..model).collect();
@@ -549,8 +579,10 @@ impl Search<'_> {
         if self.input.held.is_some() && self.found.is_empty() {
             final_fit.parameters = self.input.parameters.clone();
         }
-        let after =
-            (torque_error(&train_folds, &final_fit.parameters)?, torque_error(&held_out_folds, &final_fit.parameters)?);
+        let after = (
+            torque_error(&train_folds, &final_fit.parameters)?,
+            torque_error(&held_out_folds, &final_fit.parameters)?,
+        );
         let remaining = self.remaining(&final_fit.parameters, &after.1, ranking, shape)?;
         let design = design.with_reference(self.fixed.reference(&self.specs, &final_fit.parameters)?);
         let verdict = match (self.found.is_empty(), remaining.joints.is_empty()) {
@@ -589,7 +621,8 @@ impl Search<'_> {
             })
             .collect();
         let reference = self.fixed.reference(&self.specs, parameters)?;
-        let probed = probe::probe(&self.fixed, &self.specs, reference, parameters, &self.input.ranges, &structured)?;
+        let probed =
+            probe::probe(&self.fixed, &self.specs, reference, parameters, &self.input.ranges, &structured)?;
         let names: Vec<String> = self.fixed.tree.joint_names().map(str::to_owned).collect();
         let joints = structured.iter().map(|&row| names[row].clone()).collect();
         Ok(Remaining { joints, depends_on: probed, ranking })
@@ -604,7 +637,8 @@ struct Choice {
     rivals: Vec<(usize, f64)>,
 }
 
-const NOT_DETERMINED: &str = "the training logs do not determine the declared model: add motion, or declare fewer effects";
+const NOT_DETERMINED: &str =
+    "the training logs do not determine the declared model: add motion, or declare fewer effects";
 /// Conditioned samples that are kept between passes; longer logs are read again \[bytes\].
 const KEPT_BYTES: usize = 64 << 20;
 /// Candidates that are judged a second time.
@@ -658,7 +692,8 @@ fn weights_of(factors: &GroupedFactor, squares: &[f64]) -> Vec<f64> {
 }
 
 fn relative(factors: &GroupedFactor, squares: &[f64]) -> f64 {
-    let torque: f64 = factors.groups().iter().map(|group| group.factor.right_hand_side_sum_of_squares()).sum();
+    let torque: f64 =
+        factors.groups().iter().map(|group| group.factor.right_hand_side_sum_of_squares()).sum();
     (squares.iter().sum::<f64>() / torque).sqrt()
 }
 

@@ -59,7 +59,11 @@ impl<'a> Fixed<'a> {
     }
 
     /// A rigid body and effects with numbers, for columns that need torques.
-    pub fn reference(&self, specs: &[EffectSpec], parameters: &[f64]) -> Result<ReferenceModel, IdentificationError> {
+    pub fn reference(
+        &self,
+        specs: &[EffectSpec],
+        parameters: &[f64],
+    ) -> Result<ReferenceModel, IdentificationError> {
         let mut tree = self.tree.clone();
         let (base, mut rest) = parameters.split_at(self.base.count());
         tree.set_inertial_parameters(&self.base.to_standard(base, &self.tree.inertial_parameters())?)?;
@@ -130,7 +134,11 @@ impl Stage {
     pub fn determined(&self, prior: Option<&Prior>) -> Result<Vec<bool>, RegressorError> {
         let model = self.model_size();
         if let Some(prior) = prior {
-            return Ok((0..model).map(|parameter| prior.parameters.contains(&parameter) || parameter >= self.design.base().count()).collect());
+            return Ok((0..model)
+                .map(|parameter| {
+                    prior.parameters.contains(&parameter) || parameter >= self.design.base().count()
+                })
+                .collect());
         }
         let kept: Vec<usize> = (0..model).collect();
         let selected = self.train.select(&kept)?;
@@ -151,7 +159,15 @@ impl Stage {
         prior: Option<&'a Factor>,
     ) -> Result<Evidence<'a>, RegressorError> {
         let folds = self.folds.iter().collect();
-        Evidence::new(&self.train, &self.held_out, folds, self.model_size(), determined.to_vec(), weights.to_vec(), prior)
+        Evidence::new(
+            &self.train,
+            &self.held_out,
+            folds,
+            self.model_size(),
+            determined.to_vec(),
+            weights.to_vec(),
+            prior,
+        )
     }
 
     /// Refits with every candidate of `which`; those that leave nothing to identify, or break their bounds, are left out.
@@ -168,13 +184,19 @@ impl Stage {
             .par_iter()
             .map(|&candidate| {
                 let parameters = self.parameters(candidate);
-                let Some(refit) = evidence.refit(&parameters, &self.rows(candidate))? else { return Ok(None) };
+                let Some(refit) = evidence.refit(&parameters, &self.rows(candidate))? else {
+                    return Ok(None);
+                };
                 if !self.within_bounds(candidate, &refit) {
                     return Ok(None);
                 }
                 let (train, held_out) = evidence.gain(before, &refit);
                 let count = parameters.len() + self.candidates[candidate].constants;
-                let rows = self.rows(candidate).iter().map(|&row| self.train.groups()[row].factor.rows()).sum::<u64>();
+                let rows = self
+                    .rows(candidate)
+                    .iter()
+                    .map(|&row| self.train.groups()[row].factor.rows())
+                    .sum::<u64>();
                 let penalty = 0.5 * (rows as f64 / inflation).max(2.0).ln() * count as f64;
                 let score = (train + held_out) / inflation - penalty;
                 Ok(Some(Judged { candidate, refit, score, held_out_gain: held_out / inflation, parameters }))

@@ -1,0 +1,183 @@
+//! Tracing on recordings of a small robot whose secrets are known: named right, with its joints, and nothing else.
+
+use phiw_dynamics::random_tree::RandomNumbers;
+use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+use phiw_dynamics::{Tree, Workspace};
+use phiw_identification::{BlockSource, Data, Fold, Variants, identify};
+use phiw_residual::trace::{TraceInput, TraceOptions, Tracing, Verdict, noise_floor, trace};
+use phiw_residual::{Catalogue, SignalRanges};
+use phiw_telemetry::{Conditioning, ConditioningOptions, Recording};
+
+const URDF: &str = r#"<robot name="two_links"><link name="base"/>
+  <link name="upper"><inertial><origin xyz="0.2 0.01 0"/><mass value="3"/><inertia ixx="0.01" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="lower"><inertial><origin xyz="0.15 0 0.02"/><mass value="1.5"/><inertia ixx="0.005" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="60" velocity="6"/></joint>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/><limit lower="-2.5" upper="2.5" effort="30" velocity="8"/></joint>
+</robot>"#;
+
+/// What a secret sees: time, position, velocity, acceleration of both joints.
+struct State<'a> {
+    t: f64,
+    q: &'a [f64],
+    qd: &'a [f64],
+}
+
+const RATE: f64 = 250.0;
+const SECONDS: f64 = 60.0;
+
+/// A minute of Fourier motion with viscous and Coulomb friction, the secret and torque noise.
+fn record(tree: &Tree, seed: u64, secret: &dyn Fn(&State<'_>, &mut [f64])) -> Recording {
+    let mut random = RandomNumbers::new(seed);
+    let sines: Vec<[f64; 3]> = (0..10)
+        .map(|k| {
+            let frequency = 0.3 + 0.37 * f64::from(k % 5) + random.uniform(0.0, 0.1);
+            [random.uniform(0.2, 0.5), std::f64::consts::TAU * frequency * 0.5, random.uniform(0.0, 6.2)]
+        })
+        .collect();
+    let mut workspace = Workspace::new(tree);
+    let mut recording = Recording { joints: vec!["shoulder".into(), "elbow".into()], ..Recording::default() };
+    for row in 0..(RATE * SECONDS) as usize {
+        let t = row as f64 / RATE;
+        let (mut q, mut qd, mut qdd) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        for (index, [amplitude, omega, phase]) in sines.iter().enumerate() {
+            let (sine, cosine) = (omega * t + phase).sin_cos();
+            q[index / 5] += amplitude * sine;
+            qd[index / 5] += amplitude * omega * cosine;
+            qdd[index / 5] -= amplitude * omega * omega * sine;
+        }
+        let mut torque = [0.0; 2];
+        tree.inverse_dynamics(&q, &qd, &qdd, &mut workspace, &mut torque).unwrap();
+        for joint in 0..2 {
+            torque[joint] += 0.4 * qd[joint] + 0.6 * (qd[joint] / 0.01).tanh();
+        }
+        secret(&State { t, q: &q, qd: &qd }, &mut torque);
+        for torque in &mut torque {
+            let normal = (0..12).map(|_| random.uniform(0.0, 1.0)).sum::<f64>() - 6.0;
+            *torque += 0.05 * normal;
+        }
+        recording.t.push(t);
+        recording.q.extend(q);
+        recording.tau.extend(torque);
+    }
+    recording
+}
+
+/// Traces recordings of the secret with viscous and Coulomb friction declared; fifty seconds train, the rest is held out.
+fn traced(seed: u64, secret: &dyn Fn(&State<'_>, &mut [f64])) -> Tracing {
+    let tree = read_urdf(URDF, &UrdfOptions::default()).unwrap().tree;
+    let log = record(&tree, seed, secret);
+    let surveys = [log.survey().unwrap()];
+    let conditioning = Conditioning::choose(&surveys, &ConditioningOptions::default()).unwrap();
+    let blocks = log.blocks(&conditioning).unwrap();
+    let fold = |piece: usize| Fold { log: 0, start: 3.0 * piece as f64, end: 3.0 * (piece + 1) as f64 };
+    let sources: Vec<&dyn BlockSource> = vec![&blocks];
+    let rest_speeds = vec![0.01; 2];
+    let data = Data {
+        train: (0..12).map(fold).collect(),
+        held_out: (12..20).map(fold).collect(),
+        sources,
+        rest_speeds,
+    };
+    let ranges = SignalRanges::of_surveys(&surveys);
+    let catalogue = Catalogue::default();
+    let declared: Vec<Variants> = ["viscous_friction", "coulomb_friction"]
+        .iter()
+        .flat_map(|kind| catalogue.declare(kind, &tree, &ranges).unwrap())
+        .collect();
+    let identified = identify(&tree, declared, &data).unwrap();
+    let plan = conditioning.plan(&surveys[0]).unwrap();
+    let input = TraceInput {
+        tree: &tree,
+        catalogue: &catalogue,
+        data: &data,
+        ranges,
+        declared: identified.design.effects().iter().map(|effect| effect.spec()).collect(),
+        parameters: identified.fit.parameters.clone(),
+        residual_std: identified.fit.residual_std.clone(),
+        held: None,
+        noise_floor: noise_floor(&tree, &[0.0; 2], &surveys, &conditioning, &data.sources).unwrap(),
+        rows_per_independent: plan.output_rate_hz() / (2.0 * conditioning.parallel_cutoff_hz),
+    };
+    trace(input, &TraceOptions::default()).unwrap()
+}
+
+fn named(tracing: &Tracing) -> Vec<(String, Vec<String>)> {
+    let mut named: Vec<_> =
+        tracing.effects.iter().map(|effect| (effect.spec.kind.clone(), effect.spec.joints.clone())).collect();
+    named.sort();
+    named
+}
+
+/// The secret is found, with its joints, and the error comes down to the noise.
+fn check(secret: impl Fn(&State<'_>, &mut [f64]), expected: &[(&str, &[&str])]) {
+    let tracing = traced(11, &secret);
+    let expected: Vec<(String, Vec<String>)> = expected
+        .iter()
+        .map(|(kind, joints)| ((*kind).to_owned(), joints.iter().map(|joint| (*joint).to_owned()).collect()))
+        .collect();
+    assert_eq!(named(&tracing), expected, "{:?}", tracing.verdict);
+    assert_eq!(tracing.verdict, Verdict::Explained);
+    assert!(tracing.model.held_out.relative < tracing.before.1.relative);
+    for found in &tracing.effects {
+        assert!(found.significance > 3.0 && found.confidence > 0.5, "{found:?}");
+    }
+}
+
+#[test]
+fn a_right_model_is_sufficient() {
+    for seed in 1..=3 {
+        let tracing = traced(seed, &|_, _| ());
+        assert_eq!((named(&tracing), tracing.verdict), (vec![], Verdict::Sufficient), "seed {seed}");
+    }
+}
+
+#[test]
+fn an_offset_is_named() {
+    check(|_, torque| torque[0] += 0.7, &[("torque_offset", &["shoulder"])]);
+}
+
+#[test]
+fn stribeck_friction_is_named() {
+    let stribeck = |state: &State<'_>, torque: &mut [f64]| {
+        torque[1] += (-(state.qd[1] / 0.4).powi(2)).exp() * (state.qd[1] / 0.01).tanh();
+    };
+    check(stribeck, &[("stribeck_friction", &["elbow"])]);
+}
+
+#[test]
+fn a_ripple_is_named_with_its_frequency() {
+    let ripple = |state: &State<'_>, torque: &mut [f64]| torque[0] += 0.4 * (9.0 * state.q[0] + 0.3).sin();
+    check(ripple, &[("torque_ripple", &["shoulder"])]);
+    let tracing = traced(11, &ripple);
+    assert!((tracing.effects[0].spec.constants["periods"] - 9.0).abs() < 0.05);
+}
+
+#[test]
+fn a_shared_transmission_is_named_with_both_joints() {
+    let shared = |state: &State<'_>, torque: &mut [f64]| {
+        let sum = state.qd[0] + state.qd[1];
+        torque.iter_mut().for_each(|torque| *torque += 0.3 * sum + 0.2 * (sum / 0.02).tanh());
+    };
+    check(shared, &[("transmission_coupling", &["shoulder", "elbow"])]);
+}
+
+#[test]
+fn two_secrets_are_both_named() {
+    let both = |state: &State<'_>, torque: &mut [f64]| {
+        torque[0] += 0.15 * state.qd[0] * state.qd[0].abs();
+        torque[1] += 1.1 * (state.q[1] - 0.4);
+    };
+    check(both, &[("joint_spring", &["elbow"]), ("quadratic_friction", &["shoulder"])]);
+}
+
+#[test]
+fn what_is_not_in_the_catalogue_is_not_explained() {
+    // A disturbance that has nothing to do with the motion.
+    let tracing = traced(11, &|state, torque| torque[1] += 0.6 * (9.7 * state.t).sin());
+    assert!(
+        matches!(tracing.verdict, Verdict::Unexplained | Verdict::PartlyExplained),
+        "{:?}",
+        named(&tracing)
+    );
+    assert_eq!(tracing.remaining.joints, ["elbow"]);
+}
