@@ -62,7 +62,11 @@ fn effects(analysis: &Analysis<'_>, text: &mut String) -> std::fmt::Result {
         for (parameter, named) in parameters {
             let value = match undetermined.contains(&parameter) {
                 true => "not separable".to_owned(),
-                false => significant(named.value, 4),
+                // What was fitted by linearisation stands partly in the constant of the same name.
+                false => {
+                    let linearised_at = effect.spec.constants.get(&named.name).copied().unwrap_or_default();
+                    significant(linearised_at + named.value, 4)
+                }
             };
             let std =
                 named.std.map_or(String::new(), |std| format!("± {} {}", significant(std, 2), named.unit));

@@ -25,7 +25,7 @@ pub enum RegressorError {
         /// Index of the row in the block that was pushed.
         row: usize,
     },
-    /// The numerical rank has no clear gap.
+    /// A singular value decomposition that did not converge.
     #[error("an iterative decomposition did not converge")]
     NoConvergence,
 }

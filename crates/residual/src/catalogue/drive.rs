@@ -12,6 +12,9 @@ impl EffectKind for RotorInertia {
     fn name(&self) -> &str {
         "rotor_inertia"
     }
+    fn may_change(&self) -> bool {
+        true
+    }
     fn telling_motion(&self) -> &'static str {
         "quick accelerations in several poses of the joints behind"
     }
@@ -29,6 +32,9 @@ pub struct TorqueOffset;
 impl EffectKind for TorqueOffset {
     fn name(&self) -> &str {
         "torque_offset"
+    }
+    fn may_change(&self) -> bool {
+        true
     }
     fn telling_motion(&self) -> &'static str {
         "rests in several poses"

@@ -32,6 +32,9 @@ impl EffectKind for Viscous {
     fn name(&self) -> &str {
         "viscous_friction"
     }
+    fn may_change(&self) -> bool {
+        true
+    }
     fn telling_motion(&self) -> &'static str {
         "a motion at several constant speeds"
     }
@@ -55,6 +58,9 @@ impl EffectKind for Coulomb {
     }
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
         around(found, WIDTH, step)
+    }
+    fn may_change(&self) -> bool {
+        true
     }
     fn telling_motion(&self) -> &'static str {
         "a motion that reverses often, at low and at high speed"

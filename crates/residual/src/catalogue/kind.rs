@@ -45,6 +45,11 @@ pub trait EffectKind: Send + Sync {
         Some(Constants::new())
     }
 
+    /// Whether its parameters may have changed against a held model that has it already: the change is then found as the same kind again.
+    fn may_change(&self) -> bool {
+        false
+    }
+
     /// Whether a free rigid body takes the effect up entirely, so that it can only be seen against a held model.
     fn needs_held_model(&self) -> bool {
         false

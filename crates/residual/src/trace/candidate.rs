@@ -52,7 +52,7 @@ pub(super) fn enumerate(
             if held_model
                 && present
                     .iter()
-                    .any(|spec| spec.kind == kind.name() && spec.joints == joints && !grows(kind))
+                    .any(|spec| spec.kind == kind.name() && spec.joints == joints && !kind.may_change())
             {
                 continue;
             }
@@ -63,11 +63,6 @@ pub(super) fn enumerate(
     }
     add_pairs(catalogue, tree, ranges, present, &mut all);
     all
-}
-
-/// Kinds whose parameters may have changed against a held model: the change is found as the same kind again.
-fn grows(kind: &dyn EffectKind) -> bool {
-    matches!(kind.name(), "viscous_friction" | "coulomb_friction" | "torque_offset" | "rotor_inertia")
 }
 
 /// Constants to try; a sign's width is the one that the joint's declared friction has, where there is one.

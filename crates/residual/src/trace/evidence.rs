@@ -213,7 +213,7 @@ impl<'a> Evidence<'a> {
     ///
     /// The standard deviations come from the scores of whole folds (a cluster-robust sandwich, Liang & Zeger 1986), so that samples that are correlated
     /// within a fold are not counted one by one.
-    pub fn significance(&self, refit: &Refit, added: &[usize]) -> Result<f64, RegressorError> {
+    pub fn significance(&self, added: &[usize]) -> Result<f64, RegressorError> {
         let (places, count) = self.places();
         let columns = count + added.len();
         let mut builder = FactorBuilder::new(columns + 1);
@@ -233,7 +233,6 @@ impl<'a> Evidence<'a> {
             Err(error) => return Err(error),
         };
         let bread = factor.unit_covariance()?;
-        let _ = refit;
         // Score of a fold: its columns times its residual.
         let mut meat = Mat::<f64>::zeros(columns, columns);
         for fold in &self.folds {

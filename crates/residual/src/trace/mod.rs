@@ -6,14 +6,17 @@
 mod candidate;
 mod evidence;
 mod floor;
+mod input;
 mod probe;
+mod refine;
 mod residuals;
 mod search;
 mod stage;
+mod tracing;
 
 pub use floor::noise_floor;
+pub use input::{HeldModel, TraceInput, TraceOptions};
 pub use probe::Dependence;
 pub use residuals::{ResidualShape, residual_shape};
-pub use search::{
-    FoundEffect, HeldModel, Ranked, Remaining, RivalEffect, TraceInput, TraceOptions, Tracing, Verdict, trace,
-};
+pub use search::trace;
+pub use tracing::{FoundEffect, Ranked, Remaining, RivalEffect, Tracing, Verdict};

@@ -1,164 +1,20 @@
 //! The search for what a model lacks.
 
-use super::candidate::{Candidate, Candidates, enumerate};
+use super::candidate::{Candidates, enumerate};
 use super::evidence::{Refit, paired_t};
-use super::probe::{self, Dependence};
+use super::input::{TraceInput, TraceOptions};
+use super::probe;
 use super::residuals::{ResidualShape, residual_shape};
 use super::stage::{Fixed, Judged, Prior, Stage};
-use crate::catalogue::{Catalogue, SignalRanges};
-use phiw_dynamics::Tree;
+use super::tracing::{FoundEffect, Ranked, Remaining, RivalEffect, Tracing, Verdict};
+use crate::catalogue::SignalRanges;
 use phiw_identification::{
-    BlockSource, Data, Design, EffectCatalogue, EffectSpec, IdentificationError, Identified, KeptBlocks,
-    TorqueError, fit, torque_error,
+    BlockSource, Data, Design, EffectSpec, IdentificationError, Identified, KeptBlocks, TorqueError, fit,
+    torque_error,
 };
 use phiw_regressor::factor::Factor;
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_regressor::{BaseParameters, RegressorError};
-
-/// When a candidate is believed.
-#[derive(Clone, Debug)]
-pub struct TraceOptions {
-    /// Effects at most.
-    pub most_effects: usize,
-    /// Standard deviations (cluster-robust over the folds) that an effect must be from nothing.
-    pub least_significance: f64,
-    /// Share of a torque's held-out residual variance that an effect must take away at least.
-    pub least_share: f64,
-    /// RMS of an effect over the RMS of its torque, at least.
-    pub least_size: f64,
-    /// A residual over the noise floor by less than this is noise.
-    pub floor_margin: f64,
-    /// Autocorrelation over a quarter of a second from which a residual is structure.
-    pub structured_correlation: f64,
-}
-
-impl Default for TraceOptions {
-    fn default() -> Self {
-        TraceOptions {
-            most_effects: 12,
-            least_significance: 3.0,
-            least_share: 0.1,
-            least_size: 0.01,
-            floor_margin: 1.15,
-            structured_correlation: 0.2,
-        }
-    }
-}
-
-/// A model whose parameters are known; what has changed since is sought.
-pub struct HeldModel {
-    /// What its fit knew, over `determined`.
-    pub factor: Factor,
-    /// The parameters that the factor's columns stand for.
-    pub determined: Vec<usize>,
-    /// Standard deviation of each torque's residual when it was fitted.
-    pub residual_std: Vec<f64>,
-}
-
-/// What a trace starts from.
-pub struct TraceInput<'a> {
-    /// The robot.
-    pub tree: &'a Tree,
-    /// The effects to choose from.
-    pub catalogue: &'a Catalogue,
-    /// The logs.
-    pub data: &'a Data<'a>,
-    /// What the training logs cover.
-    pub ranges: SignalRanges,
-    /// The declared effects, constants chosen.
-    pub declared: Vec<EffectSpec>,
-    /// The declared model's parameters, fitted (or held).
-    pub parameters: Vec<f64>,
-    /// Standard deviation of each torque's residual under them \[N·m, N\].
-    pub residual_std: Vec<f64>,
-    /// The model that is held, if one is.
-    pub held: Option<HeldModel>,
-    /// Noise floor of each torque \[N·m, N\].
-    pub noise_floor: Vec<f64>,
-    /// Number of correlated rows that make one independent row: output rate over twice the parallel cut-off.
-    pub rows_per_independent: f64,
-}
-
-/// The answer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// The declared model leaves noise only.
-    Sufficient,
-    /// Effects were added and what remains is noise.
-    Explained,
-    /// Effects were added and structure remains.
-    PartlyExplained,
-    /// There is structure and no effect of the catalogue accounts for it.
-    Unexplained,
-}
-
-/// An effect that the data could not tell from the one that was named.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RivalEffect {
-    /// Kind and joints.
-    pub spec: EffectSpec,
-    /// Its probability against the others.
-    pub confidence: f64,
-}
-
-/// A candidate as it ranked.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Ranked {
-    /// Kind, joints, constants.
-    pub spec: EffectSpec,
-    /// Parameters that it adds.
-    pub parameters: usize,
-    /// Held-out error with it, pooled: RMS of the error over RMS of the torque.
-    pub held_out: f64,
-}
-
-/// An effect that was added.
-#[derive(Clone, Debug)]
-pub struct FoundEffect {
-    /// Kind, joints and constants as finally refined.
-    pub spec: EffectSpec,
-    /// Held-out error once it and all before it are in: RMS of the error over RMS of the torque.
-    pub relative: f64,
-    /// The same without it.
-    pub relative_before: f64,
-    /// Share of the held-out residual variance above the noise floor that it took away.
-    pub explains: f64,
-    /// Its probability against its rivals.
-    pub confidence: f64,
-    /// Standard deviations from nothing.
-    pub significance: f64,
-    /// What the data could not tell from it.
-    pub rivals: Vec<RivalEffect>,
-    /// The best candidates when it was chosen.
-    pub ranking: Vec<Ranked>,
-}
-
-/// What the final model leaves.
-#[derive(Clone, Debug, Default)]
-pub struct Remaining {
-    /// Joints whose residual has structure.
-    pub joints: Vec<String>,
-    /// Signals that the residuals still follow, strongest first.
-    pub depends_on: Vec<Dependence>,
-    /// The best candidates that were not good enough.
-    pub ranking: Vec<Ranked>,
-}
-
-/// The result of a trace.
-pub struct Tracing {
-    /// The verdict.
-    pub verdict: Verdict,
-    /// Declared effects, then those found, with their constants.
-    pub specs: Vec<EffectSpec>,
-    /// The final model; with a held model its parameters are those held, changed by what was found.
-    pub model: Identified,
-    /// Error of the declared (or held) model: training, held out.
-    pub before: (TorqueError, TorqueError),
-    /// The effects that were added, in order.
-    pub effects: Vec<FoundEffect>,
-    /// What is left.
-    pub remaining: Remaining,
-}
 
 /// Traces the residual of the declared (or held) model.
 ///
@@ -193,23 +49,23 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
     .run()
 }
 
-struct Search<'a> {
-    fixed: Fixed<'a>,
-    specs: Vec<EffectSpec>,
+pub(super) struct Search<'a> {
+    pub(super) fixed: Fixed<'a>,
+    pub(super) specs: Vec<EffectSpec>,
     found: Vec<FoundEffect>,
     before: Option<(TorqueError, TorqueError)>,
     /// Standard deviation of each torque's residual under the present model.
-    residual_std: Vec<f64>,
-    input: &'a TraceInput<'a>,
+    pub(super) residual_std: Vec<f64>,
+    pub(super) input: &'a TraceInput<'a>,
     options: &'a TraceOptions,
 }
 
 /// A model, fitted, and what surrounds it in one pass.
-struct Fitted {
-    stage: Stage,
-    determined: Vec<bool>,
+pub(super) struct Fitted {
+    pub(super) stage: Stage,
+    pub(super) determined: Vec<bool>,
     weights: Vec<f64>,
-    refit: Refit,
+    pub(super) refit: Refit,
     prior: Option<Factor>,
 }
 
@@ -242,7 +98,7 @@ impl Search<'_> {
         }
     }
 
-    fn design(&self, specs: &[EffectSpec]) -> Result<Design, IdentificationError> {
+    pub(super) fn design(&self, specs: &[EffectSpec]) -> Result<Design, IdentificationError> {
         let rest_speeds = self.input.data.rest_speeds.clone();
         Ok(Design::new(self.fixed.tree.clone(), self.fixed.base.clone(), self.fixed.build(specs)?)
             .with_rest_speeds(rest_speeds))
@@ -253,7 +109,11 @@ impl Search<'_> {
     }
 
     /// One pass with candidates beside the model, and the model's own weighted fit.
-    fn fitted(&self, candidates: Candidates, parameters: &[f64]) -> Result<Fitted, IdentificationError> {
+    pub(super) fn fitted(
+        &self,
+        candidates: Candidates,
+        parameters: &[f64],
+    ) -> Result<Fitted, IdentificationError> {
         let reference = self.fixed.reference(&self.specs, parameters)?;
         let stage = self.fixed.pass(&self.specs, candidates, reference)?;
         let determined = stage.determined(self.fixed.prior.as_ref())?;
@@ -263,7 +123,7 @@ impl Search<'_> {
     }
 
     /// The held model's factor over the determined parameters of the grown model, in their order.
-    fn prior_over(&self, determined: &[bool]) -> Result<Option<Factor>, RegressorError> {
+    pub(super) fn prior_over(&self, determined: &[bool]) -> Result<Option<Factor>, RegressorError> {
         let Some(prior) = &self.fixed.prior else { return Ok(None) };
         let kept: Vec<usize> = (0..determined.len()).filter(|&parameter| determined[parameter]).collect();
         let columns: Vec<usize> = prior
@@ -356,7 +216,7 @@ impl Search<'_> {
         }
         equals.sort_by_key(|judged| complexity(stage, judged));
         let chosen = equals[0].clone();
-        let significance = evidence.significance(&chosen.refit, &chosen.parameters)?;
+        let significance = evidence.significance(&chosen.parameters)?;
         let weigh = |judged: &Judged| (judged.score - best.score).max(-700.0).exp();
         let sum: f64 = equals.iter().map(weigh).sum();
         let share = |judged: &Judged| (judged.candidate, weigh(judged) / sum);
@@ -432,130 +292,8 @@ impl Search<'_> {
         parameters[..stage.model_size()].iter().copied().chain(added).collect()
     }
 
-    /// Refines the constants of the effect found last and the widths of the signs on its joints, and linearises anew what is linearised: one
-    /// pass a step, for all of them.
-    fn refine(&mut self, mut parameters: Vec<f64>) -> Result<Vec<f64>, IdentificationError> {
-        for step in 0..REFINEMENTS {
-            let (places, candidates) = self.near(step)?;
-            if candidates.list.is_empty()
-                && !self.fixed.build(&self.specs)?.iter().any(|effect| !effect.needs().is_empty())
-            {
-                break;
-            }
-            let fitted = self.fitted(candidates, &parameters)?;
-            let mut changed = false;
-            let mut refit = fitted.refit.clone();
-            for place in places {
-                if let Some((spec, better)) = self.best_near(&fitted, place, &refit)? {
-                    changed |= spec != self.specs[place];
-                    self.specs[place] = spec;
-                    refit = better;
-                }
-            }
-            parameters = refit.parameters[..fitted.stage.model_size()].to_vec();
-            self.residual_std =
-                weights_of(&fitted.stage.train, &refit.train).iter().map(|weight| 1.0 / weight).collect();
-            changed |= self.relinearise(&mut parameters)?;
-            // Columns that need torques had those of the last step.
-            changed |=
-                step == 0 && self.fixed.build(&self.specs)?.iter().any(|effect| !effect.needs().is_empty());
-            if !changed {
-                break;
-            }
-        }
-        Ok(parameters)
-    }
-
-    /// Constants to try in the place of those of the effects found and of the declared ones whose constants the data chose: each missing effect has
-    /// bent the choice. All of the kind's scan first, then closer and closer to the best.
-    fn near(&self, step: usize) -> Result<(Vec<usize>, Candidates), IdentificationError> {
-        let declared = self.input.declared.len();
-        // A torque that is down to its noise has nothing to say about a constant.
-        let noisy = |spec: &EffectSpec| {
-            let joints = spec.joints.iter().filter_map(|joint| self.fixed.tree.joint_index(joint));
-            joints
-                .into_iter()
-                .any(|joint| self.residual_std[joint] > DOWN_TO_NOISE * self.input.noise_floor[joint])
-        };
-        let places: Vec<usize> = (0..self.specs.len())
-            .filter(|&place| !self.is_held(place) && (place >= declared || noisy(&self.specs[place])))
-            .collect();
-        let mut candidates = Candidates { list: Vec::new(), effects: Vec::new() };
-        for &place in &places {
-            let spec = &self.specs[place];
-            let kind = self.fixed.catalogue.kind(&spec.kind)?;
-            let mut near = kind.refine(&spec.constants, step);
-            if step == 0 && place < declared && !spec.constants.is_empty() {
-                let site: Vec<usize> =
-                    spec.joints.iter().filter_map(|joint| self.fixed.tree.joint_index(joint)).collect();
-                near.extend(kind.scan(&site, &self.input.ranges));
-            }
-            for constants in near.into_iter().filter(|constants| *constants != spec.constants) {
-                let variant = EffectSpec { constants, ..spec.clone() };
-                let first = candidates.effects.len();
-                candidates.effects.push(self.fixed.catalogue.build(&variant, self.fixed.tree)?);
-                candidates.list.push(Candidate {
-                    specs: vec![variant],
-                    rank: place,
-                    effects: first..first + 1,
-                    constants: 0,
-                });
-            }
-        }
-        Ok((places, candidates))
-    }
-
-    /// The best of the constants near one effect's, if any beats its own; the refit's parameters are in the effect's own place.
-    fn best_near(
-        &self,
-        fitted: &Fitted,
-        place: usize,
-        now: &Refit,
-    ) -> Result<Option<(EffectSpec, Refit)>, IdentificationError> {
-        let stage = &fitted.stage;
-        let own: Vec<usize> = stage.design.effect_parameters(place).collect();
-        let mut determined = fitted.determined.clone();
-        own.iter().for_each(|&parameter| determined[parameter] = false);
-        let prior = self.prior_over(&determined)?;
-        let weights = weights_of(&stage.train, &now.train);
-        let evidence = stage.evidence(&determined, &weights, prior.as_ref())?;
-        let mine: Vec<usize> = (0..stage.candidates.len())
-            .filter(|&candidate| stage.candidates[candidate].rank == place)
-            .collect();
-        let judged = stage.judge(&evidence, now, &mine, self.input.rows_per_independent)?;
-        let gain = |refit: &Refit| {
-            let (train, held_out) = evidence.gain(now, refit);
-            train + held_out
-        };
-        let best = judged.into_iter().filter(|judged| gain(&judged.refit) > 0.0);
-        let best = best.max_by(|a, b| gain(&a.refit).total_cmp(&gain(&b.refit)));
-        Ok(best.map(|best| {
-            let mut refit = best.refit;
-            for (own, variant) in own.iter().zip(&best.parameters) {
-                refit.parameters[*own] = refit.parameters[*variant];
-            }
-            (stage.candidates[best.candidate].specs[0].clone(), refit)
-        }))
-    }
-
-    fn is_held(&self, place: usize) -> bool {
+    pub(super) fn is_held(&self, place: usize) -> bool {
         self.input.held.is_some() && place < self.input.declared.len()
-    }
-
-    /// Moves the point of linearisation of effects that have one.
-    fn relinearise(&mut self, parameters: &mut [f64]) -> Result<bool, IdentificationError> {
-        let design = self.design(&self.specs)?;
-        let mut changed = false;
-        for (place, effect) in design.effects().iter().enumerate() {
-            let own: Vec<f64> =
-                design.effect_parameters(place).map(|parameter| parameters[parameter]).collect();
-            if let Some(moved) = effect.relinearised(&own) {
-                changed |= own.iter().any(|value| value.abs() > 0.0);
-                self.specs[place] = moved.spec();
-                design.effect_parameters(place).for_each(|parameter| parameters[parameter] = 0.0);
-            }
-        }
-        Ok(changed)
     }
 
     fn finish(
@@ -652,10 +390,6 @@ const NEAR_SCORE: f64 = 6.0;
 const NEAR_SHARE: f64 = 0.02;
 /// A rival that is less probable is none.
 const LEAST_RIVAL: f64 = 0.01;
-/// A residual over the noise floor by less than this says nothing about a constant.
-const DOWN_TO_NOISE: f64 = 1.05;
-/// Passes to refine constants.
-const REFINEMENTS: usize = 3;
 
 /// The best variant of each hypothesis, best first.
 fn best_of_each(stage: &Stage, judged: Vec<Judged>) -> Vec<Judged> {
@@ -682,7 +416,7 @@ fn rms(factors: &GroupedFactor) -> Vec<f64> {
     factors.groups().iter().map(of_group).collect()
 }
 
-fn weights_of(factors: &GroupedFactor, squares: &[f64]) -> Vec<f64> {
+pub(super) fn weights_of(factors: &GroupedFactor, squares: &[f64]) -> Vec<f64> {
     let torque = rms(factors);
     let weight = |row: usize| {
         let rows = factors.groups()[row].factor.rows().max(1) as f64;

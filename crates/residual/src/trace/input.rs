@@ -1,0 +1,70 @@
+//! What a trace starts from, and when it believes a candidate.
+
+use crate::catalogue::{Catalogue, SignalRanges};
+use phiw_dynamics::Tree;
+use phiw_identification::{Data, EffectSpec};
+use phiw_regressor::factor::Factor;
+
+/// When a candidate is believed.
+#[derive(Clone, Debug)]
+pub struct TraceOptions {
+    /// Effects at most.
+    pub most_effects: usize,
+    /// Standard deviations (cluster-robust over the folds) that an effect must be from nothing.
+    pub least_significance: f64,
+    /// Share of a torque's held-out residual variance that an effect must take away at least.
+    pub least_share: f64,
+    /// RMS of an effect over the RMS of its torque, at least.
+    pub least_size: f64,
+    /// A residual over the noise floor by less than this is noise.
+    pub floor_margin: f64,
+    /// Autocorrelation over a quarter of a second from which a residual is structure.
+    pub structured_correlation: f64,
+}
+
+impl Default for TraceOptions {
+    fn default() -> Self {
+        TraceOptions {
+            most_effects: 12,
+            least_significance: 3.0,
+            least_share: 0.1,
+            least_size: 0.01,
+            floor_margin: 1.15,
+            structured_correlation: 0.2,
+        }
+    }
+}
+
+/// A model whose parameters are known; what has changed since is sought.
+pub struct HeldModel {
+    /// What its fit knew, over `determined`.
+    pub factor: Factor,
+    /// The parameters that the factor's columns stand for.
+    pub determined: Vec<usize>,
+    /// Standard deviation of each torque's residual when it was fitted.
+    pub residual_std: Vec<f64>,
+}
+
+/// What a trace starts from.
+pub struct TraceInput<'a> {
+    /// The robot.
+    pub tree: &'a Tree,
+    /// The effects to choose from.
+    pub catalogue: &'a Catalogue,
+    /// The logs.
+    pub data: &'a Data<'a>,
+    /// What the training logs cover.
+    pub ranges: SignalRanges,
+    /// The declared effects, constants chosen.
+    pub declared: Vec<EffectSpec>,
+    /// The declared model's parameters, fitted (or held).
+    pub parameters: Vec<f64>,
+    /// Standard deviation of each torque's residual under them \[N·m, N\].
+    pub residual_std: Vec<f64>,
+    /// The model that is held, if one is.
+    pub held: Option<HeldModel>,
+    /// Noise floor of each torque \[N·m, N\].
+    pub noise_floor: Vec<f64>,
+    /// Number of correlated rows that make one independent row: output rate over twice the parallel cut-off.
+    pub rows_per_independent: f64,
+}

@@ -1,0 +1,85 @@
+//! The result of a trace.
+
+use super::probe::Dependence;
+use phiw_identification::{EffectSpec, Identified, TorqueError};
+
+/// The answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The declared model leaves noise only.
+    Sufficient,
+    /// Effects were added and what remains is noise.
+    Explained,
+    /// Effects were added and structure remains.
+    PartlyExplained,
+    /// There is structure and no effect of the catalogue accounts for it.
+    Unexplained,
+}
+
+/// An effect that the data could not tell from the one that was named.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RivalEffect {
+    /// Kind and joints.
+    pub spec: EffectSpec,
+    /// Its probability against the others.
+    pub confidence: f64,
+}
+
+/// A candidate as it ranked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ranked {
+    /// Kind, joints, constants.
+    pub spec: EffectSpec,
+    /// Parameters that it adds.
+    pub parameters: usize,
+    /// Held-out error with it, pooled: RMS of the error over RMS of the torque.
+    pub held_out: f64,
+}
+
+/// An effect that was added.
+#[derive(Clone, Debug)]
+pub struct FoundEffect {
+    /// Kind, joints and constants as finally refined.
+    pub spec: EffectSpec,
+    /// Held-out error once it and all before it are in: RMS of the error over RMS of the torque.
+    pub relative: f64,
+    /// The same without it.
+    pub relative_before: f64,
+    /// Share of the held-out residual variance above the noise floor that it took away.
+    pub explains: f64,
+    /// Its probability against its rivals.
+    pub confidence: f64,
+    /// Standard deviations from nothing.
+    pub significance: f64,
+    /// What the data could not tell from it.
+    pub rivals: Vec<RivalEffect>,
+    /// The best candidates when it was chosen.
+    pub ranking: Vec<Ranked>,
+}
+
+/// What the final model leaves.
+#[derive(Clone, Debug, Default)]
+pub struct Remaining {
+    /// Joints whose residual has structure.
+    pub joints: Vec<String>,
+    /// Signals that the residuals still follow, strongest first.
+    pub depends_on: Vec<Dependence>,
+    /// The best candidates that were not good enough.
+    pub ranking: Vec<Ranked>,
+}
+
+/// The result of a trace.
+pub struct Tracing {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Declared effects, then those found, with their constants.
+    pub specs: Vec<EffectSpec>,
+    /// The final model; with a held model its parameters are those held, changed by what was found.
+    pub model: Identified,
+    /// Error of the declared (or held) model: training, held out.
+    pub before: (TorqueError, TorqueError),
+    /// The effects that were added, in order.
+    pub effects: Vec<FoundEffect>,
+    /// What is left.
+    pub remaining: Remaining,
+}
