@@ -37,7 +37,12 @@ pub fn tree() -> Tree {
 
 /// A log of the robot following sums of sines, from `seed`, with viscous friction and torque noise.
 pub fn recording(seed: u64, seconds: f64) -> Recording {
-    let tree = tree();
+    recording_of(URDF, seed, seconds)
+}
+
+/// The same of a robot of the same joints.
+pub fn recording_of(urdf: &str, seed: u64, seconds: f64) -> Recording {
+    let tree = read_urdf(urdf, &UrdfOptions::default()).unwrap().tree;
     let mut random = RandomNumbers::new(seed);
     let joints = tree.joint_count();
     let sines: Vec<[[f64; 3]; 5]> = (0..joints)
