@@ -1,21 +1,16 @@
 //! What acts from outside or has been added: a payload, a force, gravity from another direction.
 
-use super::kind::{Constants, EffectKind, constant, values};
+use super::kind::{Constants, EffectKind};
 use phiw_dynamics::{PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree};
 use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
 use phiw_regressor::JointTorqueRegressor;
 
-/// A rigid body held at a link: mass and first moment, and the inertia where `inertia` is one.
+/// A rigid body held at a link: mass, first moment and inertia.
 pub struct Payload;
-
-const INERTIA: &str = "inertia";
 
 impl EffectKind for Payload {
     fn name(&self) -> &str {
         "payload"
-    }
-    fn scan(&self, _site: &[usize], _ranges: &super::SignalRanges) -> Vec<Constants> {
-        values(INERTIA, [0.0, 1.0])
     }
     fn declared_constants(&self) -> Option<Constants> {
         None
@@ -29,7 +24,6 @@ impl EffectKind for Payload {
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let regressor = JointTorqueRegressor::new(tree);
         let body = body_of(tree, site[0]);
-        let count = if constant(constants, INERTIA, 1.0) > 0.0 { PARAMETERS_PER_BODY } else { 4 };
         let pairs = pairs_of(&regressor, body);
         let joint = tree.joint(site[0]).joint.clone();
         let parameter = |name: &&str| EffectParameter {
@@ -42,9 +36,9 @@ impl EffectKind for Payload {
             rows: pairs.iter().map(|&(row, _)| row).collect(),
             places: pairs
                 .iter()
-                .map(|&(_, place)| (0..count).map(|column| place + column).collect())
+                .map(|&(_, place)| (0..PARAMETERS_PER_BODY).map(|column| place + column).collect())
                 .collect(),
-            parameters: PARAMETER_NAMES[..count].iter().map(parameter).collect(),
+            parameters: PARAMETER_NAMES.iter().map(parameter).collect(),
             spec: EffectSpec {
                 kind: self.name().to_owned(),
                 joints: vec![joint],

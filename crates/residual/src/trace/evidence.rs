@@ -139,16 +139,24 @@ impl<'a> Evidence<'a> {
             }
         }
         let factor = builder.factor();
-        let solution = match factor.solve() {
-            Ok(solution) => solution.parameters,
-            Err(RegressorError::RankDeficient { .. }) => return Ok(None),
-            Err(error) => return Err(error),
-        };
-        // Columns that the model has absorbed but for a thousandth say nothing that the model does not.
-        let absorbed = |column: usize| factor.entry(column, column) < ABSORBED * factor.column_norm(column);
-        if (count..columns).any(absorbed) {
+        // Columns that the motion does not excite, or that the model has absorbed but for a thousandth, say nothing: the rest of the candidate may.
+        let silent = |column: usize| factor.entry(column, column) < ABSORBED * factor.column_norm(column);
+        let undetermined = factor.undetermined_columns();
+        if undetermined.iter().any(|&column| column < count) {
             return Ok(None);
         }
+        let heard: Vec<usize> = (0..added.len())
+            // A dependent column shifts the diagonal of those after it: first the one, then the other.
+            .filter(|&place| match undetermined.is_empty() {
+                true => !silent(count + place),
+                false => !undetermined.contains(&(count + place)),
+            })
+            .map(|place| added[place])
+            .collect();
+        if heard.len() < added.len() {
+            return if heard.is_empty() { Ok(None) } else { self.refit(&heard, rows) };
+        }
+        let solution = factor.solve()?.parameters;
         let mut parameters = vec![0.0; self.train.parameter_count()];
         for (parameter, place) in places.iter().enumerate() {
             parameters[parameter] = place.map_or(0.0, |place| solution[place]);

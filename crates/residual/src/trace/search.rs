@@ -33,6 +33,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
     let prior = input.held.as_ref().map(|held| Prior {
         factor: held.factor.clone(),
         parameters: held.determined.clone(),
+        known: input.parameters.len(),
         weights: held.residual_std.iter().map(|std| 1.0 / std.max(f64::MIN_POSITIVE)).collect(),
     });
     let fixed = Fixed { tree: input.tree, base, catalogue: input.catalogue, data: input.data, prior };
@@ -216,7 +217,13 @@ impl Search<'_> {
         }
         equals.sort_by_key(|judged| complexity(stage, judged));
         let chosen = equals[0].clone();
-        let significance = evidence.significance(&chosen.parameters)?;
+        let heard: Vec<usize> = chosen
+            .parameters
+            .iter()
+            .copied()
+            .filter(|&parameter| chosen.refit.parameters[parameter] != 0.0)
+            .collect();
+        let significance = evidence.significance(&heard)?;
         let weigh = |judged: &Judged| (judged.score - best.score).max(-700.0).exp();
         let sum: f64 = equals.iter().map(weigh).sum();
         let share = |judged: &Judged| (judged.candidate, weigh(judged) / sum);

@@ -7,7 +7,7 @@ use phiw_dynamics::Tree;
 use phiw_identification::{
     Data, Design, Effect, EffectCatalogue, EffectSpec, IdentificationError, ReferenceModel, accumulate, merge,
 };
-use phiw_regressor::factor::Factor;
+use phiw_regressor::factor::{Factor, FactorBuilder};
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_regressor::{BaseParameters, RegressorError};
 use rayon::prelude::*;
@@ -26,6 +26,8 @@ pub(super) struct Fixed<'a> {
 pub(super) struct Prior {
     pub factor: Factor,
     pub parameters: Vec<usize>,
+    /// Number of parameters that the held model has, determined or not.
+    pub known: usize,
     /// 1/σ of each torque when it was fitted.
     pub weights: Vec<f64>,
 }
@@ -134,11 +136,7 @@ impl Stage {
     pub fn determined(&self, prior: Option<&Prior>) -> Result<Vec<bool>, RegressorError> {
         let model = self.model_size();
         if let Some(prior) = prior {
-            return Ok((0..model)
-                .map(|parameter| {
-                    prior.parameters.contains(&parameter) || parameter >= self.design.base().count()
-                })
-                .collect());
+            return self.determined_beside(prior);
         }
         let kept: Vec<usize> = (0..model).collect();
         let selected = self.train.select(&kept)?;
@@ -149,6 +147,24 @@ impl Stage {
         let weights: Vec<f64> = selected.groups().iter().map(scale).collect();
         let undetermined = selected.combine(&weights)?.undetermined_columns();
         Ok((0..model).map(|parameter| !undetermined.contains(&parameter)).collect())
+    }
+
+    /// The same where a prior determines the base and the effects that it knew; those added since need the rows.
+    fn determined_beside(&self, prior: &Prior) -> Result<Vec<bool>, RegressorError> {
+        let model = self.model_size();
+        let mut builder = FactorBuilder::new(model + 1);
+        let columns: Vec<usize> = prior.parameters.iter().copied().chain([model]).collect();
+        builder.push_factor(&prior.factor, &columns, 1.0)?;
+        let kept: Vec<usize> = (0..model).collect();
+        let rows = self.train.select(&kept)?.combine(&prior.weights)?;
+        let all: Vec<usize> = (0..=model).collect();
+        builder.push_factor(&rows, &all, 1.0)?;
+        let undetermined = builder.factor().undetermined_columns();
+        let known = |parameter: &usize| {
+            let since = *parameter >= prior.known;
+            (since || prior.parameters.contains(parameter)) && !undetermined.contains(parameter)
+        };
+        Ok((0..model).map(|parameter| known(&parameter)).collect())
     }
 
     /// The evidence with the given weights.
@@ -191,7 +207,10 @@ impl Stage {
                     return Ok(None);
                 }
                 let (train, held_out) = evidence.gain(before, &refit);
-                let count = parameters.len() + self.candidates[candidate].constants;
+                // A parameter that the rows do not determine costs nothing.
+                let heard =
+                    parameters.iter().filter(|&&parameter| refit.parameters[parameter] != 0.0).count();
+                let count = heard + self.candidates[candidate].constants;
                 let rows = self
                     .rows(candidate)
                     .iter()
