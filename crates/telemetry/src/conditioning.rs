@@ -9,7 +9,7 @@ use std::fmt;
 pub struct ConditioningOptions {
     /// Cut-off of the positions' low-pass, in Hz.
     pub cutoff_hz: Option<f64>,
-    /// Cut-off of the parallel filter over columns and torque, in Hz; by default the motion's bandwidth, a tenth of the positions' cut-off, but at
+    /// Cut-off of the parallel filter over columns and torque, in Hz; by default the motion's bandwidth, an eighth of the positions' cut-off, but at
     /// least 10 Hz.
     pub parallel_cutoff_hz: Option<f64>,
     /// Samples from one output to the next; by default the output rate is about four times the parallel

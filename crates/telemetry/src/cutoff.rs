@@ -22,7 +22,7 @@ pub struct CutoffSuggestion {
 pub enum Bound {
     /// A higher one would let more noise into the acceleration than it saves of the signal.
     Noise,
-    /// It is ten times the frequency below which all but a thousandth of the velocity's power lies:
+    /// It is eight times the frequency below which all but a thousandth of the velocity's power lies:
     /// vibration above it is no motion of the
     /// rigid body.
     Motion,
@@ -36,7 +36,7 @@ impl fmt::Display for Bound {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(match self {
             Bound::Noise => "noise",
-            Bound::Motion => "ten times the motion's bandwidth",
+            Bound::Motion => "eight times the motion's bandwidth",
             Bound::SampleRate => "sample rate",
             Bound::Duration => "segments' length",
         })
@@ -52,9 +52,9 @@ const NEAR: f64 = 1.5;
 const NEGLIGIBLE: f64 = 1e-6;
 /// Share of the velocity's power that may lie above the motion's bandwidth.
 const VELOCITY_SHARE_ABOVE: f64 = 1e-3;
-/// Cut-off over the motion's bandwidth: twice the rule of Gautier, Janot and Vandanjon (2013), since trapezoidal and minimum-jerk motions have
-/// corners that five times the bandwidth still rounds.
-pub(crate) const BANDWIDTHS: f64 = 10.0;
+/// Cut-off over the motion's bandwidth: above the five of Gautier, Janot and Vandanjon (2013), since trapezoidal and minimum-jerk motions have
+/// corners that those still round.
+pub(crate) const BANDWIDTHS: f64 = 8.0;
 
 /// A cut-off for each joint of a log that moves.
 pub(crate) fn suggest(survey: &Survey, log: usize) -> Vec<CutoffSuggestion> {

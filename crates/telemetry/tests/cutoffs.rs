@@ -69,7 +69,7 @@ fn the_error_is_near_the_best_that_any_cutoff_gives() {
             println!(
                 "{rate} Hz, noise {noise:.0e}: {chosen:.1} Hz gives {got:.1e}, best {best:.1} Hz {least:.1e}"
             );
-            assert!((2.5..20.5).contains(&chosen), "{chosen}");
+            assert!((2.5..41.0).contains(&chosen), "{chosen}");
             // A millionth of the power is as good as none: the acceleration is about 2 rms.
             assert!(
                 got < 2.0 * least + 1e-3,
@@ -173,8 +173,8 @@ fn real_logs() {
     };
     let six: Vec<String> = (1..=6).map(|i| format!("joint_{i}")).collect();
     let six: Vec<&str> = six.iter().map(String::as_str).collect();
-    check(&["tx40/train.csv", "tx40/validate.csv"], &six, 20.0..60.0);
+    check(&["tx40/train.csv", "tx40/validate.csv"], &six, 20.0..120.0);
     check(&["kr300/traj_A.csv", "kr300/traj_B.csv"], &["A1", "A2", "A3", "A4", "A5", "A6"], 10.0..60.0);
-    let slide = check(&["emps/train.csv"], &["slide"], 20.0..100.0);
+    let slide = check(&["emps/train.csv"], &["slide"], 20.0..210.0);
     assert_ne!(slide[0].bound, Bound::SampleRate);
 }
