@@ -151,6 +151,29 @@ fn torobo_has_114_base_parameters() {
 }
 
 #[test]
+fn viscous_friction_makes_132_of_them() {
+    let held = ["torso/joint_3", "head/joint_1"];
+    let Some((tree, base)) = base_parameters_of("../shared/data/robots/torobo20/torobo20.urdf", &held) else {
+        return;
+    };
+    let joints = tree.joint_count();
+    let mut builder = FactorBuilder::new(base.count() + joints + 1);
+    let mut random = RandomNumbers::new(4);
+    for _ in 0..200 {
+        let state = random_state(&tree, &mut random);
+        let phi = dense_regressor(&tree, &state);
+        for (joint, row) in phi.chunks_exact(10 * tree.bodies().len()).enumerate() {
+            let friction = (0..joints).map(|other| if other == joint { state.v[joint] } else { 0.0 });
+            let row: Vec<f64> =
+                base.independent().iter().map(|&column| row[column]).chain(friction).chain([0.0]).collect();
+            builder.push_row(&row).unwrap();
+        }
+    }
+    let factor = builder.factor();
+    assert_eq!((factor.parameters(), factor.undetermined_columns()), (132, vec![]));
+}
+
+#[test]
 fn talos_upper_body_has_120_base_parameters() {
     let path = "../shared/data/robots/talos/talos_reduced.urdf";
     let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..").join(path);
