@@ -79,17 +79,6 @@ pub trait Effect: Send + Sync {
     fn relinearised(&self, _fitted: &[f64]) -> Option<Box<dyn Effect>> {
         None
     }
-    /// One sentence for the user, with the fitted values.
-    fn sentence(&self, fitted: &[f64]) -> String {
-        let spec = self.spec();
-        let values: Vec<String> = self
-            .parameters()
-            .iter()
-            .zip(fitted)
-            .map(|(parameter, value)| format!("{} = {value:.4} {}", parameter.name, parameter.unit))
-            .collect();
-        format!("{} on {}: {}", spec.kind.replace('_', " "), spec.joints.join(", "), values.join(", "))
-    }
 }
 
 /// Computes an effect's columns sample by sample, in order of time; may have memory.

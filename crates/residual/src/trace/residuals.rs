@@ -10,7 +10,7 @@ pub struct ResidualShape {
     pub autocorrelation: Vec<f64>,
     /// For each joint, spatial frequencies \[periods·2π over the unit of position\] at which its residual has peaks, strongest first.
     pub ripple_frequencies: Vec<Vec<f64>>,
-    /// Mean of |∂τ_j/∂q̈_k|² over the samples, row-major, where a noise floor is to be computed.
+    /// Filtered rows that were looked at.
     pub rows: u64,
 }
 
