@@ -9,6 +9,9 @@ pub enum BackendError {
     /// A slice does not fit the robot.
     #[error(transparent)]
     Dimension(#[from] DimensionError),
+    /// The world does not fit the robot.
+    #[error(transparent)]
+    World(crate::WorldError),
     /// A number given to the backend is NaN or infinite.
     #[error("{what} has an element that is not a finite number")]
     NotFinite {

@@ -16,6 +16,7 @@ mod spatial;
 mod tree;
 pub mod urdf;
 mod workspace;
+mod world;
 
 pub use analytic::AnalyticBackend;
 pub use backend::{BackendError, DynamicsBackend};
@@ -25,6 +26,7 @@ pub use scalar::{Dual, Lanes, Scalar};
 pub use spatial::{Mat3, Placement, Spatial, Vec3};
 pub use tree::{Body, InertialParameters, JointType, Limits, PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree};
 pub use workspace::Workspace;
+pub use world::{Foot, World, WorldError};
 
 /// A slice whose length does not match the robot.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
