@@ -53,7 +53,7 @@ pub(crate) fn batch_size() -> usize {
 /// The factors of `design` over each fold: \[Φ f\] of each torque, after the parallel filter.
 ///
 /// Every block is reduced by itself and the results are merged in the order of the blocks, so the outcome does not depend on the
-/// number of threads.
+/// number of threads. A fold that is named several times (a bootstrap draw) is read once and comes out as often as it is named.
 ///
 /// # Errors
 /// A log cannot be read, or a block has not the robot's joints.
@@ -62,6 +62,13 @@ pub fn accumulate(
     folds: &[Fold],
     sources: &[&dyn BlockSource],
 ) -> Result<Vec<GroupedFactor>, IdentificationError> {
+    let named = folds;
+    let mut folds: Vec<Fold> = Vec::with_capacity(named.len());
+    named.iter().for_each(|fold| {
+        if !folds.contains(fold) {
+            folds.push(*fold);
+        }
+    });
     let mut merged: Vec<Vec<Option<Factor>>> = vec![vec![None; design.rows().len()]; folds.len()];
     let batch_size = batch_size();
     let mut failure = None;
@@ -70,11 +77,11 @@ pub fn accumulate(
         source.blocks(&mut |block| {
             batch.push(block);
             if batch.len() == batch_size && failure.is_none() {
-                failure = reduce(design, folds, std::mem::take(&mut batch), &mut merged).err();
+                failure = reduce(design, &folds, std::mem::take(&mut batch), &mut merged).err();
             }
         })?;
         if failure.is_none() {
-            failure = reduce(design, folds, batch, &mut merged).err();
+            failure = reduce(design, &folds, batch, &mut merged).err();
         }
         if let Some(error) = failure {
             return Err(error);
@@ -88,7 +95,10 @@ pub fn accumulate(
         let groups = rows.into_iter().zip(design.rows()).map(group).collect();
         Ok(GroupedFactor::new(design.parameter_count(), groups)?)
     };
-    merged.into_iter().map(grouped).collect()
+    let read: Vec<GroupedFactor> =
+        merged.into_iter().map(grouped).collect::<Result<_, IdentificationError>>()?;
+    let of_fold = |fold: &Fold| folds.iter().position(|other| other == fold);
+    Ok(named.iter().filter_map(of_fold).map(|place| read[place].clone()).collect())
 }
 
 fn reduce(

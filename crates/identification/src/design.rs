@@ -53,6 +53,8 @@ pub struct DesignScratch<'a> {
     rest: Vec<f64>,
     columns: Vec<f64>,
     reference: BlockReference,
+    /// Where the links are, if that is not where their encoders are.
+    links: Option<Block>,
 }
 
 impl Design {
@@ -207,6 +209,7 @@ impl Design {
             pairs: vec![0.0; self.regressor.buffer_size()],
             columns: vec![0.0; self.effect_columns.last().map_or(0, |range| range.end)],
             reference: BlockReference::default(),
+            links: None,
         }
     }
 }
@@ -218,7 +221,14 @@ impl DesignScratch<'_> {
     /// The block has not the robot's joints.
     pub fn begin(&mut self, block: &Block) -> Result<(), DimensionError> {
         if let Some(reference) = &self.design.reference {
-            reference.evaluate(block, self.design.needs, &mut self.reference)?;
+            let compliances: Vec<(usize, f64)> =
+                self.design.effects.iter().filter_map(|effect| effect.compliance()).collect();
+            self.links = match compliances.is_empty() {
+                true => None,
+                false => Some(reference.deflected(block, &compliances)?),
+            };
+            let at = self.links.as_ref().unwrap_or(block);
+            reference.evaluate(at, self.design.needs, &mut self.reference)?;
         }
         self.evaluators.iter_mut().for_each(|evaluator| evaluator.restart());
         for sample in 0..block.warm_up {
@@ -236,7 +246,8 @@ impl DesignScratch<'_> {
     pub fn evaluate(&mut self, block: &Block, sample: usize, out: &mut [f64]) -> Result<(), DimensionError> {
         let design = self.design;
         let row = block.row(sample);
-        let (q, v, a) = (&block.q[row.clone()], &block.qd[row.clone()], &block.qdd[row.clone()]);
+        let links = self.links.as_ref().unwrap_or(block);
+        let (q, v, a) = (&links.q[row.clone()], &links.qd[row.clone()], &links.qdd[row.clone()]);
         design.regressor.compute(&design.tree, q, v, a, &mut self.regressor, &mut self.pairs)?;
         let statics = self.statics.chunks_exact_mut(self.pairs.len().max(1));
         for (tree, pairs) in self.unit_gravity.iter().zip(statics) {
@@ -254,7 +265,7 @@ impl DesignScratch<'_> {
         }
         for (joint, moves) in out[design.width..].iter_mut().enumerate() {
             let rest_speed = design.rest_speeds.get(joint).copied().unwrap_or(-1.0);
-            *moves = f64::from(u8::from(v[joint].abs() > rest_speed));
+            *moves = f64::from(u8::from(block.qd[row.start + joint].abs() > rest_speed));
         }
         Ok(())
     }

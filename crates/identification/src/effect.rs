@@ -75,6 +75,11 @@ pub trait Effect: Send + Sync {
     /// Corrects the signals before any column is evaluated: how an encoder offset or a delay, fitted by linearisation, comes
     /// into force.
     fn correct(&self, _block: &mut Block) {}
+    /// The joint whose link lags behind its encoder, and by how much for each unit of torque \[rad/(N·m), m/N\]: rigid body and gravity are then evaluated at
+    /// the link's position, by the reference model's torque; all other columns at the encoder's.
+    fn compliance(&self) -> Option<(usize, f64)> {
+        None
+    }
     /// The effect linearised anew at fitted parameters; `None` where it is linear anyway.
     fn relinearised(&self, _fitted: &[f64]) -> Option<Box<dyn Effect>> {
         None

@@ -80,7 +80,7 @@ pub fn identify(
     })
 }
 
-/// Share of a torque's residual variance that a variant must save over a simpler one.
+/// Share of a torque's residual variance that a variant of a declared effect must save over a simpler one.
 const WORTH_A_VARIANT: f64 = 0.1;
 /// Sweeps over the effects; more have never changed a choice.
 const SWEEPS: usize = 2;

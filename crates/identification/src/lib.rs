@@ -11,6 +11,7 @@ mod kept_blocks;
 mod log_set;
 mod model;
 mod predict;
+mod rates;
 mod reference;
 mod sample;
 

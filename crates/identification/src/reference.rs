@@ -1,5 +1,6 @@
 //! A rigid-body model with numbers, for effects whose columns need torques (load-dependent friction, delays, offsets, …).
 
+use crate::rates::{LocalRates, interpolate};
 use crate::{BlockReference, Effect, Needs, Sample};
 use phiw_dynamics::{DimensionError, Dual, Tree, Workspace};
 use phiw_telemetry::Block;
@@ -40,16 +41,10 @@ impl ReferenceModel {
         }
         let mut workspace = Workspace::new(&self.tree);
         if needs.torque || needs.derivatives {
-            out.torque.resize(block.t.len() * joints, 0.0);
-            for sample in 0..block.t.len() {
-                let row = block.row(sample);
-                let (q, v, a) = (&block.q[row.clone()], &block.qd[row.clone()], &block.qdd[row.clone()]);
-                self.tree.inverse_dynamics(q, v, a, &mut workspace, &mut out.torque[row])?;
-            }
-            rates(&block.t, joints, &out.torque, &mut out.torque_rate, &mut out.torque_second_rate);
+            self.torque(block, &mut workspace, out)?;
             out.total_torque.clone_from(&out.torque);
             self.add_effects(block, &mut out.total_torque);
-            rates(&block.t, joints, &out.total_torque, &mut out.total_torque_rate, &mut Vec::new());
+            differences(&block.t, joints, &out.total_torque, &mut out.total_torque_rate);
         }
         if needs.derivatives {
             self.derivatives(block, out)?;
@@ -58,6 +53,50 @@ impl ReferenceModel {
             self.gravity(block, out)?;
         }
         Ok(())
+    }
+
+    /// The rigid body's torque over a block, and its rates.
+    fn torque(
+        &self,
+        block: &Block,
+        workspace: &mut Workspace<f64>,
+        out: &mut BlockReference,
+    ) -> Result<(), DimensionError> {
+        out.torque.resize(block.t.len() * block.joints, 0.0);
+        for sample in 0..block.t.len() {
+            let row = block.row(sample);
+            let (q, v, a) = (&block.q[row.clone()], &block.qd[row.clone()], &block.qdd[row.clone()]);
+            self.tree.inverse_dynamics(q, v, a, workspace, &mut out.torque[row])?;
+        }
+        let (first, second) = (&mut out.torque_rate, &mut out.torque_second_rate);
+        local_rates(block).apply(block.joints, &out.torque, first, second);
+        Ok(())
+    }
+
+    /// Where the links are behind compliant joints whose encoders sit on the motors: q − τ/k, with τ at the link's own position, by iteration.
+    pub(crate) fn deflected(
+        &self,
+        block: &Block,
+        compliances: &[(usize, f64)],
+    ) -> Result<Block, DimensionError> {
+        let mut links = block.clone();
+        let mut workspace = Workspace::new(&self.tree);
+        let mut out = BlockReference::default();
+        for _ in 0..DEFLECTION_STEPS {
+            self.torque(&links, &mut workspace, &mut out)?;
+            for &(joint, compliance) in compliances {
+                let signals = [
+                    (&mut links.q, &block.q, &out.torque),
+                    (&mut links.qd, &block.qd, &out.torque_rate),
+                    (&mut links.qdd, &block.qdd, &out.torque_second_rate),
+                ];
+                for (link, encoder, torque) in signals {
+                    let at = (joint..link.len()).step_by(block.joints);
+                    at.for_each(|at| link[at] = encoder[at] - compliance * torque[at]);
+                }
+            }
+        }
+        Ok(links)
     }
 
     fn add_effects(&self, block: &Block, total: &mut [f64]) {
@@ -147,6 +186,21 @@ impl ReferenceModel {
     }
 }
 
+/// Steps of the iteration for a link's deflection: each adds one order in the compliance.
+const DEFLECTION_STEPS: usize = 2;
+
+/// Band of torques' rates over the motion's bandwidth.
+const RATE_BAND: f64 = 2.5;
+
+/// What differentiates the torques over a block.
+fn local_rates(block: &Block) -> LocalRates {
+    let period = match block.t.as_slice() {
+        [first, .., last] => (last - first) / (block.t.len() - 1) as f64,
+        _ => 1.0,
+    };
+    LocalRates::new(period, RATE_BAND * block.motion_bandwidth_hz)
+}
+
 /// Time between two evaluations of the derivatives \[s\].
 const DERIVATIVE_PERIOD: f64 = 0.02;
 
@@ -210,31 +264,18 @@ impl DualState {
     }
 }
 
-/// Fills in the rows between two that are known.
-fn interpolate(values: &mut [f64], width: usize, first: usize, last: usize) {
-    for sample in first + 1..last {
-        let share = (sample - first) as f64 / (last - first) as f64;
-        for column in 0..width {
-            let (a, b) = (values[first * width + column], values[last * width + column]);
-            values[sample * width + column] = a + share * (b - a);
-        }
-    }
-}
-
-/// First and second differences in time, central inside and one-sided at the ends, of rows of `width` numbers.
-fn rates(t: &[f64], width: usize, values: &[f64], first: &mut Vec<f64>, second: &mut Vec<f64>) {
-    first.resize(values.len(), 0.0);
-    second.resize(values.len(), 0.0);
+/// Differences in time, central inside and one-sided at the ends, of rows of `width` numbers.
+///
+/// For the total torque: it jumps where a friction turns round, and is to be differentiated as it is.
+fn differences(t: &[f64], width: usize, values: &[f64], rates: &mut Vec<f64>) {
+    rates.resize(values.len(), 0.0);
     let samples = t.len();
     for sample in 0..samples {
         let (before, after) = (sample.saturating_sub(1), (sample + 1).min(samples - 1));
         let step = t[after] - t[before];
         for column in 0..width {
-            let [low, here, high] = [before, sample, after].map(|row| values[row * width + column]);
-            let at = sample * width + column;
-            first[at] = if step > 0.0 { (high - low) / step } else { 0.0 };
-            let half = 0.5 * step;
-            second[at] = if after - before == 2 { (high - 2.0 * here + low) / (half * half) } else { 0.0 };
+            let [low, high] = [before, after].map(|row| values[row * width + column]);
+            rates[sample * width + column] = if step > 0.0 { (high - low) / step } else { 0.0 };
         }
     }
 }

@@ -19,6 +19,8 @@ pub enum Command {
     Identify(IdentifyArguments),
     /// The same, then close the loop: find what the model lacks, add it, and report the error before and after.
     Explain(ExplainArguments),
+    /// Turn marker recordings of people into motions of the robot: for each a log without torques, and what it is worth.
+    Retarget(RetargetArguments),
 }
 
 impl Command {
@@ -27,6 +29,7 @@ impl Command {
         match self {
             Command::Identify(identify) => identify.session.quiet,
             Command::Explain(explain) => explain.session.quiet,
+            Command::Retarget(retarget) => retarget.quiet,
         }
     }
 }
@@ -48,6 +51,50 @@ pub struct ExplainArguments {
     /// A model.json of `phiw identify` or `phiw explain`: its parameters are held, and what has changed since is sought.
     #[arg(long, value_name = "MODEL.json")]
     pub model: Option<PathBuf>,
+}
+
+/// Arguments of `phiw retarget`.
+#[derive(Clone, Debug, Args)]
+pub struct RetargetArguments {
+    /// The robot's URDF.
+    #[arg(long, value_name = "ROBOT.urdf")]
+    pub urdf: PathBuf,
+    /// Recordings: C3D, or CSV of named points (`t`, `<point>.x`, `<point>.y`, `<point>.z` in metres).
+    #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
+    pub c3d: Vec<PathBuf>,
+    /// Which marker sits where; by default the built-in map that names most markers of the recordings.
+    #[arg(long, value_name = "MAP.toml")]
+    pub map: Option<PathBuf>,
+    /// Joints of the URDF that do not move, at 0 or at a value (rad, m).
+    #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
+    pub hold: Vec<(String, f64)>,
+    /// Torso and head follow reach and gaze of the hands: for recordings that hold neither. The results say so.
+    #[arg(long)]
+    pub torso_from_reach: bool,
+    /// Keep joint velocities inside the URDF's limits, too.
+    #[arg(long)]
+    pub velocity_limits: bool,
+    /// Time between the control points of the splines (s).
+    #[arg(long, value_name = "S", default_value_t = 0.2, value_parser = positive)]
+    pub interval: f64,
+    /// How velocities and accelerations come about.
+    #[arg(long, value_enum, default_value_t = Derivatives::Analytic)]
+    pub derivatives: Derivatives,
+    /// Folder for the results; it is made if it is absent. What is done in it with the same settings is not done again.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Print nothing but errors.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// How velocities and accelerations come about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Derivatives {
+    /// Those of the spline.
+    Analytic,
+    /// Backward differences of the samples, as in the paper.
+    BackwardDifferences,
 }
 
 /// Robot, logs and declared model: what every command on measured logs takes.
@@ -122,6 +169,14 @@ fn held_joint(text: &str) -> Result<(String, f64), String> {
     match value.trim().parse::<f64>() {
         Ok(number) if number.is_finite() => Ok((joint.to_owned(), number)),
         _ => Err(format!("`{value}` is not a position; write {joint} or {joint}=0.5 (rad or m)")),
+    }
+}
+
+/// A number above zero.
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
+        _ => Err(format!("`{text}` is not a number above zero")),
     }
 }
 

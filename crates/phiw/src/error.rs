@@ -56,6 +56,52 @@ pub enum Error {
         /// What the system says.
         source: io::Error,
     },
+    /// A marker map that is none.
+    #[error("{}: {source}", path.display())]
+    Map {
+        /// The map.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: phiw_bspline_retarget::human::MapError,
+    },
+    /// A robot that cannot follow a person.
+    #[error("{}: {source}", path.display())]
+    Robot {
+        /// The URDF.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: phiw_bspline_retarget::RobotError,
+    },
+    /// A marker recording that cannot be read.
+    #[error(transparent)]
+    Recording(phiw_bspline_retarget::RecordingError),
+    /// A marker recording that cannot be retargeted.
+    #[error("{}: {source}", path.display())]
+    Retarget {
+        /// The recording.
+        path: PathBuf,
+        /// Why.
+        source: phiw_bspline_retarget::RetargetError,
+    },
+    /// A recording whose static trial cannot be used.
+    #[error("{}: its static trial tells nothing: {reason}", path.display())]
+    StaticTrial {
+        /// The recording.
+        path: PathBuf,
+        /// Why: names the trial.
+        reason: String,
+    },
+    /// Two recordings of the same name.
+    #[error("{} and {} have the same name, and so would their motions: retarget them into two folders", first.display(), second.display())]
+    SameName {
+        /// One.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
+    },
+    /// Static trials only.
+    #[error("--c3d names static trials only; name the recordings of motions")]
+    NoMotion,
     /// The identified parameters cannot be written as a URDF.
     #[error("identified.urdf: {0}")]
     IdentifiedUrdf(UrdfError),
@@ -80,6 +126,13 @@ impl Error {
             | Error::Urdf { .. }
             | Error::FloatingBase { .. }
             | Error::NotAModel { .. }
+            | Error::Map { .. }
+            | Error::Robot { .. }
+            | Error::Recording(_)
+            | Error::Retarget { .. }
+            | Error::StaticTrial { .. }
+            | Error::SameName { .. }
+            | Error::NoMotion
             | Error::OutIsFile { .. } => 2,
             Error::Identification(IdentificationError::Regressor(_)) => 1,
             Error::Identification(_) => 2,

@@ -12,7 +12,8 @@ use crate::{Error, summary};
 use phiw_identification::{Data, Identified, Model, TorqueError, identify};
 use phiw_report::ReportJson;
 use phiw_report::json::{
-    EffectJson, JointMap, ParameterJson, RemainingJson, RivalJson, TorqueErrors, Verdict,
+    EffectJson, EvidenceJson, JointMap, ParameterJson, ProgramJson, RemainingJson, RivalJson, TorqueErrors,
+    Verdict,
 };
 use phiw_residual::SignalRanges;
 use phiw_residual::trace::{self, HeldModel, TraceInput, TraceOptions, Tracing, trace};
@@ -174,7 +175,20 @@ fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
             depends_on.push(dependence.signal.clone());
         }
     }
+    let base = report_json(analysis);
+    let evidence = |found: &trace::FoundEffect| EvidenceJson {
+        kind: found.spec.kind.clone(),
+        joints: found.spec.joints.clone(),
+        significance: found.significance,
+        stability: found.stability,
+    };
+    let program = base.phiw.clone().map(|program| ProgramJson {
+        evidence: tracing.effects.iter().map(evidence).collect(),
+        cannot_be_told: explain_page::cannot_be_told(analysis, tracing),
+        ..program
+    });
     ReportJson {
+        phiw: program,
         verdict: Some(verdict(tracing.verdict)),
         before: TorqueErrors { train: error(&tracing.before.0), validate: error(&tracing.before.1) },
         effects: tracing.effects.iter().enumerate().map(effect).collect(),
@@ -184,7 +198,7 @@ fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
             joints: tracing.remaining.joints.clone(),
             depends_on,
         },
-        ..report_json(analysis)
+        ..base
     }
 }
 

@@ -4,9 +4,11 @@ use crate::analysis::Analysis;
 use crate::{Error, page as identified_page};
 use phiw_identification::{Data, Design, predict};
 use phiw_report::IdentificationPage;
-use phiw_report::json::Verdict;
+use phiw_report::json::{CannotBeToldJson, Verdict};
 use phiw_report::number::percent;
-use phiw_report::page::{CandidateRow, EffectParameter, EffectSection, Picture, Remaining, Rival};
+use phiw_report::page::{
+    CandidateRow, CannotBeTold, EffectParameter, EffectSection, Picture, Remaining, Rival,
+};
 use phiw_report::plot::{Line, ResidualAgainstSignal, residual_against_signal};
 use phiw_residual::catalogue::sentence;
 use phiw_residual::trace::{self, FoundEffect, Ranked, Tracing};
@@ -47,7 +49,7 @@ pub fn page(
         .enumerate()
         .map(|(index, found)| section(analysis, tracing, index, found, &scatters))
         .collect();
-    page.remaining = Some(remaining(tracing));
+    page.remaining = Some(remaining(analysis, tracing));
     Ok(page)
 }
 
@@ -152,10 +154,6 @@ fn section(
                 unit: named.unit.clone(),
             }
         };
-    let telling = |kind: &str| {
-        let kind = analysis.session.catalogue.kind(kind);
-        kind.map(|kind| kind.telling_motion().to_owned()).unwrap_or_default()
-    };
     EffectSection {
         kind: found.spec.kind.clone(),
         joints: found.spec.joints.clone(),
@@ -165,6 +163,7 @@ fn section(
         relative_after: found.relative,
         explains: found.explains,
         confidence: found.confidence,
+        stability: found.stability,
         rivals: found
             .rivals
             .iter()
@@ -172,7 +171,7 @@ fn section(
                 kind: rival.spec.kind.clone(),
                 joints: rival.spec.joints.clone(),
                 confidence: rival.confidence,
-                separated_by: telling(&rival.spec.kind),
+                separated_by: telling_motion(analysis, &rival.spec.kind),
             })
             .collect(),
         candidates: candidates(&found.ranking),
@@ -191,7 +190,7 @@ fn candidates(ranking: &[Ranked]) -> Vec<CandidateRow> {
     ranking.iter().map(row).collect()
 }
 
-fn remaining(tracing: &Tracing) -> Remaining {
+fn remaining(analysis: &Analysis<'_>, tracing: &Tracing) -> Remaining {
     let structured = !tracing.remaining.joints.is_empty();
     let follows = |dependence: &trace::Dependence| {
         format!(
@@ -208,7 +207,36 @@ fn remaining(tracing: &Tracing) -> Remaining {
         description: if structured { vec![describe(tracing)] } else { Vec::new() },
         candidates: candidates(&tracing.remaining.ranking),
         pictures: Vec::new(),
+        cannot_be_told: cannot_be_told(analysis, tracing)
+            .into_iter()
+            .map(|effect| CannotBeTold {
+                kind: effect.kind,
+                joints: effect.joints.iter().map(|joints| joints.join(" and ")).collect(),
+                telling_motion: effect.telling_motion,
+            })
+            .collect(),
     }
+}
+
+/// What the logs leave no trace of, kind by kind.
+pub fn cannot_be_told(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<CannotBeToldJson> {
+    let mut kinds: Vec<CannotBeToldJson> = Vec::new();
+    for spec in &tracing.remaining.silent {
+        match kinds.iter_mut().find(|other| other.kind == spec.kind) {
+            Some(kind) => kind.joints.push(spec.joints.clone()),
+            None => kinds.push(CannotBeToldJson {
+                kind: spec.kind.clone(),
+                joints: vec![spec.joints.clone()],
+                telling_motion: telling_motion(analysis, &spec.kind),
+            }),
+        }
+    }
+    kinds
+}
+
+fn telling_motion(analysis: &Analysis<'_>, kind: &str) -> String {
+    let kind = analysis.session.catalogue.kind(kind);
+    kind.map(|kind| kind.telling_motion().to_owned()).unwrap_or_default()
 }
 
 /// Residual against the signal that an effect lives on, before anything was added and after all.

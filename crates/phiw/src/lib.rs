@@ -15,6 +15,7 @@ pub mod output;
 pub mod page;
 mod parameters;
 pub mod report_json;
+pub mod retarget;
 pub mod session;
 pub mod summary;
 pub mod traces;

@@ -1,7 +1,7 @@
 //! The command `phiw`.
 
 use clap::Parser;
-use phiw::arguments::{Arguments, Command};
+use phiw::arguments::{Arguments, Command, RetargetArguments};
 use phiw::console::Console;
 use std::io::Write;
 use std::process::ExitCode;
@@ -16,6 +16,7 @@ fn main() -> ExitCode {
         Command::Explain(explain) => {
             phiw::explain::explain(explain, &Console::of_terminal(explain.session.quiet))
         }
+        Command::Retarget(arguments) => return retarget(arguments),
     };
     match outcome {
         Ok(outcome) => {
@@ -25,6 +26,23 @@ fn main() -> ExitCode {
                 let _ = std::io::stdout().write_all(outcome.summary.as_bytes());
             }
             ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_status())
+        }
+    }
+}
+
+/// Retargets; recordings that could not be are listed at the end, and make the exit status 1 if others could.
+fn retarget(arguments: &RetargetArguments) -> ExitCode {
+    match phiw::retarget::retarget(arguments, &Console::of_terminal(arguments.quiet)) {
+        Ok(outcome) => {
+            if !arguments.quiet {
+                let _ = std::io::stdout().write_all(outcome.summary.as_bytes());
+            }
+            outcome.failures.iter().for_each(|failure| eprintln!("failed: {}", failure.reason));
+            ExitCode::from(u8::from(!outcome.failures.is_empty()))
         }
         Err(error) => {
             eprintln!("error: {error}");

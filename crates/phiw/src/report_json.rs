@@ -53,6 +53,8 @@ pub fn program(analysis: &Analysis<'_>) -> ProgramJson {
             train: analysis.traces.relative_with_rests(Role::Train),
             validate: analysis.traces.relative_with_rests(Role::HeldOut),
         }),
+        evidence: Vec::new(),
+        cannot_be_told: Vec::new(),
     }
 }
 

@@ -66,6 +66,7 @@ fn specimen(joints: usize, explain: bool) -> IdentificationPage {
             ],
             candidates: candidates(4),
             pictures: vec![scatter("joint_1", 0.4, None)],
+            cannot_be_told: Vec::new(),
         });
     }
     page
@@ -200,6 +201,7 @@ fn effects() -> Vec<EffectSection> {
         relative_after: 0.163,
         explains: 0.62,
         confidence: 0.98,
+        stability: 1.0,
         rivals: vec![],
         candidates: candidates(8),
         pictures: vec![scatter("joint_5", 1.1, Some(0.05))],
@@ -228,6 +230,7 @@ fn effects() -> Vec<EffectSection> {
         relative_after: 0.134,
         explains: 0.31,
         confidence: 0.71,
+        stability: 1.0,
         rivals: vec![Rival {
             kind: "hysteresis".into(),
             joints: vec!["joint_1".into()],

@@ -147,6 +147,36 @@ pub struct ProgramJson {
     /// are left out of the errors above.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relative_with_rests: Option<RelativeErrors>,
+    /// How sure the effects are, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub evidence: Vec<EvidenceJson>,
+    /// What cannot be told from these logs, and which motion would tell.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cannot_be_told: Vec<CannotBeToldJson>,
+}
+
+/// How sure an effect is.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct EvidenceJson {
+    /// Its name in the catalogue.
+    pub kind: String,
+    /// The joints that it acts on.
+    pub joints: Vec<String>,
+    /// Standard deviations from nothing, correlated samples counted once.
+    pub significance: f64,
+    /// Share of bootstrap draws of the training motion in which it, or one of its rivals, is chosen.
+    pub stability: f64,
+}
+
+/// An effect of which the motion leaves nothing beside the model's own columns.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct CannotBeToldJson {
+    /// Its name in the catalogue.
+    pub kind: String,
+    /// The joints, or groups of joints, on which it cannot be told.
+    pub joints: Vec<Vec<String>>,
+    /// The motion, or the signal, that would tell.
+    pub telling_motion: String,
 }
 
 /// Pooled errors, RMS of the error over RMS of the torque.

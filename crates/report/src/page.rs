@@ -10,7 +10,7 @@ mod joints;
 mod parameters;
 
 pub use conditioning::Conditioning;
-pub use effects::{CandidateRow, EffectParameter, EffectSection, Remaining, Rival};
+pub use effects::{CandidateRow, CannotBeTold, EffectParameter, EffectSection, Remaining, Rival};
 pub use errors::{ErrorRow, ErrorTable, PooledError};
 pub use joints::{JointSection, TorqueTrace};
 pub use parameters::{BaseParameter, ParameterRow, Parameters};

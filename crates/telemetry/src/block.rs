@@ -37,6 +37,8 @@ pub struct Block {
     /// Temperatures as measured, the last known one where a cell is empty, in °C; NaN for a joint without.
     /// `None` where no joint has any.
     pub temp: Option<Vec<f64>>,
+    /// Frequency up to which the positions move, in Hz: a part of the cut-off of their low-pass.
+    pub motion_bandwidth_hz: f64,
     /// Leading samples that no output covers: for effects with memory to warm up on.
     pub warm_up: usize,
     /// Samples to put out, ascending.

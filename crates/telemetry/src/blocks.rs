@@ -130,6 +130,7 @@ impl<'a> BlockMaker<'a> {
             qd,
             qdd,
             tau,
+            motion_bandwidth_hz: self.plan.motion_bandwidth_hz,
             warm_up,
             outputs,
             filter: self.plan.parallel.clone(),

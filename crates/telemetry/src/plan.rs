@@ -1,6 +1,7 @@
 //! A conditioning applied to one log.
 
 use crate::clock::{Clock, ClockChoice};
+use crate::cutoff::BANDWIDTHS;
 use crate::kernel::{LowPass, SmoothingKernel};
 use crate::parallel_filter::ParallelFilter;
 use crate::{Conditioning, Survey};
@@ -18,6 +19,8 @@ pub struct LogPlan {
     pub resample: bool,
     /// The low-pass over positions, with its derivatives.
     pub kernel: SmoothingKernel,
+    /// Frequency up to which the positions move, in Hz.
+    pub motion_bandwidth_hz: f64,
     /// The filter over columns and torque.
     pub parallel: Arc<ParallelFilter>,
     /// Samples at each end of a segment that are not used: there the cut kernel would more than double the
@@ -69,6 +72,7 @@ impl LogPlan {
             measured_acceleration: measured(&|joint| {
                 joint.acceleration.is_some_and(|signal| signal.plausible())
             }),
+            motion_bandwidth_hz: conditioning.cutoff_hz / BANDWIDTHS,
             kernel,
             parallel: Arc::new(parallel),
         }

@@ -97,6 +97,20 @@ impl Factor {
         Ok(dot(&residual, &residual))
     }
 
+    /// ‖Φw‖² for any `w`, without the rows.
+    ///
+    /// # Errors
+    /// `w` has the wrong length.
+    pub fn product_sum_of_squares(&self, w: &[f64]) -> Result<f64, RegressorError> {
+        check_size("parameters", w.len(), self.parameters())?;
+        let mut product = vec![0.0; self.columns()];
+        for (column, &value) in w.iter().enumerate().filter(|(_, value)| **value != 0.0) {
+            let entries = self.column(column);
+            product.iter_mut().zip(&entries[..=column]).for_each(|(sum, entry)| *sum += value * entry);
+        }
+        Ok(dot(&product, &product))
+    }
+
     /// Sum of squares of the right-hand side, ‖f‖².
     pub fn right_hand_side_sum_of_squares(&self) -> f64 {
         self.columns().checked_sub(1).map_or(0.0, |last| self.column_norm(last).powi(2))

@@ -69,8 +69,8 @@ impl Factor {
         self.r[(row, column)]
     }
 
-    /// A column of R.
-    pub(super) fn column(&self, column: usize) -> &[f64] {
+    /// A column of R, with the zeros below its diagonal.
+    pub fn column(&self, column: usize) -> &[f64] {
         self.r.col_as_slice(column)
     }
 

@@ -26,6 +26,8 @@ pub struct EffectSection {
     pub explains: f64,
     /// Its probability against its rivals.
     pub confidence: f64,
+    /// Share of bootstrap draws of the training motion in which it, or one of its rivals, is chosen.
+    pub stability: f64,
     /// Effects that the data could not tell from it.
     pub rivals: Vec<Rival>,
     /// The candidates that were compared at this step, best first, this one among them.
@@ -92,6 +94,19 @@ pub struct Remaining {
     pub candidates: Vec<CandidateRow>,
     /// Pictures such as the residual against a signal.
     pub pictures: Vec<Picture>,
+    /// What cannot be told from these logs.
+    pub cannot_be_told: Vec<CannotBeTold>,
+}
+
+/// An effect that the motion does not excite.
+#[derive(Debug, Clone, Default)]
+pub struct CannotBeTold {
+    /// Its name in the catalogue.
+    pub kind: String,
+    /// The joints, or groups of joints, on which it cannot be told.
+    pub joints: Vec<String>,
+    /// The motion, or the signal, that would tell.
+    pub telling_motion: String,
 }
 
 pub(super) fn markup(effects: &[EffectSection]) -> Markup {
@@ -134,7 +149,8 @@ impl EffectSection {
                     dt { "Held-out error" }
                     dd { (percent(self.relative_before)) " % → " strong { (percent(self.relative_after)) " %" } }
                     dt { "Explains" } dd { (percent(self.explains)) " % of the variance above the noise floor" }
-                    dt { "Confidence" } dd { (percent(self.confidence)) " %" }
+                    dt { "Confidence" }
+                    dd { (percent(self.confidence)) " %, named in " (percent(self.stability)) " % of bootstrap draws of the training motion" }
                     @if !self.rivals.is_empty() {
                         dt { "Rivals" }
                         dd { @for rival in &self.rivals { div { (rival.markup()) } } }
@@ -222,6 +238,23 @@ impl Remaining {
             @for sentence in &self.description { p { (sentence) } }
             @for picture in &self.pictures { (picture.markup()) }
             (candidates(&self.candidates))
+            (cannot_be_told(&self.cannot_be_told))
         }
+    }
+}
+
+fn cannot_be_told(effects: &[CannotBeTold]) -> Markup {
+    if effects.is_empty() {
+        return html! {};
+    }
+    html! {
+        h4 { "What these logs cannot tell" }
+        p.muted { "Of these effects the motion leaves nothing beside the model's own columns." }
+        div.scroll { table {
+            thead { tr { th { "Effect" } th { "Joints" } th { "What would tell" } } }
+            tbody { @for effect in effects { tr {
+                td { (effect.kind) } td { (effect.joints.join(", ")) } td.muted { (effect.telling_motion) }
+            } } }
+        } }
     }
 }

@@ -1,10 +1,10 @@
 //! A flexible transmission between motor and link.
 
-use super::kind::{Constants, EffectKind};
+use super::kind::{Constants, EffectKind, constant};
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
 
-/// The encoder sits on the motor: the link lags behind it by τ/k. Linear in the compliance 1/k, about the stiff joint:
+/// The encoder sits on the motor: the link lags behind it by τ/k. Linear in the compliance 1/k, about the value that is in force already:
 /// the link's position, velocity and acceleration differ by −τ/k, −τ̇/k, −τ̈/k.
 ///
 /// τ is the torque of the reference model, which is smooth: the measured one has noise that its second rate would blow up.
@@ -31,33 +31,34 @@ impl EffectKind for JointElasticity {
             name: tree.joint(joint).joint.clone(),
             unit,
             joints: tree.joint_count(),
-            constants: constants.clone(),
+            compliance: constant(constants, COMPLIANCE, 0.0),
         })
     }
 }
 
+const COMPLIANCE: &str = "compliance";
+
+#[derive(Clone)]
 struct Elastic {
     joint: usize,
     name: String,
     unit: &'static str,
     joints: usize,
-    constants: Constants,
+    /// What is in force already.
+    compliance: f64,
 }
 
 impl Effect for Elastic {
     fn spec(&self) -> EffectSpec {
-        EffectSpec {
-            kind: "joint_elasticity".to_owned(),
-            joints: vec![self.name.clone()],
-            constants: self.constants.clone(),
-        }
+        let spec = EffectSpec::new("joint_elasticity", &[&self.name]);
+        if self.compliance == 0.0 { spec } else { spec.with(COMPLIANCE, self.compliance) }
     }
     fn parameters(&self) -> Vec<EffectParameter> {
         vec![EffectParameter {
             joint: self.name.clone(),
-            name: "compliance".to_owned(),
+            name: COMPLIANCE.to_owned(),
             unit: self.unit.to_owned(),
-            bounds: (0.0, f64::INFINITY),
+            bounds: (-self.compliance, f64::INFINITY),
         }]
     }
     fn entries(&self) -> Vec<Entry> {
@@ -65,6 +66,13 @@ impl Effect for Elastic {
     }
     fn needs(&self) -> Needs {
         Needs { torque: true, derivatives: true, ..Needs::default() }
+    }
+    fn compliance(&self) -> Option<(usize, f64)> {
+        (self.compliance != 0.0).then_some((self.joint, self.compliance))
+    }
+    fn relinearised(&self, fitted: &[f64]) -> Option<Box<dyn Effect>> {
+        let compliance = (self.compliance + fitted.first().copied().unwrap_or_default()).max(0.0);
+        Some(Box::new(Elastic { compliance, ..self.clone() }))
     }
     fn evaluator(&self) -> Box<dyn Evaluator + '_> {
         Box::new(ElasticColumns { joint: self.joint, joints: self.joints })

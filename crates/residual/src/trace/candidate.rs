@@ -31,29 +31,34 @@ pub(super) struct Candidates {
     pub effects: Vec<Box<dyn Effect>>,
 }
 
-/// Effects that are already in the model: their kind on their joints is no candidate again, unless it can act twice.
+/// What is no candidate any more.
+pub(super) struct Occupied<'a> {
+    /// Effects in the model, declared or found.
+    pub present: &'a [EffectSpec],
+    /// Effects that were found, whether they are still in the model or not.
+    pub closed: &'a [&'a EffectSpec],
+    /// Whether the declared model is held: its effects may then have changed, if their kind may.
+    pub held: bool,
+}
+
+/// Every hypothesis that is open.
 pub(super) fn enumerate(
     catalogue: &Catalogue,
     tree: &Tree,
     ranges: &SignalRanges,
-    present: &[EffectSpec],
-    held_model: bool,
+    occupied: &Occupied<'_>,
 ) -> Candidates {
-    let mut all = Candidates { list: Vec::new(), effects: Vec::new() };
+    let present = occupied.present;
+    let mut all = Candidates::none();
     for (rank, kind) in catalogue.kinds().enumerate() {
-        if kind.needs_held_model() && !held_model {
+        if kind.needs_held_model() && !occupied.held {
             continue;
         }
         for site in kind.sites(tree) {
             let joints: Vec<String> = site.iter().map(|&joint| tree.joint(joint).joint.clone()).collect();
-            if present.iter().any(|spec| spec.kind == kind.name() && spec.joints == joints) && !held_model {
-                continue;
-            }
-            if held_model
-                && present
-                    .iter()
-                    .any(|spec| spec.kind == kind.name() && spec.joints == joints && !kind.may_change())
-            {
+            let is_this = |spec: &EffectSpec| spec.kind == kind.name() && spec.joints == joints;
+            let changed = occupied.held && kind.may_change();
+            if occupied.closed.iter().any(|spec| is_this(spec)) || (!changed && present.iter().any(is_this)) {
                 continue;
             }
             for constants in scan(kind, &site, ranges, present, &joints) {
@@ -123,6 +128,11 @@ fn add_pairs(
 }
 
 impl Candidates {
+    /// No hypothesis.
+    pub fn none() -> Self {
+        Candidates { list: Vec::new(), effects: Vec::new() }
+    }
+
     fn push(&mut self, rank: usize, effects: Vec<Box<dyn Effect>>, constants: usize) {
         let first = self.effects.len();
         let specs = effects.iter().map(|effect| effect.spec()).collect();

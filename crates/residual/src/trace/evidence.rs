@@ -1,8 +1,9 @@
 //! What the factors say of a candidate: refit of everything with it, error on motion held out, and how sure that is.
 
+use super::screening::Whole;
 use faer::Mat;
 use phiw_regressor::RegressorError;
-use phiw_regressor::factor::{Factor, FactorBuilder, leave_one_out};
+use phiw_regressor::factor::{Factor, FactorBuilder};
 use phiw_regressor::least_squares::{Group, GroupedFactor};
 use std::sync::OnceLock;
 
@@ -24,6 +25,8 @@ pub(super) struct Evidence<'a> {
     rows: Vec<Factor>,
     /// For each torque, the model's rows of all the others and the prior; filled in when it is first asked for.
     others: Vec<OnceLock<Factor>>,
+    /// The model's rows of all torques, for the quick look; filled in when it is first asked for.
+    whole: OnceLock<Whole>,
     /// For each torque the factor over the model's columns alone: training, held out.
     alone: [Vec<Factor>; 2],
 }
@@ -59,6 +62,7 @@ impl<'a> Evidence<'a> {
             prior,
             rows: Vec::new(),
             others: Vec::new(),
+            whole: OnceLock::new(),
             alone: [Vec::new(), Vec::new()],
         };
         evidence.alone = [model_alone(train, model)?, model_alone(held_out, model)?];
@@ -68,7 +72,7 @@ impl<'a> Evidence<'a> {
     }
 
     /// Places of the model's determined parameters among themselves.
-    fn places(&self) -> (Vec<Option<usize>>, usize) {
+    pub(super) fn places(&self) -> (Vec<Option<usize>>, usize) {
         let mut count = 0;
         let place = |&determined: &bool| {
             determined.then(|| {
@@ -90,14 +94,6 @@ impl<'a> Evidence<'a> {
         }
         rows.extend(self.prior.cloned());
         Ok(rows)
-    }
-
-    /// Makes ready for candidates on every torque: cheaper together than one by one.
-    pub fn prepare(&self) -> Result<(), RegressorError> {
-        for (other, factor) in self.others.iter().zip(leave_one_out(&self.rows)?) {
-            other.get_or_init(|| factor);
-        }
-        Ok(())
     }
 
     fn others(&self, row: usize) -> Result<&Factor, RegressorError> {
@@ -162,11 +158,30 @@ impl<'a> Evidence<'a> {
             parameters[parameter] = place.map_or(0.0, |place| solution[place]);
         }
         added.iter().zip(&solution[count..]).for_each(|(&parameter, value)| parameters[parameter] = *value);
-        Ok(Some(Refit {
+        self.outcome(parameters, rows, added).map(Some)
+    }
+
+    /// The model's rows of all torques as one factor.
+    pub(super) fn whole(&self) -> Result<&Whole, RegressorError> {
+        if let Some(whole) = self.whole.get() {
+            return Ok(whole);
+        }
+        let whole = Whole::of_rows(&self.rows)?;
+        Ok(self.whole.get_or_init(|| whole))
+    }
+
+    /// Parameters, with what they leave of each torque.
+    pub(super) fn outcome(
+        &self,
+        parameters: Vec<f64>,
+        rows: &[usize],
+        added: &[usize],
+    ) -> Result<Refit, RegressorError> {
+        Ok(Refit {
             train: self.squares(self.train, &self.alone[0], &parameters, rows, added)?,
             held_out: self.squares(self.held_out, &self.alone[1], &parameters, rows, added)?,
             parameters,
-        }))
+        })
     }
 
     /// Residual sum of squares of each torque; those that the added columns do not act on need the model's columns only.
@@ -189,25 +204,6 @@ impl<'a> Evidence<'a> {
         factors.groups().iter().zip(alone).enumerate().map(of_row).collect()
     }
 
-    /// Gain in log-likelihood of each torque's rows over `before`, with each torque's noise unknown: rows/2·ln(RSS⁰/RSS), training and held out.
-    pub fn gain(&self, before: &Refit, after: &Refit) -> (f64, f64) {
-        let gain = |factors: &GroupedFactor, before: &[f64], after: &[f64]| -> f64 {
-            let of_group = |row: usize| {
-                let rows = factors.groups()[row].factor.rows() as f64;
-                if before[row] > 0.0 && after[row] > 0.0 {
-                    0.5 * rows * (before[row] / after[row]).ln()
-                } else {
-                    0.0
-                }
-            };
-            (0..before.len()).map(of_group).sum()
-        };
-        (
-            gain(self.train, &before.train, &after.train),
-            gain(self.held_out, &before.held_out, &after.held_out),
-        )
-    }
-
     /// For each fold the weighted error of `refit`, with σ of each torque as given.
     pub fn fold_errors(&self, refit: &Refit, std: &[f64]) -> Result<Vec<f64>, RegressorError> {
         let error = |fold: &&GroupedFactor| {
@@ -217,10 +213,10 @@ impl<'a> Evidence<'a> {
         self.folds.iter().map(error).collect()
     }
 
-    /// Wald statistic of the added parameters over their number, square root taken: how many standard deviations the candidate is from nothing.
+    /// How many standard deviations the added columns' fitted combination is from nothing.
     ///
-    /// The standard deviations come from the scores of whole folds (a cluster-robust sandwich, Liang & Zeger 1986), so that samples that are correlated
-    /// within a fold are not counted one by one.
+    /// The standard deviation comes from the scores of whole folds (a cluster-robust sandwich, Liang & Zeger 1986), so that samples that are correlated
+    /// within a fold are not counted one by one. It is that of the combination's scale: the Wald form of several parameters would need more folds than there are.
     pub fn significance(&self, added: &[usize]) -> Result<f64, RegressorError> {
         let (places, count) = self.places();
         let columns = count + added.len();
@@ -235,45 +231,52 @@ impl<'a> Evidence<'a> {
             builder.push_factor(prior, &model_columns, 1.0)?;
         }
         let factor = builder.factor();
-        let solution = match factor.solve() {
+        let fitted = match factor.solve() {
             Ok(solution) => solution.parameters,
             Err(RegressorError::RankDeficient { .. }) => return Ok(0.0),
             Err(error) => return Err(error),
         };
-        let bread = factor.unit_covariance()?;
-        // Score of a fold: its columns times its residual.
-        let mut meat = Mat::<f64>::zeros(columns, columns);
+        // The model's columns, the combination, the right-hand side.
+        let combination = Mat::from_fn(columns + 1, count + 2, |column, target| match target {
+            target if target < count => f64::from(u8::from(column == target)),
+            target if target == count => {
+                if (count..columns).contains(&column) {
+                    fitted[column]
+                } else {
+                    0.0
+                }
+            }
+            _ => f64::from(u8::from(column == columns)),
+        });
+        let bread = match factor.combine(combination.as_ref())?.unit_covariance() {
+            Ok(bread) => bread,
+            Err(RegressorError::RankDeficient { .. }) => return Ok(0.0),
+            Err(error) => return Err(error),
+        };
+        // One row of the bread is all that the combination's variance needs.
+        let mut variance = 0.0;
         for fold in &self.folds {
             let mut builder = FactorBuilder::new(columns + 1);
             for (group, weight) in fold.groups().iter().zip(&self.weights) {
                 push_group(&mut builder, group, self.model, &places, added, *weight)?;
             }
-            let r = builder.factor();
-            let residual: Vec<f64> = (0..=columns)
+            let r = builder.factor().combine(combination.as_ref())?;
+            let value = |column: usize| if column < count { fitted[column] } else { 1.0 };
+            let residual: Vec<f64> = (0..count + 2)
                 .map(|row| {
-                    let fitted: f64 =
-                        (row..columns).map(|column| r.entry(row, column) * solution[column]).sum();
-                    r.entry(row, columns) - fitted
+                    let sum: f64 = (row..=count).map(|column| r.entry(row, column) * value(column)).sum();
+                    r.entry(row, count + 1) - sum
                 })
                 .collect();
-            let score: Vec<f64> = (0..columns)
-                .map(|column| (0..=column).map(|row| r.entry(row, column) * residual[row]).sum())
-                .collect();
-            for row in 0..columns {
-                for column in 0..columns {
-                    meat[(row, column)] += score[row] * score[column];
-                }
-            }
+            // Score of a fold: its columns times its residual.
+            let score =
+                |column: usize| -> f64 { (0..=column).map(|row| r.entry(row, column) * residual[row]).sum() };
+            let influence: f64 = (0..=count).map(|column| bread[(count, column)] * score(column)).sum();
+            variance += influence * influence;
         }
-        let sandwich = &bread * &meat * &bread;
-        // One parameter at a time: the Wald form of several would need more folds than there are parameters.
         let folds = self.folds.len() as f64;
-        let small_sample = folds / (folds - 1.0).max(1.0);
-        let z = |place: usize| {
-            let variance = small_sample * sandwich[(place, place)];
-            if variance > 0.0 { solution[place].abs() / variance.sqrt() } else { 0.0 }
-        };
-        Ok((count..columns).map(z).fold(0.0, f64::max))
+        variance *= folds / (folds - 1.0).max(1.0);
+        Ok(if variance > 0.0 { 1.0 / variance.sqrt() } else { 0.0 })
     }
 }
 
@@ -288,7 +291,7 @@ fn model_alone(factors: &GroupedFactor, model: usize) -> Result<Vec<Factor>, Reg
 }
 
 /// A column with less than this share left after the model's columns are taken out is not identifiable.
-const ABSORBED: f64 = 2e-3;
+pub(super) const ABSORBED: f64 = 2e-3;
 
 /// Pushes a torque's rows over the model's determined columns, the added ones and the right-hand side.
 ///

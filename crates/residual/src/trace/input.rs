@@ -12,8 +12,10 @@ pub struct TraceOptions {
     pub most_effects: usize,
     /// Standard deviations (cluster-robust over the folds) that an effect must be from nothing.
     pub least_significance: f64,
-    /// Share of a torque's held-out residual variance that an effect must take away at least.
+    /// Share of a torque's held-out residual variance that an effect on it must take away at least.
     pub least_share: f64,
+    /// Share of the variance that the effects found before took from the same torque, at least.
+    pub least_of_others: f64,
     /// RMS of an effect over the RMS of its torque, at least.
     pub least_size: f64,
     /// A residual over the noise floor by less than this is noise.
@@ -26,8 +28,9 @@ impl Default for TraceOptions {
     fn default() -> Self {
         TraceOptions {
             most_effects: 12,
-            least_significance: 3.0,
-            least_share: 0.1,
+            least_significance: 12.0,
+            least_share: 0.2,
+            least_of_others: 0.025,
             least_size: 0.01,
             floor_margin: 1.15,
             structured_correlation: 0.2,

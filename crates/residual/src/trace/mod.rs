@@ -4,15 +4,20 @@
 //! simplest that explains on motion held out, refine its constants, and begin again, until nothing that is left has a name.
 
 mod candidate;
+mod choice;
 mod evidence;
 mod floor;
 mod input;
 mod probe;
 mod refine;
 mod residuals;
+mod revision;
+mod screening;
 mod search;
+mod stability;
 mod stage;
 mod tracing;
+mod verdict;
 
 pub use floor::noise_floor;
 pub use input::{HeldModel, TraceInput, TraceOptions};

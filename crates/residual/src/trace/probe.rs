@@ -33,7 +33,7 @@ pub(super) fn probe(
     if rows.is_empty() {
         return Ok(Vec::new());
     }
-    let mut candidates = Candidates { list: Vec::new(), effects: Vec::new() };
+    let mut candidates = Candidates::none();
     let mut meaning = Vec::new();
     for &row in rows {
         for (signal, effect) in probes(fixed, row, ranges) {

@@ -3,10 +3,13 @@
 use super::candidate::{Candidate, Candidates};
 use super::evidence::Refit;
 use super::search::{Fitted, Search, weights_of};
+use super::stage::{Judged, Thoroughness};
 use phiw_identification::{EffectCatalogue, EffectSpec, IdentificationError};
 
 /// A residual over the noise floor by less than this says nothing about a constant.
 const DOWN_TO_NOISE: f64 = 1.05;
+/// Share of a torque's residual variance that other constants of a declared effect must save.
+const WORTH_A_CHANGE: f64 = 0.03;
 /// Passes to refine constants.
 const REFINEMENTS: usize = 3;
 
@@ -59,7 +62,7 @@ impl Search<'_> {
         let places: Vec<usize> = (0..self.specs.len())
             .filter(|&place| !self.is_held(place) && (place >= declared || noisy(&self.specs[place])))
             .collect();
-        let mut candidates = Candidates { list: Vec::new(), effects: Vec::new() };
+        let mut candidates = Candidates::none();
         for &place in &places {
             let spec = &self.specs[place];
             let kind = self.fixed.catalogue.kind(&spec.kind)?;
@@ -101,13 +104,26 @@ impl Search<'_> {
         let mine: Vec<usize> = (0..stage.candidates.len())
             .filter(|&candidate| stage.candidates[candidate].rank == place)
             .collect();
-        let judged = stage.judge(&evidence, now, &mine, self.input.rows_per_independent)?;
+        let judged =
+            stage.judge(&evidence, now, &mine, Thoroughness::Screening, self.input.rows_per_independent)?;
         let gain = |refit: &Refit| {
-            let (train, held_out) = evidence.gain(now, refit);
+            let (train, held_out) = stage.gain(now, refit);
             train + held_out
         };
-        let best = judged.into_iter().filter(|judged| gain(&judged.refit) > 0.0);
-        let best = best.max_by(|a, b| gain(&a.refit).total_cmp(&gain(&b.refit)));
+        let best = match place < self.input.declared.len() {
+            true => {
+                let rows = stage.rows_of(place);
+                let samples: u64 = [&stage.train, &stage.held_out]
+                    .iter()
+                    .flat_map(|factors| rows.iter().map(|&row| factors.groups()[row].factor.rows()))
+                    .sum();
+                simplest(&stage.candidates, judged, &gain, 0.5 * WORTH_A_CHANGE * samples as f64)
+            }
+            false => {
+                let better = judged.into_iter().filter(|judged| gain(&judged.refit) > 0.0);
+                better.max_by(|a, b| gain(&a.refit).total_cmp(&gain(&b.refit)))
+            }
+        };
         Ok(best.map(|best| {
             let mut refit = best.refit;
             for (own, variant) in own.iter().zip(&best.parameters) {
@@ -132,4 +148,21 @@ impl Search<'_> {
         }
         Ok(changed)
     }
+}
+
+/// For a declared effect the variant with the smallest constants among those that are nearly as good as the best; `None` where the present one is nearly as good,
+/// so that a declared model means the same whatever has been found beside it.
+fn simplest(
+    candidates: &[Candidate],
+    judged: Vec<Judged>,
+    gain: &dyn Fn(&Refit) -> f64,
+    margin: f64,
+) -> Option<Judged> {
+    let best = judged.iter().map(|judged| gain(&judged.refit)).fold(0.0, f64::max);
+    if best <= margin {
+        return None;
+    }
+    let size = |judged: &Judged| candidates[judged.candidate].specs[0].constants.values().sum::<f64>();
+    let near = judged.into_iter().filter(|judged| gain(&judged.refit) >= best - margin);
+    near.min_by(|a, b| size(a).total_cmp(&size(b)))
 }

@@ -1,16 +1,15 @@
 //! The search for what a model lacks.
 
-use super::candidate::{Candidates, enumerate};
-use super::evidence::{Refit, paired_t};
+use super::candidate::{Candidates, Occupied, enumerate};
+use super::evidence::Refit;
 use super::input::{TraceInput, TraceOptions};
-use super::probe;
-use super::residuals::{ResidualShape, residual_shape};
-use super::stage::{Fixed, Judged, Prior, Stage};
-use super::tracing::{FoundEffect, Ranked, Remaining, RivalEffect, Tracing, Verdict};
+use super::residuals::residual_shape;
+use super::stage::{Fixed, Prior, Stage};
+use super::tracing::{FoundEffect, Tracing};
+use super::verdict::Account;
 use crate::catalogue::SignalRanges;
 use phiw_identification::{
-    BlockSource, Data, Design, EffectSpec, IdentificationError, Identified, KeptBlocks, TorqueError, fit,
-    torque_error,
+    BlockSource, Data, Design, EffectSpec, IdentificationError, KeptBlocks, TorqueError, torque_error,
 };
 use phiw_regressor::factor::Factor;
 use phiw_regressor::least_squares::GroupedFactor;
@@ -37,37 +36,48 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         weights: held.residual_std.iter().map(|std| 1.0 / std.max(f64::MIN_POSITIVE)).collect(),
     });
     let fixed = Fixed { tree: input.tree, base, catalogue: input.catalogue, data: input.data, prior };
-    let residual_std = input.residual_std.clone();
     Search {
-        fixed,
+        fixed: &fixed,
         specs: input.declared.clone(),
         found: Vec::new(),
+        dropped: Vec::new(),
+        account: None,
+        initial: None,
         before: None,
-        residual_std,
+        residual_std: input.residual_std.clone(),
         input: &input,
         options,
     }
     .run()
 }
 
+/// A model on its way, and how it came about. A clone is a branch: a model that might be.
+#[derive(Clone)]
 pub(super) struct Search<'a> {
-    pub(super) fixed: Fixed<'a>,
+    pub(super) fixed: &'a Fixed<'a>,
+    /// Effects of the model: those declared, then those found.
     pub(super) specs: Vec<EffectSpec>,
-    found: Vec<FoundEffect>,
-    before: Option<(TorqueError, TorqueError)>,
+    pub(super) found: Vec<FoundEffect>,
+    /// Effects that were found once and that others have made superfluous.
+    pub(super) dropped: Vec<EffectSpec>,
+    /// The error before the newest effects came in.
+    pub(super) account: Option<Account>,
+    /// Held-out residual sum of squares of each torque under the declared model.
+    pub(super) initial: Option<Vec<f64>>,
+    pub(super) before: Option<(TorqueError, TorqueError)>,
     /// Standard deviation of each torque's residual under the present model.
     pub(super) residual_std: Vec<f64>,
     pub(super) input: &'a TraceInput<'a>,
-    options: &'a TraceOptions,
+    pub(super) options: &'a TraceOptions,
 }
 
 /// A model, fitted, and what surrounds it in one pass.
 pub(super) struct Fitted {
     pub(super) stage: Stage,
     pub(super) determined: Vec<bool>,
-    weights: Vec<f64>,
+    pub(super) weights: Vec<f64>,
     pub(super) refit: Refit,
-    prior: Option<Factor>,
+    pub(super) prior: Option<Factor>,
 }
 
 impl Search<'_> {
@@ -83,19 +93,27 @@ impl Search<'_> {
             let all = [data.train.as_slice(), &data.held_out].concat();
             let shape = residual_shape(&design, &parameters, &all, &data.sources, &positions)?;
             ranges.ripple_frequencies = shape.ripple_frequencies.clone();
-            let candidates = self.candidates(&ranges);
-            let mut fitted = self.fitted(candidates, &parameters)?;
+            let fitted = self.fitted(self.candidates(&ranges), &parameters)?;
+            self.account(&fitted);
             if self.before.is_none() {
-                let errors = self.errors(&fitted, &fitted.refit.parameters)?;
-                self.before = Some(errors);
+                self.before = Some(self.errors(&fitted, &fitted.refit.parameters)?);
+                self.initial = Some(fitted.refit.held_out.clone());
             }
-            let (chosen, ranking) = match self.found.len() < self.options.most_effects {
-                true => self.choose(&mut fitted)?,
+            if let Some(place) = self.superfluous(&fitted)? {
+                parameters = self.refine_without(place, &fitted.refit.parameters)?;
+                continue;
+            }
+            let (choice, ranking) = match self.found.len() < self.options.most_effects {
+                true => self.choose(&fitted)?,
                 false => (None, Vec::new()),
             };
-            let Some(chosen) = chosen else { return self.finish(fitted, ranking, &shape) };
-            parameters = self.add(&fitted, chosen, ranking);
-            parameters = self.refine(parameters)?;
+            match choice {
+                Some(choice) => (self, parameters) = self.with_choice(&fitted, choice, ranking)?,
+                None => match self.unstable(&fitted)? {
+                    Some(place) => parameters = self.refine_without(place, &fitted.refit.parameters)?,
+                    None => return self.finish(fitted, ranking, &shape),
+                },
+            }
         }
     }
 
@@ -106,7 +124,10 @@ impl Search<'_> {
     }
 
     fn candidates(&self, ranges: &SignalRanges) -> Candidates {
-        enumerate(self.fixed.catalogue, self.fixed.tree, ranges, &self.specs, self.input.held.is_some())
+        let found = &self.specs[self.input.declared.len()..];
+        let closed: Vec<&EffectSpec> = found.iter().chain(&self.dropped).collect();
+        let occupied = Occupied { present: &self.specs, closed: &closed, held: self.input.held.is_some() };
+        enumerate(self.fixed.catalogue, self.fixed.tree, ranges, &occupied)
     }
 
     /// One pass with candidates beside the model, and the model's own weighted fit.
@@ -180,241 +201,23 @@ impl Search<'_> {
         Ok((torque_error(train, parameters)?, torque_error(held_out, parameters)?))
     }
 
-    /// The best candidate if it is believed, and the ranking.
-    fn choose(&self, fitted: &mut Fitted) -> Result<(Option<Choice>, Vec<Ranked>), IdentificationError> {
-        let stage = &fitted.stage;
-        let inflation = self.input.rows_per_independent;
-        let all: Vec<usize> = (0..stage.candidates.len()).collect();
-        let evidence = stage.evidence(&fitted.determined, &fitted.weights, fitted.prior.as_ref())?;
-        evidence.prepare()?;
-        let judged = stage.judge(&evidence, &fitted.refit, &all, inflation)?;
-        let Some(first) = judged.first() else { return Ok((None, Vec::new())) };
-        // With the best candidate in, the torques' noise is better known: judge the others by it.
-        let weights = weights_of(&stage.train, &first.refit.train);
-        let evidence = stage.evidence(&fitted.determined, &weights, fitted.prior.as_ref())?;
-        let near: Vec<usize> = judged.iter().take(FINALISTS).map(|judged| judged.candidate).collect();
-        let judged = stage.judge(&evidence, &fitted.refit, &near, inflation)?;
-        let best_of_each = best_of_each(stage, judged);
-        let ranking: Vec<Ranked> =
-            best_of_each.iter().take(10).map(|judged| self.ranked(stage, judged)).collect();
-        let Some(best) = best_of_each.first() else { return Ok((None, ranking)) };
-
-        // The simplest that the folds cannot tell from the best.
-        let std: Vec<f64> =
-            weights_of(&stage.train, &best.refit.train).iter().map(|weight| 1.0 / weight).collect();
-        let reference = evidence.fold_errors(&best.refit, &std)?;
-        let nothing = evidence.fold_errors(&fitted.refit, &std)?;
-        let total: f64 = nothing.iter().zip(&reference).map(|(a, b)| a - b).sum();
-        let mut equals = vec![best.clone()];
-        for other in best_of_each.iter().skip(1) {
-            let errors = evidence.fold_errors(&other.refit, &std)?;
-            let lost: f64 = errors.iter().zip(&reference).map(|(a, b)| a - b).sum();
-            let t = paired_t(&errors, &reference);
-            let near = best.score - other.score < NEAR_SCORE.max(NEAR_SHARE * best.score);
-            if (t < INDISTINGUISHABLE && near) || lost < NEGLIGIBLE * total {
-                equals.push(other.clone());
-            }
-        }
-        equals.sort_by_key(|judged| complexity(stage, judged));
-        let chosen = equals[0].clone();
-        let heard: Vec<usize> = chosen
-            .parameters
-            .iter()
-            .copied()
-            .filter(|&parameter| chosen.refit.parameters[parameter] != 0.0)
-            .collect();
-        let significance = evidence.significance(&heard)?;
-        let weigh = |judged: &Judged| (judged.score - best.score).max(-700.0).exp();
-        let sum: f64 = equals.iter().map(weigh).sum();
-        let share = |judged: &Judged| (judged.candidate, weigh(judged) / sum);
-        let rivals: Vec<(usize, f64)> =
-            equals.iter().skip(1).map(share).filter(|(_, share)| *share >= LEAST_RIVAL).collect();
-        let confidence = weigh(&chosen) / sum;
-        let believed = self.believed(fitted, &chosen, significance);
-        Ok((believed.then_some(Choice { judged: chosen, significance, confidence, rivals }), ranking))
-    }
-
-    fn believed(&self, fitted: &Fitted, chosen: &Judged, significance: f64) -> bool {
-        let stage = &fitted.stage;
-        let mut share: f64 = 0.0;
-        let mut size: f64 = 0.0;
-        for row in stage.rows(chosen.candidate) {
-            let (before, after) = (fitted.refit.held_out[row], chosen.refit.held_out[row]);
-            let factor = &stage.held_out.groups()[row].factor;
-            share = share.max(1.0 - after / before.max(f64::MIN_POSITIVE));
-            let torque = factor.right_hand_side_sum_of_squares().max(f64::MIN_POSITIVE);
-            size = size.max(((before - after).max(0.0) / torque).sqrt());
-        }
-        chosen.held_out_gain > 0.0
-            && significance >= self.options.least_significance
-            && share >= self.options.least_share
-            && size >= self.options.least_size
-    }
-
-    fn ranked(&self, stage: &Stage, judged: &Judged) -> Ranked {
-        Ranked {
-            spec: stage.candidates[judged.candidate].specs[0].clone(),
-            parameters: judged.parameters.len(),
-            held_out: relative(&stage.held_out, &judged.refit.held_out),
-        }
-    }
-
-    /// Puts the chosen effect into the model; gives the grown model's parameters.
-    fn add(&mut self, fitted: &Fitted, choice: Choice, ranking: Vec<Ranked>) -> Vec<f64> {
-        let stage = &fitted.stage;
-        let before = relative(&stage.held_out, &fitted.refit.held_out);
-        let after = relative(&stage.held_out, &choice.judged.refit.held_out);
-        let rivals: Vec<RivalEffect> = choice
-            .rivals
-            .iter()
-            .map(|&(candidate, confidence)| RivalEffect {
-                spec: stage.candidates[candidate].specs[0].clone(),
-                confidence,
-            })
-            .collect();
-        let above = |squares: &[f64]| -> f64 {
-            let of_row = |row: usize| {
-                let rows = stage.held_out.groups()[row].factor.rows() as f64;
-                (squares[row] - rows * self.input.noise_floor[row].powi(2)).max(0.0)
-            };
-            (0..squares.len()).map(of_row).sum()
-        };
-        let (left, had) = (above(&choice.judged.refit.held_out), above(&fitted.refit.held_out));
-        let explains = if had > 0.0 { (1.0 - left / had).clamp(0.0, 1.0) } else { 0.0 };
-        for spec in &stage.candidates[choice.judged.candidate].specs {
-            self.specs.push(spec.clone());
-            self.found.push(FoundEffect {
-                spec: spec.clone(),
-                relative: after,
-                relative_before: before,
-                explains,
-                confidence: choice.confidence,
-                significance: choice.significance,
-                rivals: rivals.clone(),
-                ranking: ranking.clone(),
-            });
-        }
-        let parameters = &choice.judged.refit.parameters;
-        let added = choice.judged.parameters.iter().map(|&parameter| parameters[parameter]);
-        parameters[..stage.model_size()].iter().copied().chain(added).collect()
-    }
-
     pub(super) fn is_held(&self, place: usize) -> bool {
         self.input.held.is_some() && place < self.input.declared.len()
     }
 
-    fn finish(
-        self,
-        fitted: Fitted,
-        ranking: Vec<Ranked>,
-        shape: &ResidualShape,
-    ) -> Result<Tracing, IdentificationError> {
-        let stage = fitted.stage;
-        let model = stage.model_size();
-        let kept: Vec<usize> = (0..model).collect();
-        let folds: Result<Vec<GroupedFactor>, RegressorError> =
-            stage.folds.iter().map(|fold| fold.select(&kept)).collect();
-        let mut train_folds = folds?;
-        let held_out_folds = train_folds.split_off(self.input.data.train.len());
-        let design = self.design(&self.specs)?;
-        let mut final_fit = fit(&design, &train_folds)?;
-        if self.input.held.is_some() {
-            final_fit.parameters = fitted.refit.parameters[..model].to_vec();
-        }
-        if self.input.held.is_some() && self.found.is_empty() {
-            final_fit.parameters = self.input.parameters.clone();
-        }
-        let after = (
-            torque_error(&train_folds, &final_fit.parameters)?,
-            torque_error(&held_out_folds, &final_fit.parameters)?,
-        );
-        let remaining = self.remaining(&final_fit.parameters, &after.1, ranking, shape)?;
-        let design = design.with_reference(self.fixed.reference(&self.specs, &final_fit.parameters)?);
-        let verdict = match (self.found.is_empty(), remaining.joints.is_empty()) {
-            (true, true) => Verdict::Sufficient,
-            (true, false) => Verdict::Unexplained,
-            (false, true) => Verdict::Explained,
-            (false, false) => Verdict::PartlyExplained,
-        };
-        let before = self.before.unwrap_or_else(|| after.clone());
-        let declared = self.input.declared.len();
-        let mut found = self.found;
-        found.iter_mut().zip(&self.specs[declared..]).for_each(|(effect, spec)| effect.spec = spec.clone());
-        let model = Identified {
-            design,
-            fit: final_fit,
-            train: after.0,
-            held_out: after.1,
-            train_folds,
-            held_out_folds,
-        };
-        Ok(Tracing { verdict, specs: self.specs, model, before, effects: found, remaining })
+    /// Whether the effect at `place` is in force through its point of linearisation, so that taking its columns away does not take it away.
+    pub(super) fn is_linearised(&self, spec: &EffectSpec) -> Result<bool, IdentificationError> {
+        let built = self.fixed.build(std::slice::from_ref(spec))?;
+        let mut linearised =
+            built.iter().map(|effect| effect.relinearised(&vec![0.0; effect.parameters().len()]).is_some());
+        Ok(linearised.any(|is| is))
     }
-
-    /// Which residuals have structure, and what they follow.
-    fn remaining(
-        &self,
-        parameters: &[f64],
-        held_out: &TorqueError,
-        ranking: Vec<Ranked>,
-        shape: &ResidualShape,
-    ) -> Result<Remaining, IdentificationError> {
-        let structured: Vec<usize> = (0..held_out.rmse.len())
-            .filter(|&row| {
-                held_out.rmse[row] > self.options.floor_margin * self.input.noise_floor[row]
-                    && shape.autocorrelation[row].abs() > self.options.structured_correlation
-            })
-            .collect();
-        let reference = self.fixed.reference(&self.specs, parameters)?;
-        let probed =
-            probe::probe(&self.fixed, &self.specs, reference, parameters, &self.input.ranges, &structured)?;
-        let names: Vec<String> = self.fixed.tree.joint_names().map(str::to_owned).collect();
-        let joints = structured.iter().map(|&row| names[row].clone()).collect();
-        Ok(Remaining { joints, depends_on: probed, ranking })
-    }
-}
-
-/// A candidate that was chosen, with those that the data could not tell from it.
-struct Choice {
-    judged: Judged,
-    significance: f64,
-    confidence: f64,
-    rivals: Vec<(usize, f64)>,
 }
 
 const NOT_DETERMINED: &str =
     "the training logs do not determine the declared model: add motion, or declare fewer effects";
 /// Conditioned samples that are kept between passes; longer logs are read again \[bytes\].
 const KEPT_BYTES: usize = 64 << 20;
-/// Candidates that are judged a second time.
-const FINALISTS: usize = 60;
-/// Paired t of two candidates' errors over the folds below which they are told apart by nothing.
-const INDISTINGUISHABLE: f64 = 2.5;
-/// Share of the gain that a simpler candidate may lose.
-const NEGLIGIBLE: f64 = 0.01;
-/// Log-likelihood, and share of the best one's, by which a simpler candidate may be worse and still be taken.
-const NEAR_SCORE: f64 = 6.0;
-const NEAR_SHARE: f64 = 0.02;
-/// A rival that is less probable is none.
-const LEAST_RIVAL: f64 = 0.01;
-
-/// The best variant of each hypothesis, best first.
-fn best_of_each(stage: &Stage, judged: Vec<Judged>) -> Vec<Judged> {
-    let mut best: Vec<Judged> = Vec::new();
-    for candidate in judged {
-        let hypothesis = stage.candidates[candidate.candidate].hypothesis();
-        if !best.iter().any(|other| stage.candidates[other.candidate].hypothesis() == hypothesis) {
-            best.push(candidate);
-        }
-    }
-    best
-}
-
-/// Parameters first, then the catalogue's order.
-fn complexity(stage: &Stage, judged: &Judged) -> (usize, usize) {
-    let candidate = &stage.candidates[judged.candidate];
-    (judged.parameters.len() + candidate.constants, candidate.rank)
-}
 
 fn rms(factors: &GroupedFactor) -> Vec<f64> {
     let of_group = |group: &phiw_regressor::least_squares::Group| {
@@ -432,7 +235,8 @@ pub(super) fn weights_of(factors: &GroupedFactor, squares: &[f64]) -> Vec<f64> {
     (0..squares.len()).map(weight).collect()
 }
 
-fn relative(factors: &GroupedFactor, squares: &[f64]) -> f64 {
+/// RMS of the error over RMS of the torque, all torques pooled.
+pub(super) fn relative(factors: &GroupedFactor, squares: &[f64]) -> f64 {
     let torque: f64 =
         factors.groups().iter().map(|group| group.factor.right_hand_side_sum_of_squares()).sum();
     (squares.iter().sum::<f64>() / torque).sqrt()

@@ -43,6 +43,15 @@ pub(super) struct Stage {
     pub folds: Vec<GroupedFactor>,
 }
 
+/// How a candidate is refitted.
+#[derive(Clone, Copy)]
+pub(super) enum Thoroughness {
+    /// Quickly, for a first ranking.
+    Screening,
+    /// To full precision.
+    Full,
+}
+
 /// A candidate and what a refit with it gave.
 #[derive(Clone)]
 pub(super) struct Judged {
@@ -50,6 +59,9 @@ pub(super) struct Judged {
     pub refit: Refit,
     /// Gain in log-likelihood, correlated samples counted once, less a penalty for parameters and constants.
     pub score: f64,
+    /// That penalty, and how many parameters and constants it counts.
+    pub penalty: f64,
+    pub counted: usize,
     /// Gain on the folds held out alone.
     pub held_out_gain: f64,
     pub parameters: Vec<usize>,
@@ -132,6 +144,15 @@ impl Stage {
         rows
     }
 
+    /// Torques that an effect of the model acts on.
+    pub fn rows_of(&self, place: usize) -> Vec<usize> {
+        let entries = self.design.effects()[place].entries();
+        let mut rows: Vec<usize> = entries.iter().map(|entry| entry.row).collect();
+        rows.sort_unstable();
+        rows.dedup();
+        rows
+    }
+
     /// Parameters of the model that the rows (and what was known before) determine.
     pub fn determined(&self, prior: Option<&Prior>) -> Result<Vec<bool>, RegressorError> {
         let model = self.model_size();
@@ -152,19 +173,23 @@ impl Stage {
     /// The same where a prior determines the base and the effects that it knew; those added since need the rows.
     fn determined_beside(&self, prior: &Prior) -> Result<Vec<bool>, RegressorError> {
         let model = self.model_size();
-        let mut builder = FactorBuilder::new(model + 1);
-        let columns: Vec<usize> = prior.parameters.iter().copied().chain([model]).collect();
+        // A parameter that was not determined then would take up what has come since: it stays out.
+        let open: Vec<usize> = (0..model)
+            .filter(|parameter| *parameter >= prior.known || prior.parameters.contains(parameter))
+            .collect();
+        let place = |parameter: &usize| open.binary_search(parameter).unwrap_or(open.len());
+        let mut builder = FactorBuilder::new(open.len() + 1);
+        let columns: Vec<usize> = prior.parameters.iter().map(place).chain([open.len()]).collect();
         builder.push_factor(&prior.factor, &columns, 1.0)?;
-        let kept: Vec<usize> = (0..model).collect();
-        let rows = self.train.select(&kept)?.combine(&prior.weights)?;
-        let all: Vec<usize> = (0..=model).collect();
+        let rows = self.train.select(&open)?.combine(&prior.weights)?;
+        let all: Vec<usize> = (0..=open.len()).collect();
         builder.push_factor(&rows, &all, 1.0)?;
         let undetermined = builder.factor().undetermined_columns();
-        let known = |parameter: &usize| {
-            let since = *parameter >= prior.known;
-            (since || prior.parameters.contains(parameter)) && !undetermined.contains(parameter)
-        };
-        Ok((0..model).map(|parameter| known(&parameter)).collect())
+        let mut determined = vec![false; model];
+        open.iter().enumerate().for_each(|(place, &parameter)| {
+            determined[parameter] = !undetermined.contains(&place);
+        });
+        Ok(determined)
     }
 
     /// The evidence with the given weights.
@@ -186,7 +211,7 @@ impl Stage {
         )
     }
 
-    /// Refits with every candidate of `which`; those that leave nothing to identify, or break their bounds, are left out.
+    /// Screens every candidate of `which`, or refits with it in full; those that leave nothing to identify, or break their bounds, are left out.
     ///
     /// `inflation` says how many correlated samples make one.
     pub fn judge(
@@ -194,36 +219,69 @@ impl Stage {
         evidence: &Evidence<'_>,
         before: &Refit,
         which: &[usize],
+        thoroughness: Thoroughness,
         inflation: f64,
     ) -> Result<Vec<Judged>, RegressorError> {
         let judged: Result<Vec<Option<Judged>>, RegressorError> = which
             .par_iter()
             .map(|&candidate| {
                 let parameters = self.parameters(candidate);
-                let Some(refit) = evidence.refit(&parameters, &self.rows(candidate))? else {
-                    return Ok(None);
+                let rows = self.rows(candidate);
+                let refit = match thoroughness {
+                    Thoroughness::Screening => evidence.screen(&parameters, &rows)?,
+                    Thoroughness::Full => evidence.refit(&parameters, &rows)?,
                 };
+                let Some(refit) = refit else { return Ok(None) };
                 if !self.within_bounds(candidate, &refit) {
                     return Ok(None);
                 }
-                let (train, held_out) = evidence.gain(before, &refit);
+                let (train, held_out) = self.gain(before, &refit);
                 // A parameter that the rows do not determine costs nothing.
                 let heard =
                     parameters.iter().filter(|&&parameter| refit.parameters[parameter] != 0.0).count();
                 let count = heard + self.candidates[candidate].constants;
-                let rows = self
-                    .rows(candidate)
-                    .iter()
-                    .map(|&row| self.train.groups()[row].factor.rows())
-                    .sum::<u64>();
-                let penalty = 0.5 * (rows as f64 / inflation).max(2.0).ln() * count as f64;
+                let penalty = self.penalty(&rows, count, inflation);
                 let score = (train + held_out) / inflation - penalty;
-                Ok(Some(Judged { candidate, refit, score, held_out_gain: held_out / inflation, parameters }))
+                let held_out_gain = held_out / inflation;
+                Ok(Some(Judged {
+                    candidate,
+                    refit,
+                    score,
+                    penalty,
+                    counted: count,
+                    held_out_gain,
+                    parameters,
+                }))
             })
             .collect();
         let mut judged: Vec<Judged> = judged?.into_iter().flatten().collect();
         judged.sort_by(|a, b| b.score.total_cmp(&a.score));
         Ok(judged)
+    }
+
+    /// What parameters and constants that act on `rows` cost (Schwarz 1978), correlated samples counted once.
+    pub fn penalty(&self, rows: &[usize], count: usize, inflation: f64) -> f64 {
+        let samples: u64 = rows.iter().map(|&row| self.train.groups()[row].factor.rows()).sum();
+        0.5 * (samples as f64 / inflation).max(2.0).ln() * count as f64
+    }
+
+    /// Gain in log-likelihood of each torque's rows over `before`, with each torque's noise unknown: rows/2·ln(RSS⁰/RSS), training and held out.
+    pub fn gain(&self, before: &Refit, after: &Refit) -> (f64, f64) {
+        let gain = |factors: &GroupedFactor, before: &[f64], after: &[f64]| -> f64 {
+            let of_group = |row: usize| {
+                let rows = factors.groups()[row].factor.rows() as f64;
+                if before[row] > 0.0 && after[row] > 0.0 {
+                    0.5 * rows * (before[row] / after[row]).ln()
+                } else {
+                    0.0
+                }
+            };
+            (0..before.len()).map(of_group).sum()
+        };
+        (
+            gain(&self.train, &before.train, &after.train),
+            gain(&self.held_out, &before.held_out, &after.held_out),
+        )
     }
 
     fn within_bounds(&self, candidate: usize, refit: &Refit) -> bool {

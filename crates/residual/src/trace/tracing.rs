@@ -49,6 +49,8 @@ pub struct FoundEffect {
     pub explains: f64,
     /// Its probability against its rivals.
     pub confidence: f64,
+    /// Share of bootstrap draws of the training folds in which it, or one of its rivals, is chosen beside the other effects.
+    pub stability: f64,
     /// Standard deviations from nothing.
     pub significance: f64,
     /// What the data could not tell from it.
@@ -66,6 +68,8 @@ pub struct Remaining {
     pub depends_on: Vec<Dependence>,
     /// The best candidates that were not good enough.
     pub ranking: Vec<Ranked>,
+    /// What these logs cannot tell: candidates of which the motion leaves nothing beside the model's own columns.
+    pub silent: Vec<EffectSpec>,
 }
 
 /// The result of a trace.

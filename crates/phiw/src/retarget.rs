@@ -1,0 +1,84 @@
+//! `phiw retarget`: marker recordings in, motions of the robot out, many files at a time.
+
+mod batch;
+mod motion_file;
+
+pub use batch::{Failure, RetargetOutcome};
+
+use crate::Error;
+use crate::arguments::RetargetArguments;
+use crate::console::Console;
+use crate::output::check_folder;
+use phiw_bspline_retarget::human::MarkerMap;
+use phiw_bspline_retarget::{MarkerRecording, RetargetOptions, Retargeter, read_recording};
+use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Retargets all recordings: for each a log `<name>.csv` without torques, and `<name>.json` with what it is worth.
+///
+/// A file that has been done with the same settings is kept. A file that cannot be done does not stop the others.
+///
+/// # Errors
+/// The robot or the map is wrong, two recordings would go into one file, or no recording can be retargeted at all.
+pub fn retarget(arguments: &RetargetArguments, console: &Console) -> Result<RetargetOutcome, Error> {
+    check_folder(&arguments.out)?;
+    check_names(&arguments.c3d)?;
+    let text = |path: &PathBuf| {
+        std::fs::read_to_string(path).map_err(|source| Error::Unreadable { path: path.clone(), source })
+    };
+    let urdf = text(&arguments.urdf)?;
+    let options = UrdfOptions { floating_base: false, held: arguments.hold.clone() };
+    let reading = read_urdf(&urdf, &options)
+        .map_err(|source| Error::Urdf { path: arguments.urdf.clone(), source: Box::new(source) })?;
+    let map = match &arguments.map {
+        Some(path) => MarkerMap::from_toml(&text(path)?)
+            .map_err(|source| Error::Map { path: path.clone(), source })?,
+        None => default_map(&arguments.c3d),
+    };
+    let mut options = RetargetOptions {
+        interval_s: arguments.interval,
+        torso_from_reach: arguments.torso_from_reach,
+        ..RetargetOptions::default()
+    };
+    if arguments.velocity_limits {
+        options.weights.velocity_limits = options.weights.limits;
+    }
+    let retargeter = Retargeter::new(reading.tree, map, options)
+        .map_err(|source| Error::Robot { path: arguments.urdf.clone(), source })?;
+    batch::run(arguments, &urdf, &retargeter, console)
+}
+
+/// No two recordings may have the same name: their motions would.
+fn check_names(files: &[PathBuf]) -> Result<(), Error> {
+    let mut names: BTreeMap<String, &PathBuf> = BTreeMap::new();
+    for file in files {
+        if let Some(first) = names.insert(stem(file), file) {
+            return Err(Error::SameName { first: first.clone(), second: file.clone() });
+        }
+    }
+    Ok(())
+}
+
+/// The built-in map that names most markers of the first recording that can be read.
+fn default_map(files: &[PathBuf]) -> MarkerMap {
+    let known = [MarkerMap::ue_adl(), MarkerMap::embedded()];
+    let recording = files.iter().find_map(|file| read_recording(file, Some("m")).ok());
+    let share = |map: &MarkerMap| recording.as_ref().map_or(0.0, |recording| share_named(map, recording));
+    let [seated, embedded] = known;
+    if share(&embedded) > share(&seated) { embedded } else { seated }
+}
+
+/// Share of a map's markers that a recording has.
+fn share_named(map: &MarkerMap, recording: &MarkerRecording) -> f64 {
+    let segments = map.segments.values();
+    let names: Vec<&String> =
+        segments.flat_map(|s| s.cluster.iter().chain(s.at.keys()).chain(s.at_end.keys())).collect();
+    let found = names.iter().filter(|name| recording.marker(name).is_some()).count();
+    found as f64 / names.len().max(1) as f64
+}
+
+/// A file's name without folder and extension.
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}

@@ -1,0 +1,176 @@
+//! Many recordings, in parallel, each by itself.
+
+use super::motion_file::{MotionFile, Settings};
+use super::stem;
+use crate::Error;
+use crate::arguments::RetargetArguments;
+use crate::console::Console;
+use phiw_bspline_retarget::{
+    Calibration, Quality, RecordingError, RetargetError, Retargeter, read_recording,
+};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// What became of the recordings.
+#[derive(Debug)]
+pub struct RetargetOutcome {
+    /// What was done, as text for a terminal.
+    pub summary: String,
+    /// Recordings that could not be retargeted.
+    pub failures: Vec<Failure>,
+}
+
+/// A recording that could not be retargeted.
+#[derive(Debug)]
+pub struct Failure {
+    /// The recording.
+    pub file: PathBuf,
+    /// Why: names the file.
+    pub reason: Error,
+}
+
+/// What became of one recording.
+enum Done {
+    Retargeted(Box<Quality>, f64),
+    Kept,
+}
+
+/// Retargets everything, then says what became of it.
+pub fn run(
+    arguments: &RetargetArguments,
+    urdf: &str,
+    retargeter: &Retargeter,
+    console: &Console,
+) -> Result<RetargetOutcome, Error> {
+    let suffix = retargeter.map().static_suffix.clone();
+    let is_static = |file: &&PathBuf| suffix.as_ref().is_some_and(|suffix| stem(file).ends_with(suffix));
+    let (statics, motions): (Vec<&PathBuf>, Vec<&PathBuf>) = arguments.c3d.iter().partition(is_static);
+    let calibrations = calibrations(retargeter, &motions, suffix.as_deref());
+    let done = AtomicU64::new(0);
+    let total = motions.len() as u64;
+    let outcomes: Vec<Result<Done, Error>> = motions
+        .par_iter()
+        .map(|file| {
+            let outcome = one(arguments, urdf, retargeter, file, &calibrations, suffix.as_deref());
+            console.progress("retargeting", done.fetch_add(1, Ordering::Relaxed) + 1, total);
+            outcome
+        })
+        .collect();
+    console.finish();
+
+    let (mut qualities, mut kept, mut seconds) = (Vec::new(), 0, 0.0);
+    let mut failures = Vec::new();
+    for (file, outcome) in motions.iter().zip(outcomes) {
+        match outcome {
+            Ok(Done::Retargeted(quality, duration_s)) => {
+                seconds += duration_s;
+                qualities.push(quality);
+            }
+            Ok(Done::Kept) => kept += 1,
+            Err(reason) => failures.push(Failure { file: (*file).clone(), reason }),
+        }
+    }
+    // A command that did nothing has one message, like any other.
+    if qualities.is_empty() && kept == 0 {
+        return Err(failures.into_iter().next().map_or(Error::NoMotion, |failure| failure.reason));
+    }
+    let mut summary = String::new();
+    let torso = if arguments.torso_from_reach {
+        "; torso and head from the reach, not from the recordings"
+    } else {
+        ""
+    };
+    // Writing to a string does not fail.
+    let _ = writeln!(
+        summary,
+        "{} motions ({seconds:.0} s) in {} with the map `{}`{torso}; {kept} kept, {} static trials, {} failed",
+        qualities.len(),
+        arguments.out.display(),
+        retargeter.map().name,
+        statics.len(),
+        failures.len()
+    );
+    if !qualities.is_empty() {
+        let median = |value: &dyn Fn(&Quality) -> f64| median(qualities.iter().map(|q| value(q)).collect());
+        let most = |value: &dyn Fn(&Quality) -> f64| qualities.iter().map(|q| value(q)).fold(0.0, f64::max);
+        let _ = writeln!(
+            summary,
+            "markers {:.1} mm RMS in the median, {:.1} at most; hands {:.2} % of the arm, {:.2} at most; jerk {:.0} rad/s³; \
+             beyond limits {:.1e}",
+            1e3 * median(&|q| q.marker_rms_m),
+            1e3 * most(&|q| q.marker_rms_m),
+            1e2 * median(&|q| q.hand_share()),
+            1e2 * most(&|q| q.hand_share()),
+            median(&|q| q.jerk_rms),
+            most(&|q| q.limit_excess)
+        );
+    }
+    Ok(RetargetOutcome { summary, failures })
+}
+
+type Calibrations = BTreeMap<PathBuf, Result<Calibration, String>>;
+
+/// What the static trials of these recordings tell.
+fn calibrations(retargeter: &Retargeter, motions: &[&PathBuf], suffix: Option<&str>) -> Calibrations {
+    let Some(suffix) = suffix else { return Calibrations::new() };
+    let mut files: Vec<PathBuf> = motions.iter().filter_map(|file| static_trial(file, suffix)).collect();
+    files.sort();
+    files.dedup();
+    let calibrate = |file: PathBuf| {
+        let recording = read_recording(&file, retargeter.map().units.as_deref()).map_err(|e| e.to_string());
+        let calibration = recording.and_then(|recording| {
+            retargeter.calibrate(&recording).map_err(|error| format!("{}: {error}", file.display()))
+        });
+        (file, calibration)
+    };
+    files.into_par_iter().map(calibrate).collect()
+}
+
+/// The static trial beside a recording that shares the longest beginning of its name.
+fn static_trial(file: &Path, suffix: &str) -> Option<PathBuf> {
+    let (name, extension) = (stem(file), file.extension()?);
+    let ends = name.char_indices().map(|(at, c)| at + c.len_utf8()).collect::<Vec<_>>();
+    ends.into_iter().rev().find_map(|end| {
+        let other = file.with_file_name(format!("{}{suffix}", &name[..end])).with_extension(extension);
+        other.is_file().then_some(other)
+    })
+}
+
+fn one(
+    arguments: &RetargetArguments,
+    urdf: &str,
+    retargeter: &Retargeter,
+    file: &Path,
+    calibrations: &Calibrations,
+    suffix: Option<&str>,
+) -> Result<Done, Error> {
+    let trial = suffix.and_then(|suffix| static_trial(file, suffix));
+    let content = std::fs::read(file).map_err(|source| {
+        Error::Recording(RecordingError::Unreadable { path: file.to_owned(), source })
+    })?;
+    let settings = Settings::new(arguments, urdf, retargeter, &content, trial.as_deref());
+    let output = MotionFile::new(&arguments.out, &stem(file));
+    if output.holds(&settings) {
+        return Ok(Done::Kept);
+    }
+    let recording = read_recording(file, retargeter.map().units.as_deref()).map_err(Error::Recording)?;
+    let calibration = match trial.as_ref().and_then(|trial| calibrations.get(trial)) {
+        Some(Ok(calibration)) => Some(calibration),
+        Some(Err(reason)) => {
+            return Err(Error::StaticTrial { path: file.to_owned(), reason: reason.clone() });
+        }
+        None => None,
+    };
+    let wrong = |source: RetargetError| Error::Retarget { path: file.to_owned(), source };
+    let motion = retargeter.retarget(&recording, calibration).map_err(wrong)?;
+    output.write(&motion, retargeter, &settings, arguments)?;
+    Ok(Done::Retargeted(Box::new(motion.quality), recording.duration_s()))
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}

@@ -1,0 +1,143 @@
+//! One motion in the result folder: a log and what is known of it.
+
+use crate::Error;
+use crate::arguments::{Derivatives, RetargetArguments};
+use phiw_bspline_retarget::{Retargeted, Retargeter, backward_differences};
+use phiw_telemetry::{LogColumns, LogWriter};
+use serde_json::json;
+use sha2::{Digest, Sha256};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Everything that a motion depends on, in one number.
+pub struct Settings(String);
+
+impl Settings {
+    pub fn new(
+        arguments: &RetargetArguments,
+        urdf: &str,
+        retargeter: &Retargeter,
+        recording: &[u8],
+        static_trial: Option<&Path>,
+    ) -> Self {
+        let mut digest = Sha256::new();
+        digest.update(env!("CARGO_PKG_VERSION"));
+        digest.update(urdf);
+        let settings =
+            (&arguments.hold, &arguments.derivatives, retargeter.map(), retargeter.options(), static_trial);
+        digest.update(format!("{settings:?}"));
+        digest.update(recording);
+        if let Some(Ok(trial)) = static_trial.map(fs::read) {
+            digest.update(trial);
+        }
+        Settings(digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+    }
+}
+
+/// `<name>.csv` and `<name>.json`.
+pub struct MotionFile {
+    log: PathBuf,
+    facts: PathBuf,
+}
+
+impl MotionFile {
+    pub fn new(folder: &Path, name: &str) -> Self {
+        MotionFile { log: folder.join(format!("{name}.csv")), facts: folder.join(format!("{name}.json")) }
+    }
+
+    /// Whether the motion is there, made with the same settings.
+    pub fn holds(&self, settings: &Settings) -> bool {
+        let facts = fs::read_to_string(&self.facts).ok();
+        let facts = facts.and_then(|text| serde_json::from_str::<serde_json::Value>(&text).ok());
+        self.log.is_file() && facts.is_some_and(|facts| facts["settings"] == settings.0)
+    }
+
+    /// Writes both under other names, then renames them, the facts last: whoever finds them finds a whole log.
+    pub fn write(
+        &self,
+        motion: &Retargeted,
+        retargeter: &Retargeter,
+        settings: &Settings,
+        arguments: &RetargetArguments,
+    ) -> Result<(), Error> {
+        let log = log(motion, retargeter, arguments.derivatives).map_err(unwritable(&self.log))?;
+        let mut facts = facts(motion, retargeter, settings).to_string();
+        facts.push('\n');
+        if let Some(folder) = self.log.parent() {
+            fs::create_dir_all(folder).map_err(unwritable(folder))?;
+        }
+        // What is there from other settings must not vouch for the new log.
+        if self.facts.exists() {
+            fs::remove_file(&self.facts).map_err(unwritable(&self.facts))?;
+        }
+        for (path, text) in [(&self.log, log), (&self.facts, facts.into_bytes())] {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            let partial = path.with_file_name(format!(".{name}.partial"));
+            let written = fs::write(&partial, text).and_then(|()| fs::rename(&partial, path));
+            written.inspect_err(|_| drop(fs::remove_file(&partial))).map_err(unwritable(path))?;
+        }
+        Ok(())
+    }
+}
+
+fn unwritable(path: &Path) -> impl FnOnce(io::Error) -> Error {
+    let path = path.to_owned();
+    move |source| Error::Unwritable { path, source }
+}
+
+/// The robot's motion at the recording's rate.
+fn log(motion: &Retargeted, retargeter: &Retargeter, derivatives: Derivatives) -> io::Result<Vec<u8>> {
+    let joints: Vec<String> = retargeter.robot().tree().joint_names().map(str::to_owned).collect();
+    let (count, frames) = (joints.len(), motion.frames);
+    let mut scratch = vec![0.0; motion.robot.basis().degree() + 1];
+    // Position, velocity, acceleration of all samples.
+    let mut signals = [0, 1, 2].map(|_| vec![0.0; frames * count]);
+    for (order, signal) in signals.iter_mut().enumerate() {
+        for (frame, values) in signal.chunks_exact_mut(count.max(1)).enumerate() {
+            motion.robot.evaluate(order, frame as f64 / motion.rate_hz, &mut scratch, values);
+        }
+    }
+    let [q, qd, qdd] = &mut signals;
+    if derivatives == Derivatives::BackwardDifferences {
+        backward_differences(q, count, 1.0 / motion.rate_hz, qd, qdd)
+            .map_err(|error| io::Error::other(error.to_string()))?;
+    }
+    let columns = LogColumns { velocity: true, acceleration: true, ..LogColumns::default() };
+    let mut writer = LogWriter::new(Vec::new(), &joints, columns)?;
+    for frame in 0..frames {
+        let range = frame * count..(frame + 1) * count;
+        let row = [&q[range.clone()], &qd[range.clone()], &qdd[range]];
+        writer.write(frame as f64 / motion.rate_hz, &row)?;
+    }
+    writer.finish()
+}
+
+fn facts(motion: &Retargeted, retargeter: &Retargeter, settings: &Settings) -> serde_json::Value {
+    let (quality, options) = (&motion.quality, retargeter.options());
+    let torso = if options.torso_from_reach { "from_reach" } else { "from_recording" };
+    json!({
+        "schema": 1,
+        "map": retargeter.map().name,
+        "torso_and_head": torso,
+        "rate_hz": motion.rate_hz,
+        "frames": motion.frames,
+        "marker_rms_m": quality.marker_rms_m,
+        "elbow_rms_m": quality.elbow_rms_m,
+        "hand_rms_m": quality.hand_rms_m,
+        "arm_length_m": quality.arm_length_m,
+        "limit_excess": quality.limit_excess,
+        "peak_speed": quality.peak_speed,
+        "peak_speed_share": quality.peak_speed_share,
+        "jerk_rms": quality.jerk_rms,
+        "cost": {
+            "markers": motion.cost.markers,
+            "correspondence": motion.cost.correspondence,
+            "limits": motion.cost.limits,
+            "prior": motion.cost.prior,
+        },
+        "iterations": motion.iterations,
+        "parameters": motion.parameters.iter().cloned().collect::<std::collections::BTreeMap<_, _>>(),
+        "settings": settings.0,
+    })
+}

@@ -1,0 +1,139 @@
+//! `phiw retarget`, from files to files.
+
+use assert_cmd::Command;
+use phiw_bspline_retarget::embedded::embedded_motions;
+use phiw_telemetry::{Recording, TorqueColumns};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+const MOTIONS: usize = 3;
+
+/// A folder with a robot and some of the embedded motions, cut short.
+fn scene() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (number, mut motion) in embedded_motions(5).step_by(40).take(MOTIONS).enumerate() {
+        let markers = motion.recording.labels.len();
+        motion.recording.positions_m.truncate(120 * markers);
+        std::fs::write(folder.path().join(format!("m{number}.c3d")), motion.to_c3d()).unwrap();
+    }
+    let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/upper_body18.urdf");
+    std::fs::copy(robot, folder.path().join("robot.urdf")).unwrap();
+    folder
+}
+
+fn motions(folder: &TempDir) -> Vec<PathBuf> {
+    (0..MOTIONS).map(|number| folder.path().join(format!("m{number}.c3d"))).collect()
+}
+
+/// Exit status, standard output, standard error.
+fn run(folder: &TempDir, files: &[PathBuf], more: &[&str]) -> (i32, String, String) {
+    let mut command = Command::cargo_bin("phiw").unwrap();
+    command.arg("retarget").arg("--urdf").arg(folder.path().join("robot.urdf"));
+    command.arg("--c3d").args(files).arg("--out").arg(folder.path().join("out")).args(more);
+    let output = command.output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = folder.read_dir().into_iter().flatten();
+    let mut names: Vec<String> =
+        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_bad_file_does_not_stop_the_rest_and_what_is_done_is_not_done_again() {
+    let folder = scene();
+    let mut files = motions(&folder);
+    let bad = folder.path().join("bad.c3d");
+    std::fs::write(&bad, "not a recording at all, but long enough to be one").unwrap();
+    files.insert(1, bad);
+    let (status, summary, errors) = run(&folder, &files, &[]);
+    assert_eq!(status, 1, "{errors}");
+    assert!(summary.starts_with("3 motions") && summary.contains("1 failed"), "{summary}");
+    assert!(errors.contains("bad.c3d: not a C3D file"), "{errors}");
+    let out = folder.path().join("out");
+    assert_eq!(names(&out), ["m0.csv", "m0.json", "m1.csv", "m1.json", "m2.csv", "m2.json"]);
+
+    let joints: Vec<String> = {
+        let header = std::fs::read_to_string(out.join("m0.csv")).unwrap();
+        let header = header.lines().next().unwrap().to_owned();
+        header.split(',').filter_map(|name| name.strip_prefix("q.")).map(str::to_owned).collect()
+    };
+    assert_eq!(joints.len(), 18);
+    let log = Recording::from_csv(&out.join("m0.csv"), &joints, TorqueColumns::Optional).unwrap();
+    assert_eq!(log.len(), 120);
+
+    // Again: everything is kept, byte for byte, but for the motion whose log was lost.
+    let before = std::fs::read(out.join("m1.csv")).unwrap();
+    std::fs::remove_file(out.join("m2.csv")).unwrap();
+    let (status, summary, _) = run(&folder, &motions(&folder), &[]);
+    assert_eq!(status, 0);
+    assert!(summary.starts_with("1 motions") && summary.contains("2 kept"), "{summary}");
+    assert_eq!(std::fs::read(out.join("m1.csv")).unwrap(), before);
+
+    // Other settings: done again, and named.
+    let (_, summary, _) = run(&folder, &motions(&folder), &["--torso-from-reach"]);
+    assert!(summary.contains("from the reach") && summary.contains("0 kept"), "{summary}");
+    let facts = std::fs::read_to_string(out.join("m1.json")).unwrap();
+    assert!(facts.contains("\"torso_and_head\":\"from_reach\""), "{facts}");
+}
+
+/// One message with all parts, exit status 2, nothing written.
+fn check_refused(spoil: impl FnOnce(&TempDir) -> (Vec<PathBuf>, Vec<String>), parts: &[&str]) {
+    let folder = scene();
+    let (files, more) = spoil(&folder);
+    let more: Vec<&str> = more.iter().map(String::as_str).collect();
+    let (status, _, errors) = run(&folder, &files, &more);
+    assert_eq!(status, 2, "{errors}");
+    assert!(parts.iter().all(|part| errors.contains(part)), "{errors}");
+    assert!(names(&folder.path().join("out")).is_empty());
+}
+
+#[test]
+fn wrong_input_is_named() {
+    let map = |text: &'static str| {
+        move |folder: &TempDir| {
+            let path = folder.path().join("map.toml");
+            std::fs::write(&path, text).unwrap();
+            (motions(folder), vec!["--map".to_owned(), path.display().to_string()])
+        }
+    };
+    check_refused(map("name = 1"), &["map.toml: not a marker map"]);
+    check_refused(map("name = \"m\"\n[segments.chst]\n"), &["`chst` is no segment", "`chest`"]);
+    check_refused(
+        map("name = \"m\"\n[segments.chest]\nat = { STRM = [0.1, 0.0, 0.2] }\n"),
+        &["m0.c3d: the map's marker `STRM` is not in the recording", "`STRN`"],
+    );
+    check_refused(
+        map("name = \"m\"\n[segments.chest]\ncluster = [\"STRN\"]\n"),
+        &["m0.c3d: nothing says where marker `STRN` sits", "static trial"],
+    );
+    check_refused(|folder| (vec![folder.path().join("none.c3d")], vec![]), &["none.c3d: no such file"]);
+    check_refused(
+        |folder| {
+            let cut = std::fs::read(folder.path().join("m0.c3d")).unwrap();
+            std::fs::write(folder.path().join("m0.c3d"), &cut[..20000]).unwrap();
+            (vec![folder.path().join("m0.c3d")], vec![])
+        },
+        &["m0.c3d: the frames needs bytes", "cut off"],
+    );
+    check_refused(
+        |folder| {
+            let twice = folder.path().join("m0.csv");
+            std::fs::write(&twice, "").unwrap();
+            (vec![folder.path().join("m0.c3d"), twice], vec![])
+        },
+        &["have the same name"],
+    );
+    check_refused(
+        |folder| {
+            let urdf = "<robot name=\"r\"><link name=\"a\"/></robot>";
+            std::fs::write(folder.path().join("robot.urdf"), urdf).unwrap();
+            (motions(folder), vec![])
+        },
+        &["robot.urdf"],
+    );
+}
