@@ -1,7 +1,9 @@
 //! Experiments and set-up of the workspace: `cargo xtask <task>`.
 
 mod environment;
+mod mujoco;
 mod oracle;
+mod plant_experiment;
 mod run;
 mod test;
 mod undeclared;
@@ -24,10 +26,14 @@ enum Task {
     SyntheticLog(run::synthetic_log::Arguments),
     /// All checks of the workspace, and the count of tests.
     Test(test::Arguments),
+    /// Fetch MuJoCo's library into the user's cache folder, with Python's pip.
+    Mujoco(mujoco::Arguments),
     /// Compare with Pinocchio, installed from PyPI into a private environment.
     Oracle(oracle::Arguments),
     /// Robot logs with effects that nobody declared: generate, trace with `phiw explain`, score.
     Undeclared(undeclared::Arguments),
+    /// Robots in physics engines with one secret each, tracked poorly: log, trace with `phiw explain`, score.
+    Plant(plant_experiment::Arguments),
 }
 
 fn main() -> anyhow::Result<ExitCode> {
@@ -35,7 +41,9 @@ fn main() -> anyhow::Result<ExitCode> {
         Task::Run(arguments) => run::command(&arguments),
         Task::SyntheticLog(arguments) => run::synthetic_log::command(&arguments),
         Task::Test(arguments) => test::command(&arguments),
+        Task::Mujoco(arguments) => mujoco::command(&arguments),
         Task::Oracle(arguments) => oracle::command(&arguments),
+        Task::Plant(arguments) => plant_experiment::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Undeclared(arguments) => undeclared::command(&arguments).map(|()| ExitCode::SUCCESS),
     }
 }

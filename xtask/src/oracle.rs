@@ -1,13 +1,16 @@
-//! `cargo xtask oracle`: this workspace's dynamics against Pinocchio's, robot by robot.
+//! `cargo xtask oracle`: this workspace's dynamics against Pinocchio's, robot by robot, and its C3D reader against ezc3d's.
 
 mod answers;
+mod c3d;
 mod case;
 mod comparison;
 mod pinocchio;
+mod python;
 
 use crate::environment;
 use answers::QUANTITIES;
 use case::Case;
+use python::Python;
 use std::process::ExitCode;
 
 /// The largest relative difference that is rounding.
@@ -28,14 +31,35 @@ pub struct Arguments {
     /// The Python that the private environment is made with.
     #[arg(long, default_value = "python3")]
     python: String,
+    /// What is compared; everything by default.
+    #[arg(value_enum)]
+    part: Option<Part>,
 }
 
-/// Prints the table of differences; fails if one is too large.
+/// A part of the comparison.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Part {
+    /// Dynamics against Pinocchio.
+    Dynamics,
+    /// C3D files against ezc3d.
+    C3d,
+}
+
+/// Prints tables of differences; fails if one is too large.
 ///
 /// # Errors
-/// Pinocchio cannot be installed, a robot cannot be read, or Pinocchio fails on it.
+/// The packages cannot be installed, a robot or recording cannot be read, or a package fails on it.
 pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let oracle = pinocchio::Oracle::install(&arguments.python)?;
+    let python = Python::install(&arguments.python)?;
+    let asked = |part| arguments.part.is_none_or(|only| only == part);
+    let recordings_agree = !asked(Part::C3d) || c3d::compare(&python)?;
+    let dynamics_agree = !asked(Part::Dynamics) || dynamics(python, arguments)?;
+    Ok(if recordings_agree && dynamics_agree { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Prints the table of differences to Pinocchio; whether all are small.
+fn dynamics(python: Python, arguments: &Arguments) -> anyhow::Result<bool> {
+    let oracle = pinocchio::Oracle::new(python)?;
     let folder = tempfile::tempdir()?;
     let mut cases = case::from_files(&environment::workspace_root()?)?;
     cases.extend(case::random(folder.path(), arguments.seed, arguments.random_robots)?);
@@ -61,7 +85,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let agrees = largest < TOLERANCE;
     let verdict = if agrees { "below" } else { "NOT below" };
     println!("\nmax relative difference {largest:.1e} over {} cases: {verdict} {TOLERANCE:.0e}", cases.len());
-    Ok(if agrees { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(agrees)
 }
 
 /// A line of the table.

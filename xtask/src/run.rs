@@ -6,7 +6,7 @@
 mod synthetic;
 pub mod synthetic_log;
 
-use crate::environment;
+use crate::{environment, mujoco};
 use anyhow::Context;
 use phiw::arguments::{ExplainArguments, SessionArguments};
 use phiw::console::Console;
@@ -40,6 +40,7 @@ pub struct Arguments {
 /// # Errors
 /// Files cannot be read or written, or the identification fails.
 pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    mujoco::fetch_or_go_on_without();
     let root = environment::workspace_root()?;
     let out = root.join(&arguments.out);
     let mut reports = vec![run(&example(&root, &out)?)?];

@@ -2,7 +2,7 @@
 
 mod tally;
 
-use crate::environment;
+use crate::{environment, mujoco};
 use anyhow::Context;
 use std::io::{BufRead, BufReader};
 use std::process::{ExitCode, Stdio};
@@ -42,6 +42,7 @@ const TESTS: &[&str] = &["test", "--workspace", "--no-fail-fast", "--", "--show-
 /// # Errors
 /// Cargo cannot be started.
 pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    mujoco::fetch_or_go_on_without();
     let mut failed = Vec::new();
     let checks = if arguments.quick { &[] } else { &CHECKS[..] };
     for check in checks {

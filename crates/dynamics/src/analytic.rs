@@ -3,7 +3,7 @@
 use crate::backend::check_finite;
 use crate::configuration::{normalised, quaternion_product};
 use crate::motion::floating_placement;
-use crate::{BackendError, DynamicsBackend, Tree, Vec3, Workspace, check_size};
+use crate::{BackendError, DimensionError, DynamicsBackend, Tree, Vec3, Workspace, World, check_size};
 
 /// Largest distance of a quaternion's length from 1.
 const QUATERNION_TOLERANCE: f64 = 1e-6;
@@ -18,6 +18,8 @@ const RUNGE_KUTTA: [(f64, f64); 4] = [(1.0 / 6.0, 0.5), (1.0 / 3.0, 0.5), (1.0 /
 #[derive(Clone, Debug)]
 pub struct AnalyticBackend {
     tree: Tree,
+    /// One for each joint, or empty.
+    rotor_inertia: Vec<f64>,
     joint_names: Vec<String>,
     workspace: Workspace<f64>,
     q: Vec<f64>,
@@ -51,6 +53,7 @@ impl AnalyticBackend {
             q: tree.neutral_configuration(),
             v: v(),
             base_wrench: [0.0; 6],
+            rotor_inertia: Vec::new(),
             stages: Stages {
                 force: v(),
                 q: q(),
@@ -65,10 +68,44 @@ impl AnalyticBackend {
         }
     }
 
+    /// The robot in a world of which this backend can do the rotors alone: they add their inertia to the mass matrix's
+    /// diagonal, and their reaction on the base is left out, as in physics engines ("armature").
+    ///
+    /// # Errors
+    /// The world does not fit the robot, or has feet or position limits, which need contacts.
+    pub fn in_world(tree: Tree, world: &World) -> Result<Self, BackendError> {
+        world.check(&tree)?;
+        let contacts =
+            [(!world.feet.is_empty(), "feet"), (world.position_limits, "position limits of joints")];
+        if let Some((_, what)) = contacts.into_iter().find(|(wanted, _)| *wanted) {
+            let message = format!("it has no contacts, so a world with {what} needs a physics engine");
+            return Err(BackendError::Backend { backend: "analytic", message });
+        }
+        Ok(AnalyticBackend { rotor_inertia: world.rotor_inertia.clone(), ..AnalyticBackend::new(tree) })
+    }
+
     /// The robot.
     pub fn tree(&self) -> &Tree {
         &self.tree
     }
+}
+
+/// The acceleration under a generalised force.
+fn accelerate(
+    tree: &Tree,
+    rotor_inertia: &[f64],
+    [q, v, force]: [&[f64]; 3],
+    workspace: &mut Workspace<f64>,
+    acceleration: &mut [f64],
+) -> Result<(), DimensionError> {
+    if rotor_inertia.is_empty() {
+        return tree.forward_dynamics(q, v, force, workspace, acceleration);
+    }
+    tree.check_state(q, v)?;
+    check_size("the generalised force", force.len(), tree.velocity_size())?;
+    check_size("the acceleration", acceleration.len(), tree.velocity_size())?;
+    tree.solve_mass_matrix([q, v, force], rotor_inertia, workspace, acceleration);
+    Ok(())
 }
 
 impl DynamicsBackend for AnalyticBackend {
@@ -119,6 +156,10 @@ impl DynamicsBackend for AnalyticBackend {
     ) -> Result<(), BackendError> {
         self.tree.inverse_dynamics(q, v, a, &mut self.workspace, force)?;
         self.base_wrench = self.tree.base_wrench(&self.workspace);
+        let first_joint = force.len() - self.joint_names.len();
+        for (joint, inertia) in self.rotor_inertia.iter().enumerate() {
+            force[first_joint + joint] += inertia * a[first_joint + joint];
+        }
         Ok(())
     }
 
@@ -129,7 +170,7 @@ impl DynamicsBackend for AnalyticBackend {
         force: &[f64],
         acceleration: &mut [f64],
     ) -> Result<(), BackendError> {
-        self.tree.forward_dynamics(q, v, force, &mut self.workspace, acceleration)?;
+        accelerate(&self.tree, &self.rotor_inertia, [q, v, force], &mut self.workspace, acceleration)?;
         check_finite("the acceleration", acceleration).map_err(|_| BackendError::Singular)
     }
 
@@ -139,7 +180,7 @@ impl DynamicsBackend for AnalyticBackend {
         if dt.is_nan() || dt <= 0.0 {
             return Err(BackendError::TimeStep { dt });
         }
-        let AnalyticBackend { tree, workspace, stages, .. } = self;
+        let AnalyticBackend { tree, rotor_inertia, workspace, stages, .. } = self;
         let Stages { force, q, v, q_rate, q_sum, a, a_sum, bias } = stages;
         let first_joint = force.len() - torque.len();
         force[..first_joint].fill(0.0);
@@ -150,7 +191,7 @@ impl DynamicsBackend for AnalyticBackend {
         a_sum.fill(0.0);
         let mut base_wrench = None;
         for (weight, reach) in RUNGE_KUTTA {
-            tree.forward_dynamics(q, v, force, workspace, a)?;
+            accelerate(tree, rotor_inertia, [q, v, force], workspace, a)?;
             if base_wrench.is_none() {
                 tree.inverse_dynamics(q, v, a, workspace, bias)?;
                 base_wrench = Some(tree.base_wrench(workspace));

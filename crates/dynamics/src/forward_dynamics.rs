@@ -133,7 +133,7 @@ impl Tree {
         check_size("the acceleration", acceleration.len(), self.velocity_size)?;
         workspace.check(self)?;
         if self.has_mimic() {
-            self.solve_mass_matrix(q, v, force, workspace, acceleration);
+            self.solve_mass_matrix([q, v, force], &[], workspace, acceleration);
             return Ok(());
         }
         let Workspace { placements, articulated, .. } = workspace;
@@ -143,12 +143,13 @@ impl Tree {
         Ok(())
     }
 
+    /// Forward dynamics by way of the mass matrix, without checks. `rotor_inertia`: what is added to the diagonal, one for
+    /// each joint, or empty.
     #[inline(always)]
-    fn solve_mass_matrix<T: Scalar>(
+    pub(crate) fn solve_mass_matrix<T: Scalar>(
         &self,
-        q: &[T],
-        v: &[T],
-        force: &[T],
+        [q, v, force]: [&[T]; 3],
+        rotor_inertia: &[f64],
         workspace: &mut Workspace<T>,
         acceleration: &mut [T],
     ) {
@@ -159,6 +160,10 @@ impl Tree {
             acceleration[index] = force[index] - bias[index];
         }
         self.composite_rigid_bodies(q, placements, composites, matrix);
+        let first_joint = self.velocity_size - self.joint_count();
+        for (joint, &inertia) in rotor_inertia.iter().enumerate() {
+            matrix[(first_joint + joint) * (self.velocity_size + 1)] += T::constant(inertia);
+        }
         solve_in_place(matrix, acceleration, self.velocity_size);
     }
 

@@ -4,7 +4,9 @@ mod arbitrary;
 
 use arbitrary::{assert_close, dot, mass_matrix, times};
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, RandomTreeOptions, random_state, random_tree};
-use phiw_dynamics::{AnalyticBackend, BackendError, DynamicsBackend, Placement, Tree};
+use phiw_dynamics::{
+    AnalyticBackend, BackendError, DynamicsBackend, Foot, Placement, Tree, World, WorldError,
+};
 
 fn robot(seed: u64, options: RandomTreeOptions) -> (Tree, RandomState) {
     let tree = random_tree(seed, &options).unwrap();
@@ -183,4 +185,61 @@ fn wrong_input_is_refused_and_changes_nothing() {
     backend.state(&mut q, &mut v).unwrap();
     assert_eq!((q, v), (start.q, start.v));
     assert_eq!(backend.base_wrench(), [0.0; 6]);
+}
+
+/// `(M + diag rotor)·a + h`, from the mass matrix and inverse dynamics without rotors.
+#[test]
+fn rotors_add_to_the_diagonal() {
+    for (seed, options) in kinds().enumerate() {
+        let (tree, RandomState { q, v, a }) = robot(seed as u64, options);
+        let mut random = RandomNumbers::new(seed as u64 + 100);
+        let rotor_inertia: Vec<f64> = (0..tree.joint_count()).map(|_| random.uniform(0.0, 0.3)).collect();
+        let world = World { rotor_inertia: rotor_inertia.clone(), ..World::default() };
+        let mut backend = AnalyticBackend::in_world(tree.clone(), &world).unwrap();
+        let (mut force, mut bare, mut found) = (a.clone(), a.clone(), a.clone());
+        backend.inverse_dynamics(&q, &v, &a, &mut force).unwrap();
+        AnalyticBackend::new(tree.clone()).inverse_dynamics(&q, &v, &a, &mut bare).unwrap();
+        let first_joint = tree.velocity_size() - tree.joint_count();
+        for (joint, inertia) in rotor_inertia.iter().enumerate() {
+            bare[first_joint + joint] += inertia * a[first_joint + joint];
+        }
+        assert_close(&force, &bare, 1e-12);
+        backend.forward_dynamics(&q, &v, &force, &mut found).unwrap();
+        assert_close(&found, &a, 1e-8);
+    }
+}
+
+#[test]
+fn rotors_store_energy_of_their_own() {
+    let (tree, start) = robot(1, RandomTreeOptions { joints: 5, ..Default::default() });
+    let rotor_inertia = vec![0.2; tree.joint_count()];
+    let world = World { rotor_inertia: rotor_inertia.clone(), ..World::default() };
+    let mut backend = AnalyticBackend::in_world(tree.clone(), &world).unwrap();
+    let total = |q: &[f64], v: &[f64]| energy(&tree, q, v) + 0.1 * dot(v, v);
+    backend.set_state(&start.q, &start.v).unwrap();
+    for _ in 0..1000 {
+        backend.step(&vec![0.0; tree.joint_count()], 5e-4).unwrap();
+    }
+    let (mut q, mut v) = (start.q.clone(), start.v.clone());
+    backend.state(&mut q, &mut v).unwrap();
+    let (before, after) = (total(&start.q, &start.v), total(&q, &v));
+    assert!((after - before).abs() < 1e-6 * before.abs().max(1.0), "{before} J, then {after} J");
+}
+
+#[test]
+fn a_world_with_contacts_is_refused() {
+    let (tree, _) = robot(1, RandomTreeOptions { joints: 3, floating_base: true, ..Default::default() });
+    let foot = Foot { body: 0, sole: vec![[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]] };
+    let check = |world: World, expected: &str| {
+        let error = AnalyticBackend::in_world(tree.clone(), &world).unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}");
+    };
+    check(World { feet: vec![foot], ..World::default() }, "feet");
+    check(World { position_limits: true, ..World::default() }, "position limits");
+    check(World { rotor_inertia: vec![1.0], ..World::default() }, "rotor inertias");
+    let negative = World { rotor_inertia: vec![-1.0; 3], ..World::default() };
+    assert!(matches!(
+        AnalyticBackend::in_world(tree.clone(), &negative),
+        Err(BackendError::World(WorldError::RotorInertia { .. }))
+    ));
 }

@@ -1,1 +1,35 @@
 #![doc = include_str!("../README.md")]
+#![warn(missing_docs)]
+
+mod controller;
+mod effect;
+mod error;
+mod friction;
+mod history;
+mod joint_drive;
+mod mechanism;
+mod motion;
+mod numbers;
+mod plant;
+mod presliding;
+mod reference;
+mod robot_as_built;
+mod root;
+mod run;
+mod sensors;
+mod standing;
+mod step_solver;
+mod support;
+
+pub use controller::{ComputedTorque, Gains, RigidBodyModel, TorqueModel, apparent_inertia};
+pub use effect::{Coupling, Effect};
+pub use error::PlantError;
+pub use friction::Friction;
+pub use history::History;
+pub use mechanism::Mechanism;
+pub use plant::{Plant, PlantSetup, Timing};
+pub use presliding::Presliding;
+pub use reference::{MultiSine, Reference};
+pub use run::{Reaction, Run};
+pub use sensors::{Clock, Sensors};
+pub use support::{SupportError, feet_from_toml};

@@ -1,1 +1,18 @@
 #![doc = include_str!("../README.md")]
+
+mod articulation;
+mod backend;
+mod base_frame;
+mod floor;
+mod mass_properties;
+mod probe;
+
+pub use backend::{DEFAULT_SOLVER_ITERATIONS, RapierBackend};
+
+use phiw_dynamics::BackendError;
+
+const NAME: &str = "rapier";
+
+fn error(message: impl Into<String>) -> BackendError {
+    BackendError::Backend { backend: NAME, message: message.into() }
+}

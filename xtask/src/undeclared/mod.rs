@@ -12,7 +12,7 @@ mod kind;
 mod load;
 mod mechanism;
 mod plant;
-mod report_file;
+pub(crate) mod report_file;
 mod robot;
 mod run;
 mod saturation;
@@ -23,7 +23,7 @@ mod suite;
 mod table;
 #[cfg(test)]
 mod tests;
-mod tracer;
+pub(crate) mod tracer;
 mod trajectory;
 mod truth;
 mod visibility;
@@ -52,9 +52,9 @@ pub struct Arguments {
     /// How many cases of each suite (default: as many as the experiment asks for).
     #[arg(long)]
     count: Option<usize>,
-    /// Which seeds.
-    #[arg(long, default_value = "report")]
-    seeds: Seeds,
+    /// Which seeds (default: with --all both, one score after the other; else those for reporting).
+    #[arg(long)]
+    seeds: Option<Seeds>,
     /// Only write the cases' files into this folder: `<seed>/` for the tracer, `<seed>.truth.json` beside it.
     #[arg(long, value_name = "DIR")]
     generate: Option<PathBuf>,
@@ -70,11 +70,10 @@ pub struct Arguments {
     /// The tracer (default: build it from this workspace).
     #[arg(long, value_name = "PATH")]
     phiw: Option<PathBuf>,
-    /// Trace each case's twin without secrets too, and take the noise floor from there: what the noise leaves behind the tracer's
-    /// own filter. Twice as slow.
+    /// Go on with a run that was stopped: cases whose outcome is in the output folder are not traced again.
     #[arg(long)]
-    oracle: bool,
-    /// Where `cases.csv` and `score.md` go.
+    resume: bool,
+    /// Where `cases.csv` and `score.md` go, and each case's outcome, in a folder for each family of seeds.
     #[arg(long, value_name = "DIR", default_value = "target/undeclared")]
     out: PathBuf,
 }
@@ -85,25 +84,49 @@ pub struct Arguments {
 /// A folder cannot be written, a model does not read, or there is no tracer.
 pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
     let robots = robot::robots()?;
-    let specs = specs(arguments, &robots)?;
+    let seeds = match (arguments.seeds, arguments.all) {
+        (Some(seeds), _) => vec![seeds],
+        (None, true) => vec![Seeds::Dev, Seeds::Report],
+        (None, false) => vec![Seeds::Report],
+    };
     if let Some(folder) = &arguments.generate {
-        return generate(&specs, &robots, folder);
+        for seeds in seeds {
+            generate(&specs(arguments, seeds, &robots)?, &robots, folder)?;
+        }
+        return Ok(());
     }
     let threads = std::thread::available_parallelism().map_or(1, usize::from).div_ceil(arguments.jobs.max(1));
     let tracer = tracer::Tracer::find(arguments.phiw.as_deref(), threads)?;
-    let options =
-        run::Options { jobs: arguments.jobs, oracle: arguments.oracle, keep: arguments.keep.as_deref() };
-    let scored = run::run_all(&specs, &robots, &tracer, &options)?;
+    seeds.into_iter().try_for_each(|seeds| run_and_report(arguments, seeds, &robots, &tracer))
+}
+
+/// Runs the cases of one family of seeds, prints the score and writes it.
+fn run_and_report(
+    arguments: &Arguments,
+    seeds: Seeds,
+    robots: &[robot::Robot],
+    tracer: &tracer::Tracer,
+) -> anyhow::Result<()> {
+    let specs = specs(arguments, seeds, robots)?;
+    let folder = arguments.out.join(format!("{seeds:?}").to_lowercase());
+    let outcomes = folder.join("outcomes");
+    std::fs::create_dir_all(&outcomes).with_context(|| outcomes.display().to_string())?;
+    let options = run::Options {
+        jobs: arguments.jobs,
+        keep: arguments.keep.as_deref(),
+        outcomes: &outcomes,
+        resume: arguments.resume,
+    };
+    let scored = run::run_all(&specs, robots, tracer, &options)?;
     if arguments.case.is_some() {
         for case in &scored {
             println!("{}", serde_json::to_string_pretty(&case.truth)?);
         }
     }
-    let score = format!("# Undeclared effects, {:?} seeds\n\n{}", arguments.seeds, table::markdown(&scored));
+    let score = format!("# Undeclared effects, {seeds:?} seeds\n\n{}", table::markdown(&scored));
     println!("{score}");
-    std::fs::create_dir_all(&arguments.out).with_context(|| arguments.out.display().to_string())?;
     for (name, text) in [("score.md", score), ("cases.csv", table::csv(&scored))] {
-        let path = arguments.out.join(name);
+        let path = folder.join(name);
         std::fs::write(&path, text).with_context(|| path.display().to_string())?;
     }
     Ok(())
@@ -122,7 +145,7 @@ fn generate(specs: &[Spec], robots: &[robot::Robot], folder: &std::path::Path) -
     Ok(())
 }
 
-fn specs(arguments: &Arguments, robots: &[robot::Robot]) -> anyhow::Result<Vec<Spec>> {
+fn specs(arguments: &Arguments, seeds: Seeds, robots: &[robot::Robot]) -> anyhow::Result<Vec<Spec>> {
     if let Some(seed) = arguments.case {
         let spec = Spec::of_seed(seed, robots.len())
             .with_context(|| format!("no suite has a case of seed {seed}"))?;
@@ -145,7 +168,7 @@ fn specs(arguments: &Arguments, robots: &[robot::Robot]) -> anyhow::Result<Vec<S
         let full = suite.full_count();
         // With a filter and a count, cases beyond the full run's fill up what the filter takes away.
         let range = if arguments.count.is_some() { 0..100_000 } else { 0..full };
-        let seeds = range.map(|index| suite.seed(arguments.seeds, index));
+        let seeds = range.map(|index| suite.seed(seeds, index));
         let found = seeds.filter_map(|seed| Spec::of_seed(seed, robots.len())).filter(wanted);
         specs.extend(found.take(arguments.count.unwrap_or(full)));
     }

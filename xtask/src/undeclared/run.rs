@@ -3,11 +3,12 @@
 use super::case::Case;
 use super::robot::Robot;
 use super::score::{Score, score};
-use super::suite::Spec;
+use super::suite::{Spec, Suite};
 use super::tracer::Tracer;
 use super::truth::Truth;
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -22,14 +23,23 @@ pub struct Scored {
     pub seconds: f64,
 }
 
+/// What is kept of a case: all but what follows from its seed.
+#[derive(Serialize, Deserialize)]
+struct Outcome {
+    score: Result<Score, String>,
+    seconds: f64,
+}
+
 /// How cases are run.
 pub struct Options<'a> {
     /// Cases at a time.
     pub jobs: usize,
-    /// Take the noise floor from the same case without its secrets, not from the report.
-    pub oracle: bool,
     /// Keep each case's files here.
     pub keep: Option<&'a Path>,
+    /// Each case's outcome is written here as soon as it is known.
+    pub outcomes: &'a Path,
+    /// Take the outcomes that are there already.
+    pub resume: bool,
 }
 
 /// Runs all cases, in any order; the results are in the order of the specs.
@@ -78,6 +88,13 @@ pub fn run_all(
 fn run_one(spec: &Spec, robots: &[Robot], tracer: &Tracer, options: &Options) -> anyhow::Result<Scored> {
     let case = Case::draw(spec, robots).with_context(|| format!("no robot can have case {}", spec.seed))?;
     let truth = Truth::of(&case);
+    let outcome = options.outcomes.join(format!("{}.json", spec.seed));
+    if options.resume && outcome.exists() {
+        let text = std::fs::read_to_string(&outcome).with_context(|| outcome.display().to_string())?;
+        let Outcome { score, seconds } =
+            serde_json::from_str(&text).with_context(|| outcome.display().to_string())?;
+        return Ok(Scored { truth, score, seconds });
+    }
     let temporary = tempfile::tempdir()?;
     if let Some(folder) = options.keep {
         super::write::write_truth(&truth, folder)?;
@@ -86,19 +103,21 @@ fn run_one(spec: &Spec, robots: &[Robot], tracer: &Tracer, options: &Options) ->
         Some(folder) => folder.join(spec.seed.to_string()),
         None => temporary.path().join("case"),
     };
-    let floors = match options.oracle {
-        true => {
-            let twin = tracer.run(&case.without_secrets(), &temporary.path().join("twin"));
-            twin.ok().map(|twin| twin.report.before.validate.rmse)
+    // The floor is what the noise leaves, and the experiment knows it: the same case without its secrets. A case outside the catalogue, or a control, needs none.
+    let floors = match spec.suite {
+        Suite::One | Suite::Two | Suite::Three => {
+            tracer.remainder(&case.without_secrets(), &temporary.path().join("twin")).ok()
         }
-        false => None,
+        Suite::Control | Suite::Outside => None,
     };
-    Ok(match tracer.run(&case, &folder) {
-        Ok(traced) => Scored {
-            score: Ok(score(&truth, &traced.report, floors.as_ref())),
-            seconds: traced.elapsed.as_secs_f64(),
-            truth,
-        },
-        Err(error) => Scored { score: Err(format!("{error:#}")), seconds: 0.0, truth },
-    })
+    let (score, seconds) = match tracer.run(&case, &folder) {
+        Ok(traced) => (Ok(score(&truth, &traced.report, floors.as_ref())), traced.elapsed.as_secs_f64()),
+        Err(error) => (Err(format!("{error:#}")), 0.0),
+    };
+    let kept = Outcome { score, seconds };
+    // Written aside and renamed: a killed run leaves no half a file.
+    let aside = outcome.with_extension("tmp");
+    std::fs::write(&aside, serde_json::to_string(&kept)?).with_context(|| aside.display().to_string())?;
+    std::fs::rename(&aside, &outcome).with_context(|| outcome.display().to_string())?;
+    Ok(Scored { truth, score: kept.score, seconds: kept.seconds })
 }

@@ -4,7 +4,7 @@ use super::kind::{Kind, Name};
 use super::report_file::{Error, Report};
 use super::suite::Suite;
 use super::truth::{TrueSecret, Truth};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A rival with at least this share of the named effect's confidence is of near-equal merit.
@@ -13,7 +13,7 @@ const NEAR_EQUAL: f64 = 0.5;
 const LEAST_EXCESS: f64 = 1.05;
 
 /// What became of one secret.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// Its kind was named with exactly its joints, and nothing else at near-equal merit.
@@ -29,7 +29,7 @@ pub enum Outcome {
 }
 
 /// The score of one case.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Score {
     /// What became of each secret, in the truth's order.
     pub outcomes: Vec<Outcome>,

@@ -4,6 +4,7 @@ use super::case::Case;
 use super::report_file::Report;
 use super::write::write_visible;
 use anyhow::{Context, bail};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -31,29 +32,42 @@ impl Tracer {
     /// A file cannot be written or read, or the tracer fails: its standard error is in the message.
     pub fn run(&self, case: &Case, folder: &Path) -> anyhow::Result<Traced> {
         write_visible(case, folder)?;
-        let declared: Vec<String> = case.declared.iter().map(|kind| kind.name()).collect();
-        let base = |task: &str, logs: [&str; 3], out: &str| {
-            let mut command = Command::new(&self.program);
-            command.current_dir(folder).env("RAYON_NUM_THREADS", self.threads.to_string());
-            command.args([task, "--urdf", "robot.urdf", "--train", logs[0], logs[1], "--validate", logs[2]]);
-            if !declared.is_empty() {
-                command.args(["--declare", &declared.join(",")]);
-            }
-            command.args(["--out", out]);
-            command
-        };
-        let mut explain = base("explain", ["train_a.csv", "train_b.csv", "validate.csv"], "out");
+        let task = |task: &str, logs: [&str; 3], out: &str| self.task(task, case, folder, logs, out);
+        let mut explain = task("explain", ["train_a.csv", "train_b.csv", "validate.csv"], "out");
         if case.spec.held {
-            run(base("identify", ["clean_a.csv", "clean_b.csv", "clean_c.csv"], "clean"))?;
+            run(task("identify", ["clean_a.csv", "clean_b.csv", "clean_c.csv"], "clean"))?;
             explain.args(["--model", "clean/model.json"]);
         }
         let start = Instant::now();
         run(explain)?;
         let elapsed = start.elapsed();
-        let path = folder.join("out/report.json");
-        let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-        let report = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
-        Ok(Traced { report, elapsed })
+        Ok(Traced { report: read_report(folder)?, elapsed })
+    }
+
+    /// Writes the case into `folder` and gives what is left of it once the declared model is identified, joint by joint: of a case without secrets, what
+    /// the noise leaves behind the tracer's own filters.
+    ///
+    /// # Errors
+    /// A file cannot be written or read, or the program fails.
+    pub fn remainder(&self, case: &Case, folder: &Path) -> anyhow::Result<BTreeMap<String, f64>> {
+        if case.spec.held {
+            return Ok(self.run(case, folder)?.report.before.validate.rmse);
+        }
+        write_visible(case, folder)?;
+        run(self.task("identify", case, folder, ["train_a.csv", "train_b.csv", "validate.csv"], "out"))?;
+        Ok(read_report(folder)?.before.validate.rmse)
+    }
+
+    fn task(&self, task: &str, case: &Case, folder: &Path, logs: [&str; 3], out: &str) -> Command {
+        let declared: Vec<String> = case.declared.iter().map(|kind| kind.name()).collect();
+        let mut command = Command::new(&self.program);
+        command.current_dir(folder).env("RAYON_NUM_THREADS", self.threads.to_string());
+        command.args([task, "--urdf", "robot.urdf", "--train", logs[0], logs[1], "--validate", logs[2]]);
+        if !declared.is_empty() {
+            command.args(["--declare", &declared.join(",")]);
+        }
+        command.args(["--out", out]);
+        command
     }
 
     /// The program at `path`, or else the one built from this workspace.
@@ -67,6 +81,12 @@ impl Tracer {
         };
         Ok(Tracer { program, threads })
     }
+}
+
+fn read_report(folder: &Path) -> anyhow::Result<Report> {
+    let path = folder.join("out/report.json");
+    let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+    serde_json::from_str(&text).with_context(|| path.display().to_string())
 }
 
 fn run(mut command: Command) -> anyhow::Result<()> {

@@ -4,6 +4,7 @@ use super::case::Case;
 use super::kind::{Kind, Name};
 use super::mechanism::Mechanism;
 use super::secret::{Form, Secret};
+use phiw_dynamics::{JointType, Tree, Vec3};
 use serde::Serialize;
 
 /// The truth of one case.
@@ -75,17 +76,54 @@ impl Truth {
     }
 }
 
-/// A balancer whose spring has no rest length pulls the first link with a torque that is a pure sinusoid of its angle: so does a
-/// force on that link that keeps its direction.
+/// Other names for literally the same torques, whatever the motion, given that the declared model's parameters are free.
 fn equivalents(case: &Case, secret: &Secret) -> Vec<(Kind, Vec<String>)> {
-    match secret.form {
-        Form::Mechanism(Mechanism::Balancer { rest: 0.0, .. })
-            if secret.joints.iter().all(|&joint| case.robot.tree.joint(joint).parent.is_none()) =>
+    let tree = &case.robot.tree;
+    let others = |joints: &[usize]| -> Vec<String> { case.robot.names(joints) };
+    match (&secret.form, secret.joints.as_slice()) {
+        // A balancer whose spring has no rest length pulls the first link with a torque that is a pure sinusoid of its angle: so does a force on that link that
+        // keeps its direction.
+        (Form::Mechanism(Mechanism::Balancer { rest: 0.0, .. }), joints)
+            if joints.iter().all(|&joint| tree.joint(joint).parent.is_none()) =>
         {
-            vec![(Kind::ExternalForce, case.robot.names(&secret.joints))]
+            vec![(Kind::ExternalForce, others(joints))]
+        }
+        // Of two torques, a gain on the one is the inverse gain on the other, all parameters scaled.
+        (Form::Gain, &[joint]) if tree.joint_count() == 2 && !case.spec.held => {
+            vec![(Kind::TorqueGain, others(&[1 - joint]))]
+        }
+        // On a slide along gravity a mass is felt as inertia and as weight: more inertia is the same as less weight.
+        (Form::Mechanism(Mechanism::Rotor), &[joint]) if slides_along_gravity(tree, joint) => {
+            vec![(Kind::TorqueOffset, others(&[joint]))]
+        }
+        (Form::Mechanism(Mechanism::Offset), &[joint]) if slides_along_gravity(tree, joint) => {
+            vec![(Kind::RotorInertia, others(&[joint]))]
+        }
+        // A slide along gravity carries a force's point up and down: about the joints before it the arm is the same, and along it the force is a weight.
+        (Form::Force(_), &[joint]) if joint > 0 && slides_along_gravity(tree, joint) => {
+            vec![(Kind::ExternalForce, others(&[joint - 1]))]
         }
         _ => Vec::new(),
     }
+}
+
+/// Whether the joint slides along gravity in whatever pose: all the joints before it turn about gravity.
+fn slides_along_gravity(tree: &Tree, joint: usize) -> bool {
+    let mut body = tree.joint(joint);
+    if body.joint_type != JointType::Prismatic {
+        return false;
+    }
+    let mut slide = body.origin.rotation * body.axis;
+    while let Some(parent) = body.parent {
+        body = &tree.bodies()[parent];
+        // In the parent's frame the slide must lie along the parent's own axis, so that turning leaves it where it is.
+        if slide.dot(body.axis).abs() < 1.0 - 1e-9 {
+            return false;
+        }
+        slide = body.origin.rotation * slide;
+    }
+    let gravity = Vec3(tree.gravity);
+    slide.dot(gravity).abs() >= (1.0 - 1e-9) * gravity.dot(gravity).sqrt()
 }
 
 /// Paths of random walks are long and say nothing.

@@ -1,0 +1,130 @@
+//! Closed loops with a secret: robots in physics engines, tracked poorly, each with one effect that nobody declared. Their logs
+//! go to `phiw explain`, a program of its own, and its answer is held against the truth.
+
+mod case;
+mod engine;
+mod score;
+mod secret;
+mod table;
+
+use crate::undeclared::tracer::Tracer;
+use anyhow::Context;
+use case::{Case, Robot};
+use engine::Engine;
+use indicatif::{ProgressBar, ProgressStyle};
+use score::Scored;
+use secret::{SecretKind, TWELVE};
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Arguments of `cargo xtask plant`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Physics engines.
+    #[arg(long, value_delimiter = ',', default_value = "mujoco,rapier")]
+    engine: Vec<Engine>,
+    /// Kinds of secrets (default: twelve that a log can show by itself).
+    #[arg(long, value_delimiter = ',')]
+    kind: Vec<SecretKind>,
+    /// All kinds, with those that only a held model shows.
+    #[arg(long, conflicts_with = "kind")]
+    all_kinds: bool,
+    /// Cases of each kind and engine.
+    #[arg(long, default_value_t = 2)]
+    count: u64,
+    /// Standard deviation of the torque that actuators add unlogged, over the effort limit.
+    #[arg(long, default_value_t = 0.005)]
+    noise: f64,
+    /// Time between two rows of the log, and between two commands of the controller \[s\].
+    #[arg(long, default_value_t = 0.01)]
+    period: f64,
+    /// Length of each of the three logs \[s\].
+    #[arg(long, default_value_t = 20.0)]
+    duration: f64,
+    /// The first seed.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Cases at a time.
+    #[arg(long, default_value_t = 2)]
+    jobs: usize,
+    /// The tracer (default: build it from this workspace).
+    #[arg(long, value_name = "PATH")]
+    phiw: Option<PathBuf>,
+    /// Keep each case's files in this folder; the truth lies beside what the tracer sees.
+    #[arg(long, value_name = "DIR")]
+    keep: Option<PathBuf>,
+    /// Where `cases.json`, `cases.csv` and `score.md` go.
+    #[arg(long, value_name = "DIR", default_value = "target/plant")]
+    out: PathBuf,
+}
+
+/// Runs the task.
+///
+/// # Errors
+/// A model does not read, an engine is not there, there is no tracer, or a file cannot be written.
+pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
+    let robot = Robot::read()?;
+    for engine in &arguments.engine {
+        engine.check(&robot.tree)?;
+    }
+    let kinds: Vec<SecretKind> = match (arguments.all_kinds, arguments.kind.as_slice()) {
+        (true, _) => SecretKind::ALL.to_vec(),
+        (false, []) => TWELVE.to_vec(),
+        (false, some) => some.to_vec(),
+    };
+    let mut cases = Vec::new();
+    for &kind in &kinds {
+        for index in 0..arguments.count {
+            // The same secrets in all engines.
+            let seed = arguments.seed * 10_000 + kind as u64 * 100 + index;
+            cases.extend(arguments.engine.iter().map(|&engine| Case { engine, kind, seed }));
+        }
+    }
+    let threads = std::thread::available_parallelism().map_or(1, usize::from).div_ceil(arguments.jobs.max(1));
+    let tracer = Tracer::find(arguments.phiw.as_deref(), threads)?;
+    let scored = run_all(&cases, &robot, &tracer, arguments)?;
+    let markdown = table::markdown(&scored, arguments);
+    println!("{markdown}");
+    std::fs::create_dir_all(&arguments.out).with_context(|| arguments.out.display().to_string())?;
+    let json = serde_json::to_string_pretty(&scored)? + "\n";
+    for (name, text) in [("score.md", markdown), ("cases.json", json), ("cases.csv", table::csv(&scored))] {
+        let path = arguments.out.join(name);
+        std::fs::write(&path, text).with_context(|| path.display().to_string())?;
+    }
+    Ok(())
+}
+
+/// Runs all cases, several at a time; the results are in the order of the cases.
+fn run_all(
+    cases: &[Case],
+    robot: &Robot,
+    tracer: &Tracer,
+    arguments: &Arguments,
+) -> anyhow::Result<Vec<Scored>> {
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {elapsed} (left {eta}) {msg}")?;
+    let progress = ProgressBar::new(cases.len() as u64).with_style(style);
+    let next = AtomicUsize::new(0);
+    let results: Mutex<Vec<(usize, anyhow::Result<Scored>)>> = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for _ in 0..arguments.jobs.max(1) {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(case) = cases.get(index) else { break };
+                    let result = case.run(robot, tracer, arguments).with_context(|| {
+                        format!("{} in {:?}, seed {}", case.kind.name(), case.engine, case.seed)
+                    });
+                    if let Ok(mut results) = results.lock() {
+                        results.push((index, result));
+                    }
+                    progress.inc(1);
+                }
+            });
+        }
+    });
+    progress.finish_and_clear();
+    let mut results = results.into_inner().ok().context("a worker died")?;
+    results.sort_by_key(|(index, _)| *index);
+    results.into_iter().map(|(_, result)| result).collect()
+}
