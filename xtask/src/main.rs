@@ -4,6 +4,7 @@ mod environment;
 mod mujoco;
 mod oracle;
 mod plant_experiment;
+mod retarget;
 mod run;
 mod test;
 mod undeclared;
@@ -24,6 +25,8 @@ enum Task {
     Run(run::Arguments),
     /// A log as long as wanted, to see that memory does not grow with it.
     SyntheticLog(run::synthetic_log::Arguments),
+    /// Retargeting: figure 9 of the paper, whole databases, and a page with pictures of them.
+    Retarget(retarget::Arguments),
     /// All checks of the workspace, and the count of tests.
     Test(test::Arguments),
     /// Fetch MuJoCo's library into the user's cache folder, with Python's pip.
@@ -40,6 +43,7 @@ fn main() -> anyhow::Result<ExitCode> {
     match Arguments::parse().task {
         Task::Run(arguments) => run::command(&arguments),
         Task::SyntheticLog(arguments) => run::synthetic_log::command(&arguments),
+        Task::Retarget(arguments) => retarget::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Test(arguments) => test::command(&arguments),
         Task::Mujoco(arguments) => mujoco::command(&arguments),
         Task::Oracle(arguments) => oracle::command(&arguments),

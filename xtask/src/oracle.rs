@@ -5,7 +5,7 @@ mod c3d;
 mod case;
 mod comparison;
 mod pinocchio;
-mod python;
+pub mod python;
 
 use crate::environment;
 use answers::QUANTITIES;
@@ -13,6 +13,8 @@ use case::Case;
 use python::Python;
 use std::process::ExitCode;
 
+/// The packages, pinned.
+const REQUIREMENTS: &str = include_str!("oracle/requirements.txt");
 /// The largest relative difference that is rounding.
 const TOLERANCE: f64 = 1e-9;
 
@@ -50,7 +52,7 @@ enum Part {
 /// # Errors
 /// The packages cannot be installed, a robot or recording cannot be read, or a package fails on it.
 pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let python = Python::install(&arguments.python)?;
+    let python = Python::install(&arguments.python, "oracle-python", REQUIREMENTS)?;
     let asked = |part| arguments.part.is_none_or(|only| only == part);
     let recordings_agree = !asked(Part::C3d) || c3d::compare(&python)?;
     let dynamics_agree = !asked(Part::Dynamics) || dynamics(python, arguments)?;

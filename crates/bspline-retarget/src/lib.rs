@@ -1,1 +1,28 @@
 #![doc = include_str!("../README.md")]
+#![warn(missing_docs)]
+
+pub mod bspline;
+pub mod c3d;
+pub mod embedded;
+mod finite_difference;
+pub mod human;
+mod point_csv;
+mod problem;
+mod quality;
+mod reach;
+mod recording;
+mod retarget;
+mod robot;
+mod robot_start;
+pub mod solver;
+mod start;
+mod weights;
+
+pub use finite_difference::backward_differences;
+pub use point_csv::read_point_csv;
+pub use problem::Problem;
+pub use quality::Quality;
+pub use recording::{MarkerRecording, RecordingError, read_recording};
+pub use retarget::{Calibration, Person, RetargetError, RetargetOptions, Retargeted, Retargeter};
+pub use robot::{Arm, ArmMap, BodyPoint, RobotError, RobotMap, RobotModel};
+pub use weights::{Cost, Weights};

@@ -32,8 +32,9 @@ pub fn retarget(arguments: &RetargetArguments, console: &Console) -> Result<Reta
     let reading = read_urdf(&urdf, &options)
         .map_err(|source| Error::Urdf { path: arguments.urdf.clone(), source: Box::new(source) })?;
     let map = match &arguments.map {
-        Some(path) => MarkerMap::from_toml(&text(path)?)
-            .map_err(|source| Error::Map { path: path.clone(), source })?,
+        Some(path) => {
+            MarkerMap::from_toml(&text(path)?).map_err(|source| Error::Map { path: path.clone(), source })?
+        }
         None => default_map(&arguments.c3d),
     };
     let mut options = RetargetOptions {

@@ -1,6 +1,9 @@
 //! Traces the residual of logs and prints what it finds:
-//! `trace_logs ROBOT.urdf viscous_friction,coulomb_friction TRAIN.csv,… [VALIDATE.csv,…]`.
+//! `trace_logs ROBOT.urdf viscous_friction,coulomb_friction TRAIN.csv,… [VALIDATE.csv,… [SEED]]`.
+//!
+//! With a seed the training folds are a bootstrap draw: as many as there are, with replacement. The names should not depend on it.
 
+use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
 use phiw_identification::{BlockSource, Data, LogSet, Variants, identify};
 use phiw_residual::trace::{TraceInput, TraceOptions, noise_floor, trace};
@@ -12,7 +15,7 @@ use std::path::PathBuf;
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [urdf, declare, train, rest @ ..] = arguments.as_slice() else {
-        return Err("usage: trace_logs URDF EFFECT,… TRAIN,… [VALIDATE,…]".into());
+        return Err("usage: trace_logs URDF EFFECT,… TRAIN,… [VALIDATE,… [SEED]]".into());
     };
     let list =
         |text: &str| text.split(',').filter(|part| !part.is_empty()).map(str::to_owned).collect::<Vec<_>>();
@@ -30,13 +33,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let files = logs.sources(&|_, _, _| ());
     let sources: Vec<&dyn BlockSource> = files.iter().map(|file| file as &dyn BlockSource).collect();
     let mut train = logs.training_folds();
-    if let Ok(seed) = std::env::var("DRAW") {
-        let mut x: u64 = seed.parse()?;
+    if let Some(seed) = rest.get(1) {
         let all = train.clone();
-        for f in train.iter_mut() {
-            x = x.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            *f = all[(x >> 33) as usize % all.len()];
-        }
+        let mut random = RandomNumbers::new(seed.parse()?);
+        train.fill_with(|| all[(random.uniform(0.0, all.len() as f64) as usize).min(all.len() - 1)]);
     }
     let data = Data { train, held_out: logs.held_out_folds(), sources, rest_speeds: logs.rest_speeds() };
     let begin = std::time::Instant::now();

@@ -6,21 +6,19 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The packages, pinned.
-const REQUIREMENTS: &str = include_str!("requirements.txt");
-
 /// A Python with the packages installed.
 pub struct Python {
     program: PathBuf,
 }
 
 impl Python {
-    /// Makes the environment in the build folder, or completes the one that is there.
+    /// Makes an environment of this name in the build folder, or completes the one that is there, with the packages that `pinned`
+    /// lists as pip does.
     ///
     /// # Errors
     /// There is no Python, or pip cannot install.
-    pub fn install(python: &str) -> anyhow::Result<Self> {
-        let environment = environment::target_directory()?.join("oracle-python");
+    pub fn install(python: &str, name: &str, pinned: &str) -> anyhow::Result<Self> {
+        let environment = environment::target_directory()?.join(name);
         let program = environment.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
         if !program.exists() {
             eprintln!("making a Python environment in {}", environment.display());
@@ -28,10 +26,10 @@ impl Python {
                 .context("a Python with `venv` is needed: install one, or name it with --python")?;
         }
         let requirements = environment.join("requirements.txt");
-        std::fs::write(&requirements, REQUIREMENTS)?;
+        std::fs::write(&requirements, pinned)?;
         let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary=:all:"];
         run(Command::new(&program).args(pip).arg("--requirement").arg(&requirements)).with_context(|| {
-            let packages = REQUIREMENTS.split_whitespace().collect::<Vec<_>>().join(", ");
+            let packages = pinned.split_whitespace().collect::<Vec<_>>().join(", ");
             format!("pip cannot install {packages} (their wheels need a recent CPython)")
         })?;
         Ok(Python { program })

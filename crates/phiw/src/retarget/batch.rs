@@ -148,9 +148,8 @@ fn one(
     suffix: Option<&str>,
 ) -> Result<Done, Error> {
     let trial = suffix.and_then(|suffix| static_trial(file, suffix));
-    let content = std::fs::read(file).map_err(|source| {
-        Error::Recording(RecordingError::Unreadable { path: file.to_owned(), source })
-    })?;
+    let content = std::fs::read(file)
+        .map_err(|source| Error::Recording(RecordingError::Unreadable { path: file.to_owned(), source }))?;
     let settings = Settings::new(arguments, urdf, retargeter, &content, trial.as_deref());
     let output = MotionFile::new(&arguments.out, &stem(file));
     if output.holds(&settings) {

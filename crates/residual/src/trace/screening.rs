@@ -164,3 +164,50 @@ fn solve(factor: &Factor, x: &mut [f64]) {
 fn dot(left: &[f64], right: &[f64]) -> f64 {
     left.iter().zip(right).map(|(a, b)| a * b).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::evidence::Evidence;
+    use phiw_dynamics::random_tree::RandomNumbers;
+    use phiw_regressor::factor::FactorBuilder;
+    use phiw_regressor::least_squares::{Group, GroupedFactor};
+
+    /// Two torques over three parameters of a model and two candidates, the second of which nearly depends on the model.
+    fn factors(random: &mut RandomNumbers) -> GroupedFactor {
+        let mut number = || random.uniform(-1.0, 1.0);
+        let columns = [vec![0, 1, 3, 4], vec![1, 2, 4]];
+        let groups = columns.map(|parameters| {
+            let mut builder = FactorBuilder::new(parameters.len() + 1);
+            for _ in 0..60 {
+                let mut row: Vec<f64> = (0..=parameters.len()).map(|_| number()).collect();
+                if parameters.len() == 4 {
+                    row[3] = row[0] - 2.0 * row[1] + 0.05 * row[3];
+                }
+                builder.push_row(&row).unwrap();
+            }
+            Group { parameters, factor: builder.factor() }
+        });
+        GroupedFactor::new(5, groups.to_vec()).unwrap()
+    }
+
+    #[test]
+    fn screening_is_the_full_refit() {
+        let mut random = RandomNumbers::new(3);
+        for _ in 0..20 {
+            let (train, held_out) = (factors(&mut random), factors(&mut random));
+            let folds = vec![&train, &held_out];
+            let evidence =
+                Evidence::new(&train, &held_out, folds, 3, vec![true; 3], vec![1.3, 0.4], None).unwrap();
+            for (added, rows) in [(vec![3], vec![0]), (vec![4], vec![0, 1]), (vec![3, 4], vec![0, 1])] {
+                let full = evidence.refit(&added, &rows).unwrap().unwrap();
+                let quick = evidence.screen(&added, &rows).unwrap().unwrap();
+                let pairs = full.parameters.iter().zip(&quick.parameters);
+                let sums =
+                    full.train.iter().zip(&quick.train).chain(full.held_out.iter().zip(&quick.held_out));
+                for (full, quick) in pairs.chain(sums) {
+                    assert!((full - quick).abs() <= 1e-9 * full.abs().max(1.0), "{full} {quick}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! The marker map: which marker sits where, in TOML.
+
+use super::skeleton::Segment;
+use crate::recording::MarkerRecording;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// Which marker sits on which segment, and what is known of where.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MarkerMap {
+    /// Name of the map.
+    pub name: String,
+    /// Unit of length of the recordings, if they do not say it or say it wrong.
+    #[serde(default)]
+    pub units: Option<String>,
+    /// How names of static trials end (`_static`); they calibrate the recordings that share the name before it.
+    #[serde(default)]
+    pub static_suffix: Option<String>,
+    /// Standard deviation \[m\] of markers from where the map or the static trial puts them on their segment; with more than zero
+    /// their positions are estimated jointly with the motion.
+    #[serde(default)]
+    pub marker_spread_m: f64,
+    /// How joints move, by segment; `free` where nothing is said.
+    #[serde(default)]
+    pub joints: BTreeMap<String, JointMode>,
+    /// Markers by segment.
+    pub segments: BTreeMap<String, SegmentMarkers>,
+    /// Points of the robot, where they should not be found from its shape.
+    #[serde(default)]
+    pub robot: crate::robot::RobotMap,
+}
+
+/// How the joint before a segment moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum JointMode {
+    /// Over time.
+    Free,
+    /// Not within a recording, but it is not known where it is.
+    Still,
+    /// Not at all: it rests.
+    Held,
+}
+
+/// The markers of a segment.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SegmentMarkers {
+    /// Markers whose place on the segment a static trial tells.
+    #[serde(default)]
+    pub cluster: Vec<String>,
+    /// Markers at a place \[m\] from the joint before the segment: x forward, y left, z up, arms hanging.
+    #[serde(default)]
+    pub at: BTreeMap<String, [f64; 3]>,
+    /// Markers at a place \[m\] from the end of the segment.
+    #[serde(default)]
+    pub at_end: BTreeMap<String, [f64; 3]>,
+}
+
+/// A marker map that can not be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MapError {
+    /// It is not TOML of this form.
+    #[error("not a marker map: {0}")]
+    Toml(String),
+    /// A segment that the human model has not.
+    #[error("`{name}` is no segment of the human model; nearest are {nearest}")]
+    Segment {
+        /// Name in the map.
+        name: String,
+        /// Names like it.
+        nearest: String,
+    },
+    /// A marker that the recording has not.
+    #[error("the map's marker `{name}` is not in the recording; nearest are {nearest}")]
+    Marker {
+        /// Name in the map.
+        name: String,
+        /// Names like it in the recording.
+        nearest: String,
+    },
+    /// A marker that is there by name only.
+    #[error(
+        "marker `{name}` is missing in every frame; take it out of the map, or label it in the recording"
+    )]
+    NeverSeen {
+        /// Name in the map.
+        name: String,
+    },
+    /// A cluster without a static trial.
+    #[error(
+        "nothing says where marker `{name}` sits: give a static trial (`static_suffix`), or list it under `at` with \
+         `marker_spread_m`"
+    )]
+    Uncalibrated {
+        /// Name in the map.
+        name: String,
+    },
+    /// Too few markers to find a body.
+    #[error("the map places {0} markers that the recording has; a body needs at least 4")]
+    TooFew(usize),
+}
+
+impl MarkerMap {
+    /// The map for the set `ue_adl`: seated, arms and shoulders in clusters of four, one marker on the sternum.
+    pub fn ue_adl() -> Self {
+        // The text is part of the crate and covered by its tests.
+        Self::from_toml(include_str!("../../maps/ue_adl.toml")).unwrap_or_else(|_| Self::empty())
+    }
+
+    /// The map of the embedded motions: markers on all segments of the upper body.
+    pub fn embedded() -> Self {
+        Self::from_toml(include_str!("../../maps/embedded.toml")).unwrap_or_else(|_| Self::empty())
+    }
+
+    fn empty() -> Self {
+        MarkerMap {
+            name: String::new(),
+            units: None,
+            static_suffix: None,
+            marker_spread_m: 0.0,
+            joints: BTreeMap::new(),
+            segments: BTreeMap::new(),
+            robot: Default::default(),
+        }
+    }
+
+    /// Reads a map.
+    ///
+    /// # Errors
+    /// [`MapError::Toml`], or a segment that there is not.
+    pub fn from_toml(text: &str) -> Result<Self, MapError> {
+        let map: MarkerMap = toml::from_str(text).map_err(|error| MapError::Toml(error.to_string()))?;
+        for name in map.segments.keys().chain(map.joints.keys()) {
+            if Segment::from_name(name).is_none() {
+                let names: Vec<String> = Segment::ALL.iter().map(|segment| segment.name()).collect();
+                return Err(MapError::Segment { name: name.clone(), nearest: nearest(name, &names) });
+            }
+        }
+        Ok(map)
+    }
+
+    /// How the joint before a segment moves.
+    pub fn mode(&self, segment: Segment) -> JointMode {
+        self.joints.get(&segment.name()).copied().unwrap_or(JointMode::Free)
+    }
+
+    /// Index of a marker in the recording.
+    pub(crate) fn find(&self, name: &str, recording: &MarkerRecording) -> Result<usize, MapError> {
+        let marker = recording.marker(name).ok_or_else(|| MapError::Marker {
+            name: name.to_owned(),
+            nearest: nearest(name, &recording.labels),
+        })?;
+        if recording.is_ever_seen(marker) {
+            Ok(marker)
+        } else {
+            Err(MapError::NeverSeen { name: name.to_owned() })
+        }
+    }
+}
+
+/// The three names most like `name`, for a message.
+fn nearest(name: &str, names: &[String]) -> String {
+    let mut ranked: Vec<(usize, &String)> =
+        names.iter().map(|other| (strsim::osa_distance(name, other), other)).collect();
+    ranked.sort();
+    ranked.iter().take(3).map(|(_, other)| format!("`{other}`")).collect::<Vec<_>>().join(", ")
+}

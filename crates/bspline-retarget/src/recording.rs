@@ -1,0 +1,101 @@
+//! Marker recordings, whatever file they come from.
+
+use crate::c3d::C3dError;
+use std::path::{Path, PathBuf};
+
+/// Positions of named markers over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MarkerRecording {
+    /// Frames per second \[Hz\].
+    pub rate_hz: f64,
+    /// The markers' labels, as the file has them.
+    pub labels: Vec<String>,
+    /// Position of each marker \[m\], frame by frame; a missing one is NaN in all three coordinates.
+    pub positions_m: Vec<[f64; 3]>,
+}
+
+impl MarkerRecording {
+    /// Number of frames.
+    pub fn frames(&self) -> usize {
+        self.positions_m.len().checked_div(self.labels.len()).unwrap_or(0)
+    }
+    /// Time from the first frame to the last \[s\].
+    pub fn duration_s(&self) -> f64 {
+        self.frames().saturating_sub(1) as f64 / self.rate_hz
+    }
+    /// Position of a marker in a frame \[m\].
+    pub fn position_m(&self, frame: usize, marker: usize) -> [f64; 3] {
+        self.positions_m[frame * self.labels.len() + marker]
+    }
+
+    /// The marker of this name: as it is, or behind a subject's prefix (`Anna:LSHO`) that no two markers share.
+    pub fn marker(&self, name: &str) -> Option<usize> {
+        if let Some(index) = self.labels.iter().position(|label| label == name) {
+            return Some(index);
+        }
+        let mut behind_prefix = self
+            .labels
+            .iter()
+            .enumerate()
+            .filter(|(_, label)| label.rsplit_once(':').is_some_and(|(_, own)| own == name));
+        let (index, _) = behind_prefix.next()?;
+        behind_prefix.next().is_none().then_some(index)
+    }
+
+    /// Whether a marker is seen in any frame.
+    pub fn is_ever_seen(&self, marker: usize) -> bool {
+        (0..self.frames()).any(|frame| self.position_m(frame, marker)[0].is_finite())
+    }
+
+    /// Share of marker positions that are missing, 0 to 1.
+    pub fn missing_share(&self) -> f64 {
+        let missing = self.positions_m.iter().filter(|position| !position[0].is_finite()).count();
+        missing as f64 / self.positions_m.len().max(1) as f64
+    }
+}
+
+/// Reads a recording: C3D, or CSV of named points if the name ends so. `units` replaces what the file says of its unit.
+///
+/// # Errors
+/// [`RecordingError`], which names the file, the place and the mend.
+pub fn read_recording(path: &Path, units: Option<&str>) -> Result<MarkerRecording, RecordingError> {
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
+        crate::point_csv::read_point_csv(path)
+    } else {
+        crate::c3d::read_c3d_file(path, units)
+    }
+}
+
+/// Why a recording can not be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordingError {
+    /// The system does not give the file out.
+    #[error("{}: {}", path.display(), if source.kind() == std::io::ErrorKind::NotFound {
+        "no such file; check the path".to_owned()
+    } else {
+        format!("can't be read: {source}")
+    })]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// It is no sound C3D file.
+    #[error("{}: {source}", path.display())]
+    C3d {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: C3dError,
+    },
+    /// It is no table of points.
+    #[error("{}: {what}", path.display())]
+    Csv {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, where, and the mend.
+        what: String,
+    },
+}

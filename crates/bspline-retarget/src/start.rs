@@ -1,0 +1,89 @@
+//! Where the solver starts.
+
+use crate::problem::Problem;
+use crate::retarget::Calibration;
+use phiw_dynamics::Vec3;
+
+/// The pose of the static trial over all time, or rest, turned and moved to where the markers are.
+pub(crate) fn start(problem: &Problem<'_>, calibration: Option<&Calibration>) -> Vec<f64> {
+    let mut variables = problem.rest();
+    let Some(calibration) = calibration else {
+        align(problem, &mut variables);
+        return variables;
+    };
+    let (n, first) = (problem.coordinates(), problem.coordinates() * problem.basis().control_points());
+    for (column, coordinate) in problem.body.trajectories.iter().enumerate() {
+        if let Some(&value) = calibration.pose.get(&coordinate.name) {
+            variables[..first].iter_mut().skip(column).step_by(n).for_each(|variable| *variable = value);
+        }
+    }
+    for (variable, parameter) in variables[first..].iter_mut().zip(&problem.body.parameters) {
+        if let Some(&value) = calibration.pose.get(&parameter.name) {
+            *variable = value;
+        }
+    }
+    variables
+}
+
+/// Turns the body about the vertical and moves it so that its markers at rest lie on those that are seen: for each control point of
+/// its own if the pelvis moves.
+pub(crate) fn align(problem: &Problem<'_>, variables: &mut [f64]) {
+    let (n, points) = (problem.coordinates(), problem.basis().control_points());
+    let body = problem.body;
+    let mut columns = variables[..n].to_vec();
+    columns.extend_from_slice(&variables[n * points..]);
+    let mut scratch = body.kinematics.scratch();
+    body.kinematics.place(&columns, &mut scratch);
+    let rest: Vec<Vec3<f64>> =
+        (0..body.markers.len()).map(|point| body.kinematics.position(point, &scratch)).collect();
+    let names = ["pelvis_x", "pelvis_y", "pelvis_z", "pelvis_yaw"];
+    let trajectory = |name: &str| body.trajectories.iter().position(|c| c.name == name);
+    let parameter = |name: &str| body.parameters.iter().position(|c| c.name == name);
+    let mut last_yaw: Option<f64> = None;
+    for point in 0..points {
+        let sample = problem.sample_near(point);
+        let Some(mut pose) = pose(&rest, problem.measured_at(sample)) else { continue };
+        // Yaw goes on where it was: a turn has no seam.
+        if let Some(last) = last_yaw {
+            let turns = ((last - pose[3]) / std::f64::consts::TAU).round();
+            pose[3] += turns * std::f64::consts::TAU;
+        }
+        let is_first = last_yaw.is_none();
+        last_yaw = Some(pose[3]);
+        for (name, value) in names.into_iter().zip(pose) {
+            if let Some(column) = trajectory(name) {
+                variables[point * n + column] = value;
+                if is_first {
+                    (0..point).for_each(|earlier| variables[earlier * n + column] = value);
+                }
+            } else if let Some(index) = parameter(name).filter(|_| is_first) {
+                variables[n * points + index] = value;
+            }
+        }
+    }
+}
+
+/// x, y, z and yaw that bring points at rest to those measured (least squares about the vertical); `None` if fewer than two are seen.
+fn pose(rest: &[Vec3<f64>], measured: &[[f64; 3]]) -> Option<[f64; 4]> {
+    let seen = || rest.iter().zip(measured).filter(|(_, measured)| measured[0].is_finite());
+    let count = seen().count();
+    if count < 2 {
+        return None;
+    }
+    let zero = (Vec3([0.0; 3]), Vec3([0.0; 3]));
+    let (a, b) = seen().fold(zero, |(a, b), (rest, measured)| (a + *rest, b + Vec3(*measured)));
+    let share = 1.0 / count as f64;
+    let (a, b) = (a.scale(share), b.scale(share));
+    let (mut sine, mut cosine) = (0.0, 0.0);
+    for (rest, measured) in seen() {
+        let ([x, y, _], [u, v, _]) = ((*rest - a).0, (Vec3(*measured) - b).0);
+        cosine += x * u + y * v;
+        sine += x * v - y * u;
+    }
+    let yaw = sine.atan2(cosine);
+    let (sine, cosine) = yaw.sin_cos();
+    let [x, y, z] = a.0;
+    let turned = Vec3([cosine * x - sine * y, sine * x + cosine * y, z]);
+    let [x, y, z] = (b - turned).0;
+    Some([x, y, z, yaw])
+}
