@@ -29,9 +29,9 @@ pub struct Arguments {
     /// Compare with mink, installed from PyPI by this Python into a private environment.
     #[arg(long, value_name = "PYTHON")]
     mink: Option<String>,
-    /// Folder for the page and the motions.
-    #[arg(long, default_value = "target/retarget")]
-    out: PathBuf,
+    /// Folder for the page and the motions; by default `retarget` in the build folder.
+    #[arg(long)]
+    out: Option<PathBuf>,
 }
 
 /// The robot, the person and the files that the measurements are made on.
@@ -49,7 +49,10 @@ struct Scene {
 /// A file cannot be read or written.
 pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
     let scene = Scene::find()?;
-    let out = environment::workspace_root()?.join(&arguments.out);
+    let out = match &arguments.out {
+        Some(out) => out.clone(),
+        None => environment::target_directory()?.join("retarget"),
+    };
     std::fs::create_dir_all(&out).with_context(|| out.display().to_string())?;
     let mut page = page::Page::default();
     database::measure(&scene, arguments.seed, &out, &mut page)?;
@@ -94,9 +97,15 @@ impl Scene {
     fn example(&self, seed: u64, options: RetargetOptions) -> anyhow::Result<Example> {
         let Some(folder) = &self.seated else {
             let retargeter = self.retargeter(MarkerMap::embedded(), options)?;
-            let motion = phiw_bspline_retarget::embedded::embedded_motions(seed).find(|motion| motion.task == "Pour");
+            let motion =
+                phiw_bspline_retarget::embedded::embedded_motions(seed).find(|motion| motion.task == "Pour");
             let motion = motion.context("no embedded motion")?;
-            return Ok(Example { retargeter, recording: motion.recording, calibration: None, name: motion.name });
+            return Ok(Example {
+                retargeter,
+                recording: motion.recording,
+                calibration: None,
+                name: motion.name,
+            });
         };
         let retargeter = self.retargeter(MarkerMap::ue_adl(), options)?;
         let calibration = retargeter.calibrate(&read_recording(&folder.join("ADL001_static.c3d"), None)?)?;

@@ -86,6 +86,17 @@ fn additions_of_the_program_come_last() {
         warnings: vec!["train and validate are the same file".into()],
         conditioning: [("cut_off".to_string(), Value::from(5.2))].into_iter().collect(),
         relative_with_rests: Some(RelativeErrors { train: 0.2, validate: 0.25 }),
+        evidence: vec![EvidenceJson {
+            kind: "torque_offset".into(),
+            joints: vec!["joint_1".into()],
+            significance: 21.5,
+            stability: 1.0,
+        }],
+        cannot_be_told: vec![CannotBeToldJson {
+            kind: "transmission_coupling".into(),
+            joints: vec![vec!["joint_1".into(), "joint_2".into()]],
+            telling_motion: "one joint alone".into(),
+        }],
     });
     let text = report.to_json().unwrap();
     assert!(text.find("\"phiw\"") > text.find("\"remaining\""));

@@ -40,7 +40,8 @@ pub fn draw(scene: &Scene, seed: u64, page: &mut Page) -> anyhow::Result<()> {
                 let position = recording.position_m(frame, marker);
                 if position[0].is_finite() {
                     let [x, y] = view.project(turned(position, center, heading));
-                    let _ = write!(svg, "<circle cx='{:.0}' cy='{:.0}' r='2.5'/>", left + 100.0 + x, 150.0 - y);
+                    let _ =
+                        write!(svg, "<circle cx='{:.0}' cy='{:.0}' r='2.5'/>", left + 100.0 + x, 150.0 - y);
                 }
             }
             let mut path = String::new();
@@ -58,11 +59,17 @@ pub fn draw(scene: &Scene, seed: u64, page: &mut Page) -> anyhow::Result<()> {
                 let (x, y) = (left + 280.0, 150.0);
                 let _ = write!(path, "M{:.0} {:.0}L{:.0} {:.0}", x + a[0], y - a[1], x + b[0], y - b[1]);
             }
-            let _ = write!(svg, "<path d='{path}' stroke='#2a6' stroke-width='5' stroke-linecap='round' fill='none'/>");
+            let _ = write!(
+                svg,
+                "<path d='{path}' stroke='#2a6' stroke-width='5' stroke-linecap='round' fill='none'/>"
+            );
         }
         frames.push(svg);
     }
-    page.picture(&film(&frames), "markers of the person (dots) and the robot (lines): from the front, from the left");
+    page.picture(
+        &film(&frames),
+        "markers of the person (dots) and the robot (lines): from the front, from the left",
+    );
     strip(&frames, page);
     // Joint positions over time say whether it is smooth, too.
     let peaks: Vec<Vec<f64>> = (0..tree.joint_count())
@@ -78,8 +85,13 @@ pub fn draw(scene: &Scene, seed: u64, page: &mut Page) -> anyhow::Result<()> {
         .collect();
     let places: Vec<String> = (1..=peaks.len()).map(|joint| joint.to_string()).collect();
     let groups = [BoxGroup { name: "positions", samples: &peaks }];
-    let plot =
-        BoxPlot { groups: &groups, places: &places, x_label: "joint", y_label: "position [rad]", logarithmic: false };
+    let plot = BoxPlot {
+        groups: &groups,
+        places: &places,
+        x_label: "joint",
+        y_label: "position [rad]",
+        logarithmic: false,
+    };
     page.picture(box_plot(&plot).as_str(), "where each joint of the robot is over the motion");
     Ok(())
 }
@@ -89,7 +101,11 @@ fn strip(frames: &[String], page: &mut Page) {
     let mut svg = String::from("<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 2400 320'>");
     for moment in 0..6 {
         let frame = &frames[moment * (frames.len().max(1) - 1) / 5];
-        let _ = write!(svg, "<svg x='{}' width='400' height='320' viewBox='0 0 400 320'>{frame}</svg>", 400 * moment);
+        let _ = write!(
+            svg,
+            "<svg x='{}' width='400' height='320' viewBox='0 0 400 320'>{frame}</svg>",
+            400 * moment
+        );
     }
     svg.push_str("</svg>");
     page.picture(&svg, "six moments of it, from the front");

@@ -75,7 +75,10 @@ pub fn compare(scene: &Scene, seed: u64, python: &str, page: &mut Page) -> anyho
         iterations: ITERATIONS,
     };
     let folder = tempfile::tempdir()?;
-    std::fs::write(folder.path().join("robot.urdf"), fixed(&std::fs::read_to_string(&scene.urdf)?, &scene.hold))?;
+    std::fs::write(
+        folder.path().join("robot.urdf"),
+        fixed(&std::fs::read_to_string(&scene.urdf)?, &scene.hold),
+    )?;
     std::fs::write(folder.path().join("request.json"), serde_json::to_string(&request)?)?;
     std::fs::write(folder.path().join("targets"), targets)?;
     let answer = python.run(SCRIPT, [folder.path()]).context("mink fails")?;
@@ -103,5 +106,9 @@ fn fixed(urdf: &str, hold: &[(String, f64)]) -> String {
             );
         }
     }
-    urdf.replacen("</robot>", "<mujoco><compiler fusestatic=\"false\" discardvisual=\"true\"/></mujoco></robot>", 1)
+    urdf.replacen(
+        "</robot>",
+        "<mujoco><compiler fusestatic=\"false\" discardvisual=\"true\"/></mujoco></robot>",
+        1,
+    )
 }

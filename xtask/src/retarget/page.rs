@@ -22,8 +22,7 @@ impl Page {
 
     /// A picture with what it shows.
     pub fn picture(&mut self, svg: &str, caption: &str) {
-        let _ =
-            writeln!(self.0, "<figure>{svg}<figcaption>{}</figcaption></figure>", escaped(caption));
+        let _ = writeln!(self.0, "<figure>{svg}<figcaption>{}</figcaption></figure>", escaped(caption));
     }
 
     /// The whole page.
