@@ -1,7 +1,7 @@
 //! Torso and head for recordings that hold neither: gaze-and-reach coordination.
 //!
-//! People turn and lean the trunk towards what they reach for, the more the further it is from the shoulder beyond some 60 % of the
-//! arm's length, and look at the hand that works. Which hand does, its speed tells.
+//! The trunk turns and leans towards what the hand reaches for, the more the further it is from the shoulder, and the head looks at the hand that works.
+//! Which hand does, its speed tells. The constants below are plausible, not measured: what they make is named as theirs in the output.
 
 use crate::problem::Problem;
 use crate::robot::{RobotModel, norm};

@@ -1,8 +1,8 @@
 //! Segments, joints and lengths of the human upper body.
 //!
 //! Frames of all segments are alike when all angles are zero: x forward, y left, z up, arms hanging. A segment's frame is at the joint
-//! before it; its end is where the next one begins. Lengths are those of an adult 1.75 m tall, after the shares of stature of
-//! Drillis and Contini (1966); they are starting values with a spread, not assumptions.
+//! before it; its end is where the next one begins. Lengths are round numbers for an adult 1.75 m tall: starting values with a spread, which the
+//! recording corrects.
 
 /// A rigid part of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
