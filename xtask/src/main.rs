@@ -3,6 +3,7 @@
 mod environment;
 mod mujoco;
 mod oracle;
+mod paper;
 mod plant_experiment;
 mod retarget;
 mod run;
@@ -35,6 +36,8 @@ enum Task {
     Oracle(oracle::Arguments),
     /// Robot logs with effects that nobody declared: generate, trace with `phiw explain`, score.
     Undeclared(undeclared::Arguments),
+    /// The experiments of the paper's section 5, resumable, on one machine or many.
+    Paper(paper::Arguments),
     /// Robots in physics engines with one secret each, tracked poorly: log, trace with `phiw explain`, score.
     Plant(plant_experiment::Arguments),
 }
@@ -47,6 +50,7 @@ fn main() -> anyhow::Result<ExitCode> {
         Task::Test(arguments) => test::command(&arguments),
         Task::Mujoco(arguments) => mujoco::command(&arguments),
         Task::Oracle(arguments) => oracle::command(&arguments),
+        Task::Paper(arguments) => paper::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Plant(arguments) => plant_experiment::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Undeclared(arguments) => undeclared::command(&arguments).map(|()| ExitCode::SUCCESS),
     }

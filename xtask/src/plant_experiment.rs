@@ -2,7 +2,7 @@
 //! go to `phiw explain`, a program of its own, and its answer is held against the truth.
 
 mod case;
-mod engine;
+pub mod engine;
 mod score;
 mod secret;
 mod table;
@@ -33,8 +33,9 @@ pub struct Arguments {
     /// Cases of each kind and engine.
     #[arg(long, default_value_t = 2)]
     count: u64,
-    /// Standard deviation of the torque that actuators add unlogged, over the effort limit.
-    #[arg(long, default_value_t = 0.005)]
+    /// Standard deviation of the torque that actuators add unlogged, over the effort limit. (A wrist's usual torque is a hundredth of its limit: a few thousandths
+    /// of the limit are a good part of that.)
+    #[arg(long, default_value_t = 0.002)]
     noise: f64,
     /// Time between two rows of the log, and between two commands of the controller \[s\].
     #[arg(long, default_value_t = 0.01)]

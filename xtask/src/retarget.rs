@@ -1,7 +1,7 @@
 //! `cargo xtask retarget`: what retargeting can do, measured.
 
 mod animation;
-mod database;
+pub mod database;
 mod figure9;
 mod mink;
 mod page;
@@ -96,9 +96,9 @@ impl Scene {
     /// A drinking motion of the seated set, or an embedded one.
     fn example(&self, seed: u64, options: RetargetOptions) -> anyhow::Result<Example> {
         let Some(folder) = &self.seated else {
-            let retargeter = self.retargeter(MarkerMap::embedded(), options)?;
+            let retargeter = self.retargeter(MarkerMap::embedded()?, options)?;
             let motion =
-                phiw_bspline_retarget::embedded::embedded_motions(seed).find(|motion| motion.task == "Pour");
+                phiw_bspline_retarget::embedded::embedded_motions(seed)?.find(|motion| motion.task == "Pour");
             let motion = motion.context("no embedded motion")?;
             return Ok(Example {
                 retargeter,
@@ -107,7 +107,7 @@ impl Scene {
                 name: motion.name,
             });
         };
-        let retargeter = self.retargeter(MarkerMap::ue_adl(), options)?;
+        let retargeter = self.retargeter(MarkerMap::ue_adl()?, options)?;
         let calibration = retargeter.calibrate(&read_recording(&folder.join("ADL001_static.c3d"), None)?)?;
         let recording = read_recording(&folder.join("ADL001DR1.c3d"), None)?;
         Ok(Example { retargeter, recording, calibration: Some(calibration), name: "ADL001DR1".to_owned() })

@@ -11,7 +11,8 @@ use std::hint::black_box;
 fn retargeter() -> Retargeter {
     let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/upper_body18.urdf");
     let tree = read_urdf_file(robot, &UrdfOptions::default()).expect("the project's own robot").tree;
-    Retargeter::new(tree, MarkerMap::embedded(), RetargetOptions::default()).expect("it has two arms")
+    Retargeter::new(tree, MarkerMap::embedded().expect("it is part of the crate"), RetargetOptions::default())
+        .expect("it has two arms")
 }
 
 /// The motion there and back again, until it has `frames`.
@@ -30,7 +31,10 @@ fn of_length(motion: &EmbeddedMotion, frames: usize) -> MarkerRecording {
 
 fn retarget(criterion: &mut Criterion) {
     let retargeter = retargeter();
-    let motion = embedded_motions(1).find(|motion| motion.task == "Mix").expect("Table 1 has it");
+    let motion = embedded_motions(1)
+        .expect("it is part of the crate")
+        .find(|motion| motion.task == "Mix")
+        .expect("Table 1 has it");
     let mut group = criterion.benchmark_group("retarget");
     group.sample_size(10);
     for frames in [200, 740, 2_000, 6_000, 20_000] {
@@ -44,7 +48,7 @@ fn retarget(criterion: &mut Criterion) {
 }
 
 fn read(criterion: &mut Criterion) {
-    let bytes = embedded_motions(1).next().expect("110 of them").to_c3d();
+    let bytes = embedded_motions(1).expect("it is part of the crate").next().expect("110 of them").to_c3d();
     let mut group = criterion.benchmark_group("read_c3d");
     group.throughput(Throughput::Bytes(bytes.len() as u64));
     group.bench_function("embedded", |bencher| bencher.iter(|| read_c3d(black_box(&bytes))));

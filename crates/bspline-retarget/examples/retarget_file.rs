@@ -13,7 +13,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return Err("give a URDF, a static trial and motions".into());
     };
     let tree = read_urdf_file(urdf, &UrdfOptions::default())?.tree;
-    let retargeter = Retargeter::new(tree, MarkerMap::ue_adl(), RetargetOptions::default())?;
+    let retargeter = Retargeter::new(tree, MarkerMap::ue_adl()?, RetargetOptions::default())?;
     let calibration = retargeter.calibrate(&read_recording(Path::new(static_trial), None)?)?;
     println!("lengths {:.3?} m", calibration.lengths_m);
     for file in motions {

@@ -34,7 +34,7 @@ pub(crate) fn quality(
     curve: &Curve,
     variables: &[f64],
 ) -> Quality {
-    let mut scratch = problem.scratch();
+    let mut scratch = problem.pose_scratch();
     let names = problem.body.marker_names();
     let (mut errors, mut sums) = (vec![0.0f64; names.len()], vec![(0.0f64, 0.0f64); names.len()]);
     let (mut elbow_sum, mut hand_sum) = (0.0, 0.0);
@@ -43,12 +43,13 @@ pub(crate) fn quality(
     let (mut excess, mut peak, mut share, mut jerk) = (0.0f64, 0.0f64, 0.0f64, 0.0);
     let samples = problem.samples();
     for sample in 0..samples {
-        problem.marker_errors(variables, sample, &mut scratch, &mut errors);
+        problem.pose(variables, sample, &mut scratch);
+        problem.marker_errors(sample, &scratch, &mut errors);
         for ((sum, seen), error) in sums.iter_mut().zip(&errors).filter(|(_, error)| error.is_finite()) {
             *sum += error;
             *seen += 1.0;
         }
-        let residuals = problem.arm_residuals(robot, variables, sample, &mut scratch);
+        let residuals = problem.arm_residuals(robot, &scratch);
         // Elbow, wrist, hand of each arm.
         for arm in residuals.as_chunks::<3>().0 {
             elbow_sum += arm[0].dot(arm[0]);

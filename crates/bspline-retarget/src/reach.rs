@@ -7,6 +7,8 @@ use crate::problem::Problem;
 use crate::robot::{RobotModel, norm};
 use phiw_dynamics::Vec3;
 
+/// Correspondences of the left and the right hand.
+const HANDS: [usize; 2] = [2, 5];
 /// Share of the hand's azimuth that the trunk turns.
 const TURN_SHARE: f64 = 0.3;
 /// Lean at full reach \[rad\].
@@ -24,14 +26,16 @@ pub(crate) fn targets(
     robot: &RobotModel,
     variables: &[f64],
 ) -> Vec<(usize, Vec<Vec3<f64>>)> {
-    let mut scratch = problem.scratch();
+    let mut scratch = problem.pose_scratch();
     let shoulders = problem.zero_points(robot.arms().map(|arm| arm.shoulder), &mut scratch);
     let middle = (shoulders[0] + shoulders[1]).scale(0.5);
     let arm = robot.arm_length_m();
     // Hands at the robot's size, seen from its base.
     let hands: Vec<[Vec3<f64>; 2]> = (0..problem.samples())
         .map(|sample| {
-            let [left, right] = problem.human_hands(robot, variables, sample, &mut scratch);
+            problem.pose(variables, sample, &mut scratch);
+            let vectors = problem.human_vectors(robot, sample, &scratch);
+            let [left, right] = HANDS.map(|hand| vectors[hand]);
             [shoulders[0] + left, shoulders[1] + right]
         })
         .collect();

@@ -3,6 +3,7 @@
 use crate::Problem;
 use crate::bspline::{Basis, BasisError, Curve, CurveError};
 use crate::human::{HumanBody, MapError, MarkerMap, Placed};
+use crate::human_start::human_start;
 use crate::quality::{Quality, quality};
 use crate::recording::MarkerRecording;
 use crate::robot::{RobotError, RobotModel};
@@ -40,6 +41,9 @@ impl Default for RetargetOptions {
         }
     }
 }
+
+/// How much sooner the person alone is found than all of it: it is a start.
+const ROUGH: f64 = 10.0;
 
 /// A robot and a marker map: turns recordings into motions of the robot.
 #[derive(Clone, Debug)]
@@ -168,7 +172,7 @@ impl Retargeter {
     /// The map does not fit the recording.
     pub fn calibrate(&self, recording: &MarkerRecording) -> Result<Calibration, RetargetError> {
         let mean = mean_frame(recording);
-        let map = MarkerMap { marker_spread_m: 0.0, ..self.map.clone() };
+        let map = self.firm_map();
         let body = HumanBody::new(&map, &mean, &BTreeMap::new(), None, true, 0)?;
         // A pose is a spline of degree 0 with one control point.
         let basis = Basis::clamped(0, 1, 0.0, 1.0)?;
@@ -176,7 +180,7 @@ impl Retargeter {
         let mut first = problem.rest();
         align(&problem, &mut first);
         let solution = solve(&problem, first, &self.options.iterations);
-        let mut scratch = body.kinematics.scratch();
+        let mut scratch = body.kinematics.scratch::<f64>();
         body.kinematics.place(&solution.variables, &mut scratch);
         let mut markers = BTreeMap::new();
         for (name, segments) in map.segments.iter() {
@@ -185,7 +189,9 @@ impl Retargeter {
             let names = segments.cluster.iter().chain(segments.at.keys()).chain(segments.at_end.keys());
             for name in names {
                 let seen = Vec3(mean.position_m(0, map.find(name, &mean)?));
-                let local = scratch.rotations[node].transpose_mul(seen - scratch.origins[node]);
+                let (rotation, origin) =
+                    (body.kinematics.rotation(node, &scratch), body.kinematics.origin(node, &scratch));
+                let local = rotation.transpose_mul(seen - origin);
                 markers.insert(name.clone(), Placed { segment, from_end: false, local_m: local.0 });
             }
         }
@@ -227,14 +233,16 @@ impl Retargeter {
         let alone = HumanBody::new(&self.map, recording, markers, lengths, false, 0)?;
         let basis = self.basis(recording)?;
         let problem = Problem::new(&alone, None, recording, basis.clone(), self.options.weights);
-        let coarse = Iterations { coarse_only: true, ..self.options.iterations };
-        let solution = solve(&problem, start(&problem, calibration), &coarse);
+        let first = self.followed(recording, calibration, &problem)?;
+        let rough =
+            Iterations { tolerance: ROUGH * self.options.iterations.tolerance, ..self.options.iterations };
+        let solution = solve(&problem, first, &rough);
         let (control, parameters) =
             solution.variables.split_at(alone.trajectories() * basis.control_points());
         // Those of the static trial alone stay known by name.
         let mut markers = markers.clone();
         markers.extend(alone.markers_placed(parameters));
-        let map = MarkerMap { marker_spread_m: 0.0, ..self.map.clone() };
+        let map = self.firm_map();
         let joints = self.robot.tree().joint_count();
         let body = HumanBody::new(&map, recording, &markers, lengths, false, joints)?;
         // Places come last.
@@ -246,6 +254,31 @@ impl Retargeter {
             steps: solution.iterations,
             body,
         })
+    }
+
+    /// Variables of a person's problem with the markers followed pose by pose, as if they sat where they are known to.
+    fn followed(
+        &self,
+        recording: &MarkerRecording,
+        calibration: Option<&Calibration>,
+        problem: &Problem<'_>,
+    ) -> Result<Vec<f64>, RetargetError> {
+        let none = BTreeMap::new();
+        let markers = calibration.map_or(&none, |calibration| &calibration.markers);
+        let lengths = calibration.map(|calibration| &calibration.lengths_m[..]);
+        let firm = HumanBody::new(&self.firm_map(), recording, markers, lengths, false, 0)?;
+        let basis = problem.basis().clone();
+        let firm = Problem::new(&firm, None, recording, basis, self.options.weights);
+        let mut variables = human_start(&firm, start(&firm, calibration));
+        // Places come last.
+        let places = &problem.body.parameters[firm.body.parameters()..];
+        variables.extend(places.iter().map(|place| place.mean));
+        Ok(variables)
+    }
+
+    /// The map with markers that do not shift.
+    fn firm_map(&self) -> MarkerMap {
+        MarkerMap { marker_spread_m: 0.0, ..self.map.clone() }
     }
 
     /// Problem (15) of a person's recording.

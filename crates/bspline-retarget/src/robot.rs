@@ -1,7 +1,7 @@
 //! The robot's side of the correspondence: which of its points answer to the human's.
 
 use crate::human::{Segment, Side};
-use phiw_dynamics::{DimensionError, Placement, Tree, Vec3};
+use phiw_dynamics::{DimensionError, Placement, Scalar, Tree, Vec3};
 use serde::Deserialize;
 
 /// A point fixed to a body of the robot.
@@ -145,6 +145,14 @@ impl RobotModel {
         self.correspondences[2].human.iter().map(|(_, vector)| norm(*vector)).sum()
     }
 
+    /// All joints at zero, or at the limit next to it \[rad, m\].
+    pub(crate) fn rest(&self) -> impl Iterator<Item = f64> {
+        (0..self.tree.joint_count()).map(|joint| {
+            let limits = self.tree.joint(joint).limits;
+            0.0f64.max(limits.lower).min(limits.upper)
+        })
+    }
+
     fn add_torso_and_head(&mut self, placements: &[Placement<f64>], chains: &Chains) {
         let at = |point: BodyPoint| world(placements, point);
         let [left, right] = [self.arms[0].shoulder, self.arms[1].shoulder];
@@ -279,11 +287,10 @@ fn zero_placements(tree: &Tree) -> Result<Vec<Placement<f64>>, DimensionError> {
 }
 
 /// Where a point is in the world.
-pub(crate) fn world(placements: &[Placement<f64>], point: BodyPoint) -> Vec3<f64> {
-    match point.body {
-        Some(body) => placements[body].point(point.local),
-        None => point.local,
-    }
+#[inline(always)]
+pub(crate) fn world<S: Scalar>(placements: &[Placement<S>], point: BodyPoint) -> Vec3<S> {
+    let local = Vec3::constant(point.local.0);
+    point.body.map_or(local, |body| placements[body].point(local))
 }
 
 pub(crate) fn norm(vector: Vec3<f64>) -> f64 {

@@ -2,7 +2,8 @@
 
 use crate::problem::Problem;
 use crate::retarget::Calibration;
-use phiw_dynamics::Vec3;
+use crate::solver::{Arrow, Pattern};
+use phiw_dynamics::{Lanes, Vec3};
 
 /// The pose of the static trial over all time, or rest, turned and moved to where the markers are.
 pub(crate) fn start(problem: &Problem<'_>, calibration: Option<&Calibration>) -> Vec<f64> {
@@ -25,6 +26,47 @@ pub(crate) fn start(problem: &Problem<'_>, calibration: Option<&Calibration>) ->
     variables
 }
 
+/// Weight of a control point to be at the pose itself, against the curve's going through it.
+const AT_POSE: f64 = 0.02;
+
+/// Replaces coordinates from `first` on by those of a curve that goes through poses, one for each control point, near where that pulls
+/// most.
+pub(crate) fn through(problem: &Problem<'_>, poses: &[Vec<f64>], variables: &mut [f64], first: usize) {
+    let (n, basis) = (problem.coordinates(), problem.basis());
+    let order = basis.degree() + 1;
+    let mut fit = Arrow::new(1, poses.len(), basis.degree(), 0);
+    let alone = Pattern::dense(1, 0);
+    let mut places = Vec::new();
+    for point in 0..poses.len() {
+        let mut values = vec![0.0; order];
+        let at = basis.derivative(0, problem.time_s(problem.sample_near(point)), &mut values);
+        let products: Vec<Lanes<1>> =
+            values.iter().flat_map(|a| values.iter().map(move |b| Lanes([a * b]))).collect();
+        let sums: Vec<Lanes<1>> = values.iter().map(|&value| Lanes([value])).collect();
+        fit.add_windows(at, &alone, &products, &sums, [&[1.0]]);
+        *fit.diagonal_mut(point) += AT_POSE;
+        places.push((at, values));
+    }
+    // A basis has a value everywhere and the diagonal is positive: there is a factor.
+    if !fit.factor() {
+        return;
+    }
+    for coordinate in 0..poses.first().map_or(0, Vec::len) {
+        let mut right = vec![0.0; poses.len()];
+        for (point, (at, values)) in places.iter().enumerate() {
+            let value = poses[point][coordinate];
+            right[point] += AT_POSE * value;
+            for (sum, weight) in right[*at..].iter_mut().zip(values) {
+                *sum += weight * value;
+            }
+        }
+        fit.solve(&mut right);
+        for (point, value) in right.iter().enumerate() {
+            variables[point * n + first + coordinate] = *value;
+        }
+    }
+}
+
 /// Turns the body about the vertical and moves it so that its markers at rest lie on those that are seen: for each control point of
 /// its own if the pelvis moves.
 pub(crate) fn align(problem: &Problem<'_>, variables: &mut [f64]) {
@@ -42,7 +84,9 @@ pub(crate) fn align(problem: &Problem<'_>, variables: &mut [f64]) {
     let mut last_yaw: Option<f64> = None;
     for point in 0..points {
         let sample = problem.sample_near(point);
-        let Some(mut pose) = pose(&rest, problem.measured_at(sample)) else { continue };
+        let measured = |(point, &rest)| problem.measured_at(sample, point).map(|measured| (rest, measured));
+        let seen: Vec<(Vec3<f64>, Vec3<f64>)> = rest.iter().enumerate().filter_map(measured).collect();
+        let Some(mut pose) = pose(&seen) else { continue };
         // Yaw goes on where it was: a turn has no seam.
         if let Some(last) = last_yaw {
             let turns = ((last - pose[3]) / std::f64::consts::TAU).round();
@@ -63,20 +107,18 @@ pub(crate) fn align(problem: &Problem<'_>, variables: &mut [f64]) {
     }
 }
 
-/// x, y, z and yaw that bring points at rest to those measured (least squares about the vertical); `None` if fewer than two are seen.
-fn pose(rest: &[Vec3<f64>], measured: &[[f64; 3]]) -> Option<[f64; 4]> {
-    let seen = || rest.iter().zip(measured).filter(|(_, measured)| measured[0].is_finite());
-    let count = seen().count();
-    if count < 2 {
+/// x, y, z and yaw that bring points at rest to those measured (least squares about the vertical); `None` if they are fewer than two.
+fn pose(seen: &[(Vec3<f64>, Vec3<f64>)]) -> Option<[f64; 4]> {
+    if seen.len() < 2 {
         return None;
     }
     let zero = (Vec3([0.0; 3]), Vec3([0.0; 3]));
-    let (a, b) = seen().fold(zero, |(a, b), (rest, measured)| (a + *rest, b + Vec3(*measured)));
-    let share = 1.0 / count as f64;
+    let (a, b) = seen.iter().fold(zero, |(a, b), (rest, measured)| (a + *rest, b + *measured));
+    let share = 1.0 / seen.len() as f64;
     let (a, b) = (a.scale(share), b.scale(share));
     let (mut sine, mut cosine) = (0.0, 0.0);
-    for (rest, measured) in seen() {
-        let ([x, y, _], [u, v, _]) = ((*rest - a).0, (Vec3(*measured) - b).0);
+    for (rest, measured) in seen {
+        let ([x, y, _], [u, v, _]) = ((*rest - a).0, (*measured - b).0);
         cosine += x * u + y * v;
         sine += x * v - y * u;
     }

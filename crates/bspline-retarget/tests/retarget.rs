@@ -32,7 +32,7 @@ fn retargeter(map: MarkerMap) -> Retargeter {
 
 /// The first motion of a task, cut to `frames`.
 fn motion(task: &str, frames: usize) -> EmbeddedMotion {
-    let mut motion = embedded_motions(3).find(|motion| motion.task == task).unwrap();
+    let mut motion = embedded_motions(3).unwrap().find(|motion| motion.task == task).unwrap();
     let markers = motion.recording.labels.len();
     motion.recording.positions_m.truncate(frames * markers);
     motion
@@ -49,7 +49,7 @@ fn check_sound(result: &Retargeted, name: &str) {
 #[test]
 fn the_embedded_motions_are_table_1() {
     assert_eq!(TASKS.iter().map(|task| task.count).sum::<usize>(), 110);
-    let motions: Vec<EmbeddedMotion> = embedded_motions(1).collect();
+    let motions: Vec<EmbeddedMotion> = embedded_motions(1).unwrap().collect();
     assert_eq!(motions.len(), 110);
     for task in TASKS {
         let durations = motions.iter().filter(|m| m.task == task.name).map(|m| m.recording.duration_s());
@@ -58,7 +58,7 @@ fn the_embedded_motions_are_table_1() {
     }
     let missing = motions.iter().map(|m| m.recording.missing_share()).sum::<f64>() / 110.0;
     assert!((0.002..0.05).contains(&missing), "{missing}");
-    let again = embedded_motions(1).nth(40).unwrap();
+    let again = embedded_motions(1).unwrap().nth(40).unwrap();
     assert_eq!(again.to_c3d(), motions[40].to_c3d());
     let read = read_c3d(&again.to_c3d()).unwrap().recording(None).unwrap();
     assert_eq!((read.frames(), &read.labels), (again.recording.frames(), &again.recording.labels));
@@ -67,7 +67,7 @@ fn the_embedded_motions_are_table_1() {
 #[test]
 fn angles_behind_the_markers_come_back() {
     let motion = motion("Stir", 300);
-    let result = retargeter(MarkerMap::embedded()).retarget(&motion.recording, None).unwrap();
+    let result = retargeter(MarkerMap::embedded().unwrap()).retarget(&motion.recording, None).unwrap();
     check_sound(&result, &motion.name);
     assert!(result.quality.marker_rms_m < 0.002, "{}", result.quality.marker_rms_m);
     let mut scratch = vec![0.0; 4];
@@ -86,7 +86,7 @@ fn angles_behind_the_markers_come_back() {
 #[test]
 fn the_gradient_is_the_slope_of_the_cost() {
     let motion = motion("Pour", 90);
-    let retargeter = retargeter(MarkerMap::embedded());
+    let retargeter = retargeter(MarkerMap::embedded().unwrap());
     let person = retargeter.person(&motion.recording, None).unwrap();
     let basis = retargeter.basis(&motion.recording).unwrap();
     let mut weights = retargeter.options().weights;
@@ -125,15 +125,11 @@ fn the_gradient_is_the_slope_of_the_cost() {
 #[test]
 fn the_structured_solver_is_no_worse_than_quasi_newton() {
     let motion = motion("Cut", 120);
-    let retargeter = retargeter(MarkerMap::embedded());
+    let retargeter = retargeter(MarkerMap::embedded().unwrap());
     let person = retargeter.person(&motion.recording, None).unwrap();
     let problem = retargeter.problem(&person, &motion.recording);
     let start = retargeter.start(&problem, &person);
-    let iterations = phiw_bspline_retarget::solver::Iterations {
-        hard_limits: false,
-        coarse_first: false,
-        ..Default::default()
-    };
+    let iterations = phiw_bspline_retarget::solver::Iterations { hard_limits: false, ..Default::default() };
     let ours = solve(&problem, start.clone(), &iterations);
     let theirs = quasi_newton(&problem, start, &QuasiNewton { most: 150, ..Default::default() });
     assert!(ours.cost.total() <= 1.02 * theirs.cost.total(), "{:?} {:?}", ours.cost, theirs.cost);
@@ -144,7 +140,7 @@ fn the_structured_solver_is_no_worse_than_quasi_newton() {
 
 #[test]
 fn missing_markers_carry_no_weight() {
-    let retargeter = retargeter(MarkerMap::embedded());
+    let retargeter = retargeter(MarkerMap::embedded().unwrap());
     let mut recording = motion("Mix", 200).recording;
     let markers = recording.labels.len();
     let whole = retargeter.retarget(&recording, None).unwrap();
@@ -165,7 +161,7 @@ fn missing_markers_carry_no_weight() {
 #[test]
 fn what_does_not_fit_is_named() {
     let recording = motion("Open", 60).recording;
-    let retargeter = retargeter(MarkerMap::embedded());
+    let retargeter = retargeter(MarkerMap::embedded().unwrap());
     let refused = |change: &dyn Fn(&mut phiw_bspline_retarget::MarkerRecording)| {
         let mut changed = recording.clone();
         change(&mut changed);
@@ -188,7 +184,7 @@ fn what_does_not_fit_is_named() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/upper_body18.urdf");
     let floating = UrdfOptions { floating_base: true, ..Default::default() };
     let floating = read_urdf_file(path, &floating).unwrap().tree;
-    let refused = Retargeter::new(floating, MarkerMap::embedded(), RetargetOptions::default());
+    let refused = Retargeter::new(floating, MarkerMap::embedded().unwrap(), RetargetOptions::default());
     assert_eq!(refused.unwrap_err(), RobotError::FloatingBase);
 }
 
@@ -203,7 +199,7 @@ fn real_motions_of_the_seated_set() {
     let read = |name: &str| read_recording(&motions.join(name), None).unwrap();
     for torso_from_reach in [false, true] {
         let options = RetargetOptions { torso_from_reach, ..Default::default() };
-        let retargeter = Retargeter::new(tree.clone(), MarkerMap::ue_adl(), options).unwrap();
+        let retargeter = Retargeter::new(tree.clone(), MarkerMap::ue_adl().unwrap(), options).unwrap();
         // Subject 9 sits the other way round.
         for subject in ["ADL001", "ADL009"] {
             let calibration = retargeter.calibrate(&read(&format!("{subject}_static.c3d"))).unwrap();

@@ -56,7 +56,8 @@ impl<T: Scalar> Vec3<T> {
     /// The vector times a scalar.
     #[inline(always)]
     pub fn scale(self, factor: T) -> Self {
-        Vec3(self.0.map(|x| x * factor))
+        let [x, y, z] = self.0;
+        Vec3([x * factor, y * factor, z * factor])
     }
 }
 
@@ -138,15 +139,18 @@ impl<T: Scalar> Mul<Vec3<T>> for Mat3<T> {
     type Output = Vec3<T>;
     #[inline(always)]
     fn mul(self, v: Vec3<T>) -> Vec3<T> {
-        Vec3(self.0.map(|row| Vec3(row).dot(v)))
+        // No `map`: its closure is not inlined for SIMD scalars, and whole matrices are copied.
+        let [a, b, c] = self.0;
+        Vec3([Vec3(a).dot(v), Vec3(b).dot(v), Vec3(c).dot(v)])
     }
 }
 impl<T: Scalar> Mul for Mat3<T> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        let columns = other.transpose().0;
-        Mat3(self.0.map(|row| columns.map(|column| Vec3(row).dot(Vec3(column)))))
+        let [a, b, c] = other.transpose().0;
+        let [x, y, z] = [self * Vec3(a), self * Vec3(b), self * Vec3(c)];
+        Mat3([x.0, y.0, z.0]).transpose()
     }
 }
 impl<T: Scalar> Add for Mat3<T> {

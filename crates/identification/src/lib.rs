@@ -16,7 +16,7 @@ mod reference;
 mod sample;
 
 pub use accumulate::{BlockSource, Fold, accumulate};
-pub use checks::{InputError, check_logs};
+pub use checks::{InputError, check_excitation, check_logs};
 pub use design::{Design, DesignScratch, RowLayout};
 pub use effect::{Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Entry, Evaluator};
 pub use error::IdentificationError;
@@ -26,6 +26,7 @@ pub use kept_blocks::KeptBlocks;
 pub use log_set::{HELD_OUT_SHARE, LogFile, LogSet, Progress};
 pub use model::{
     BodyParameters, EffectParameters, FactorRows, Model, NamedParameter, parameter_name, standard_unit,
+    with_masses,
 };
 pub use predict::{Prediction, predict};
 pub use reference::ReferenceModel;

@@ -1,6 +1,6 @@
 //! The logs of a session: which train, which are held out, and how they are conditioned.
 
-use crate::{BlockSource, Fold, IdentificationError, check_logs};
+use crate::{BlockSource, Fold, IdentificationError, check_excitation, check_logs};
 use phiw_dynamics::Tree;
 use phiw_telemetry::{Block, Conditioning, ConditioningOptions, LogError, Survey, TorqueColumns};
 use std::ops::ControlFlow;
@@ -28,8 +28,24 @@ impl LogSet {
     /// Surveys the logs, checks them against the robot, and chooses how to condition them.
     ///
     /// # Errors
-    /// A log that cannot be read or does not fit the robot.
+    /// A log that cannot be read or does not fit the robot, or a joint that moves in none.
     pub fn open(
+        tree: &Tree,
+        train: &[PathBuf],
+        validate: &[PathBuf],
+        options: &ConditioningOptions,
+        progress: Progress<'_>,
+    ) -> Result<Self, IdentificationError> {
+        let logs = Self::open_unexcited(tree, train, validate, options, progress)?;
+        check_excitation(tree, logs.training())?;
+        Ok(logs)
+    }
+
+    /// [`LogSet::open`] for a model that other knowledge completes: joints may stand still in all logs.
+    ///
+    /// # Errors
+    /// A log that cannot be read or does not fit the robot.
+    pub fn open_unexcited(
         tree: &Tree,
         train: &[PathBuf],
         validate: &[PathBuf],

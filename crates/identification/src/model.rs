@@ -252,7 +252,7 @@ const UNKNOWN_RADIUS: f64 = 0.1;
 /// The tree's standard parameters, a body without mass replaced by a sphere of the others' mean mass (of 1 kg if none has any).
 ///
 /// Standard parameters near a mass of zero belong to no real body, and URDF cannot express a first moment without mass.
-fn with_masses(tree: &Tree) -> Vec<f64> {
+pub fn with_masses(tree: &Tree) -> Vec<f64> {
     let mut parameters = tree.inertial_parameters();
     let masses = parameters.iter().step_by(PARAMETERS_PER_BODY).filter(|mass| **mass > 0.0);
     let (count, sum) = masses.fold((0.0, 0.0), |(count, sum), mass| (count + 1.0, sum + mass));

@@ -21,6 +21,8 @@ pub enum Command {
     Explain(ExplainArguments),
     /// Turn marker recordings of people into motions of the robot: for each a log without torques, and what it is worth.
     Retarget(RetargetArguments),
+    /// Choose the motion that a real robot should run next, given what has been measured: one iteration of the curriculum.
+    Next(NextArguments),
 }
 
 impl Command {
@@ -30,6 +32,7 @@ impl Command {
             Command::Identify(identify) => identify.session.quiet,
             Command::Explain(explain) => explain.session.quiet,
             Command::Retarget(retarget) => retarget.quiet,
+            Command::Next(next) => next.quiet,
         }
     }
 }
@@ -51,6 +54,9 @@ pub struct ExplainArguments {
     /// A model.json of `phiw identify` or `phiw explain`: its parameters are held, and what has changed since is sought.
     #[arg(long, value_name = "MODEL.json")]
     pub model: Option<PathBuf>,
+    /// Trace again on this many bootstrap draws of the training motion, and say how often each effect is named.
+    #[arg(long, value_name = "COUNT", default_value_t = 0)]
+    pub draws: u32,
 }
 
 /// Arguments of `phiw retarget`.
@@ -86,6 +92,66 @@ pub struct RetargetArguments {
     /// Print nothing but errors.
     #[arg(long)]
     pub quiet: bool,
+}
+
+/// Arguments of `phiw next`.
+#[derive(Clone, Debug, Args)]
+pub struct NextArguments {
+    /// The robot's URDF.
+    #[arg(long, value_name = "ROBOT.urdf")]
+    pub urdf: PathBuf,
+    /// Folder of motions to choose from, as `phiw retarget` writes them: logs with q, qd and qdd.
+    #[arg(long, value_name = "DIR")]
+    pub motions: PathBuf,
+    /// Logs (CSV) of what the robot has run so far.
+    #[arg(long, value_name = "LOG", num_args = 1..)]
+    pub measured: Vec<PathBuf>,
+    /// What the robot stands on (soles of links); without it the robot is taken as bolted down.
+    #[arg(long, value_name = "SUPPORT.toml")]
+    pub support: Option<PathBuf>,
+    /// A model.json of `phiw identify` or `phiw explain` to take the parameters from, instead of fitting the logs.
+    #[arg(long, value_name = "MODEL.json", conflicts_with = "declare")]
+    pub model: Option<PathBuf>,
+    /// Effects beside the rigid body, on every joint: viscous_friction, coulomb_friction, rotor_inertia, …
+    #[arg(long, value_name = "EFFECT,…", value_delimiter = ',')]
+    pub declare: Vec<String>,
+    /// Joints of the URDF that do not move, at 0 or at a value (rad, m).
+    #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
+    pub hold: Vec<(String, f64)>,
+    /// How far off the URDF's inertial parameters may be, as a share of each body's magnitude: what the logs do not tell is taken from it.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.3, value_parser = positive)]
+    pub urdf_error: f64,
+    /// The part that the support is reduced by, 0 to 1; by default from cond(Φ), as in the paper's equation (20).
+    #[arg(long, value_name = "ALPHA", value_parser = share)]
+    pub alpha: Option<f64>,
+    /// Cut-off of the low-pass over positions (Hz); by default chosen from the logs' spectra.
+    #[arg(long, value_name = "HZ")]
+    pub cutoff_hz: Option<f64>,
+    /// Cut-off of the low-pass over the model's columns and the torque alike (Hz); by default the motion's bandwidth.
+    #[arg(long, value_name = "HZ")]
+    pub parallel_cutoff_hz: Option<f64>,
+    /// The motion to run, as a log with the feed-forward torque; the reason goes beside it, with the extension .json.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Print nothing but errors.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+impl NextArguments {
+    /// The same as a session on the measured logs.
+    pub fn session(&self) -> SessionArguments {
+        SessionArguments {
+            urdf: self.urdf.clone(),
+            train: self.measured.clone(),
+            declare: self.declare.clone(),
+            hold: self.hold.clone(),
+            cutoff_hz: self.cutoff_hz,
+            parallel_cutoff_hz: self.parallel_cutoff_hz,
+            quiet: self.quiet,
+            ..SessionArguments::default()
+        }
+    }
 }
 
 /// How velocities and accelerations come about.
@@ -169,6 +235,14 @@ fn held_joint(text: &str) -> Result<(String, f64), String> {
     match value.trim().parse::<f64>() {
         Ok(number) if number.is_finite() => Ok((joint.to_owned(), number)),
         _ => Err(format!("`{value}` is not a position; write {joint} or {joint}=0.5 (rad or m)")),
+    }
+}
+
+/// A number from 0 to 1.
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if (0.0..=1.0).contains(&number) => Ok(number),
+        _ => Err(format!("`{text}` is not a number from 0 to 1")),
     }
 }
 

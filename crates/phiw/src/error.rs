@@ -1,5 +1,6 @@
 //! Why a command failed, and with which exit status.
 
+use phiw_curriculum::CurriculumError;
 use phiw_dynamics::urdf::UrdfError;
 use phiw_identification::{EffectError, IdentificationError, InputError};
 use phiw_telemetry::LogError;
@@ -47,6 +48,12 @@ pub enum Error {
         out: PathBuf,
         /// The file that is in the way.
         file: PathBuf,
+    },
+    /// The file for the result is a folder.
+    #[error("--out {}: this is a folder; name a file in it, such as {}", out.display(), out.join("next.csv").display())]
+    OutIsFolder {
+        /// What was asked for.
+        out: PathBuf,
     },
     /// A result cannot be written.
     #[error("{}: can't be written: {source}", path.display())]
@@ -102,6 +109,82 @@ pub enum Error {
     /// Static trials only.
     #[error("--c3d names static trials only; name the recordings of motions")]
     NoMotion,
+    /// A folder without motions.
+    #[error("{}: there are no motions (*.csv) in this folder; make some with `phiw retarget`", folder.display())]
+    NoMotions {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A log that is no motion.
+    #[error("{}: {source}", path.display())]
+    Motion {
+        /// The log.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: CurriculumError,
+    },
+    /// A joint that no motion moves.
+    #[error(
+        "{}: joint `{joint}` moves by {travel:.1e} {unit} in all motions, so none can tell anything of it; add motions that move it, \
+         or hold it with --hold {joint}={position:.4}", folder.display()
+    )]
+    JointStandsStill {
+        /// The motions.
+        folder: PathBuf,
+        /// The joint.
+        joint: String,
+        /// Its largest travel \[rad, m\].
+        travel: f64,
+        /// Unit of the travel.
+        unit: &'static str,
+        /// Where it stands \[rad, m\].
+        position: f64,
+    },
+    /// A support file that does not fit the robot.
+    #[error("{}: {source}", path.display())]
+    Support {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: phiw_plant::SupportError,
+    },
+    /// Soles that carry nothing.
+    #[error("{}: {source}", path.display())]
+    SupportPolygon {
+        /// The support file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: phiw_zmp::SupportError,
+    },
+    /// A foot that joints move.
+    #[error(
+        "{}: the foot `{link}` is moved by the joint `{joint}`, but motions are planned for a robot whose base stands still; hold its legs with --hold {joint},…",
+        path.display()
+    )]
+    FootMoves {
+        /// The support file.
+        path: PathBuf,
+        /// The foot's link.
+        link: String,
+        /// A joint between it and the base.
+        joint: String,
+    },
+    /// Every motion would topple the robot.
+    #[error(
+        "none of the {motions} motions keeps the ZMP over the support under the present estimate: the safest, {safest}, leaves it by {:.1} mm; \
+         add calmer motions, or start from a better model with --model", 1e3 * outside_m
+    )]
+    NothingSafe {
+        /// How many there are.
+        motions: usize,
+        /// The one that comes nearest.
+        safest: String,
+        /// How far its ZMP is outside \[m\].
+        outside_m: f64,
+    },
+    /// The choice of a motion.
+    #[error(transparent)]
+    Curriculum(#[from] CurriculumError),
     /// The identified parameters cannot be written as a URDF.
     #[error("identified.urdf: {0}")]
     IdentifiedUrdf(UrdfError),
@@ -133,10 +216,21 @@ impl Error {
             | Error::StaticTrial { .. }
             | Error::SameName { .. }
             | Error::NoMotion
+            | Error::NoMotions { .. }
+            | Error::Motion { .. }
+            | Error::JointStandsStill { .. }
+            | Error::Support { .. }
+            | Error::SupportPolygon { .. }
+            | Error::FootMoves { .. }
+            | Error::NothingSafe { .. }
+            | Error::OutIsFolder { .. }
             | Error::OutIsFile { .. } => 2,
             Error::Identification(IdentificationError::Regressor(_)) => 1,
             Error::Identification(_) => 2,
-            Error::Unwritable { .. } | Error::IdentifiedUrdf(_) | Error::Json { .. } => 1,
+            Error::Curriculum(_)
+            | Error::Unwritable { .. }
+            | Error::IdentifiedUrdf(_)
+            | Error::Json { .. } => 1,
         }
     }
 }

@@ -3,6 +3,7 @@
 use crate::analysis::{Analysis, noise_floor};
 use crate::arguments::ExplainArguments;
 use crate::console::Console;
+use crate::draws::Draws;
 use crate::explain_page;
 use crate::identify::{Outcome, outputs};
 use crate::output::{check_folder, write_folder};
@@ -12,8 +13,8 @@ use crate::{Error, summary};
 use phiw_identification::{Data, Identified, Model, TorqueError, identify};
 use phiw_report::ReportJson;
 use phiw_report::json::{
-    EffectJson, EvidenceJson, JointMap, ParameterJson, ProgramJson, RemainingJson, RivalJson, TorqueErrors,
-    Verdict,
+    DrawsJson, EffectJson, EvidenceJson, JointMap, NamedInDrawsJson, ParameterJson, ProgramJson,
+    RemainingJson, RivalJson, TorqueErrors, Verdict,
 };
 use phiw_residual::SignalRanges;
 use phiw_residual::trace::{self, HeldModel, TraceInput, TraceOptions, Tracing, trace};
@@ -37,44 +38,36 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
     let mut session = Session::open(&arguments.session, &progress)?;
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
-    let start = start(arguments, &session, &data)?;
-    let floor = noise_floor(&session, &data, &start.model)?;
-    let conditioning = session.logs.conditioning();
-    let plan = conditioning.plan(&session.logs.surveys()[0])?;
-    let input = TraceInput {
-        tree: &session.tree,
-        catalogue: &session.catalogue,
-        data: &data,
-        ranges: SignalRanges::of_surveys(session.logs.training()),
-        declared: start.specs.clone(),
-        parameters: start.parameters.clone(),
-        residual_std: start.model.residual_std.clone(),
-        held: start.held,
-        noise_floor: floor.clone(),
-        rows_per_independent: (plan.output_rate_hz() / (2.0 * conditioning.parallel_cutoff_hz)).max(1.0),
+    let Traced { start, floor, mut tracing } = traced(arguments, &session, &data)?;
+    let names = |data: &Data<'_>| {
+        let Traced { tracing, .. } = traced(arguments, &session, data)?;
+        Ok(tracing.effects.into_iter().map(|effect| effect.spec).collect())
     };
-    let tracing = trace(input, &TraceOptions::default())?;
+    let draws = Draws::take(arguments.draws, &data, names)?;
+    draws.weigh(&mut tracing);
     drop(data);
     drop(sources);
     if arguments.model.is_some() {
         // What the held model declared is declared here too.
-        session.declared =
-            start.model.declared.iter().filter(|kind| *kind != "rigid_body").cloned().collect();
+        session.declared = start.declared.iter().filter(|kind| *kind != "rigid_body").cloned().collect();
     }
 
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
     let mut analysis = Analysis::new(&session, &data, &tracing.model)?;
     analysis.noise_floor = floor;
-    let declared_design = start.model.design(&session.tree, &session.catalogue)?;
+    let declared_design = start.design(&session.tree, &session.catalogue)?;
     let mut page = explain_page::page(&analysis, &tracing, declared_design, &data)?;
     page.command_line = command_line(arguments);
+    let in_draws = draws.json().as_ref().map(draws_in_words);
+    page.headline.extend(in_draws.clone());
     console.finish();
 
-    let report = report(&analysis, &tracing);
+    let mut report = report(&analysis, &tracing);
+    report.phiw.iter_mut().for_each(|program| program.draws = draws.json());
     let files = outputs(&analysis, &report, page.render())?;
     write_folder(&arguments.session.out, &files)?;
-    let mut summary = story(&analysis, &tracing);
+    let mut summary = story(&analysis, &tracing, in_draws);
     summary.push_str(&summary::summary(&analysis, &arguments.session.out, &files));
     Ok(Outcome {
         summary,
@@ -90,7 +83,48 @@ pub fn command_line(arguments: &ExplainArguments) -> String {
     if let Some(model) = &arguments.model {
         line.push_str(&format!(" --model {}", model.display()));
     }
+    if arguments.draws > 0 {
+        line.push_str(&format!(" --draws {}", arguments.draws));
+    }
     line
+}
+
+/// A model to start from, the noise floor, and what was traced.
+struct Traced {
+    start: Model,
+    floor: Vec<f64>,
+    tracing: Tracing,
+}
+
+/// Identifies the declared model on `data` (or takes the held one), and traces its residual.
+fn traced(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Result<Traced, Error> {
+    let start = start(arguments, session, data)?;
+    let floor = noise_floor(session, data, &start.model)?;
+    let conditioning = session.logs.conditioning();
+    let plan = conditioning.plan(&session.logs.surveys()[0])?;
+    let input = TraceInput {
+        tree: &session.tree,
+        catalogue: &session.catalogue,
+        data,
+        ranges: SignalRanges::of_surveys(session.logs.training()),
+        declared: start.specs,
+        parameters: start.parameters,
+        residual_std: start.model.residual_std.clone(),
+        held: start.held,
+        noise_floor: floor.clone(),
+        rows_per_independent: (plan.output_rate_hz() / (2.0 * conditioning.parallel_cutoff_hz)).max(1.0),
+    };
+    let tracing = trace(input, &TraceOptions::default())?;
+    Ok(Traced { start: start.model, floor, tracing })
+}
+
+fn draws_in_words(draws: &DrawsJson) -> String {
+    let each = |named: &NamedInDrawsJson| {
+        format!("{} of {} {}", named.kind.replace('_', " "), named.joints.join(", "), named.draws)
+    };
+    let named: Vec<String> = draws.named.iter().map(each).collect();
+    let named = if named.is_empty() { "nothing".to_owned() } else { named.join("; ") };
+    format!("Named on {} bootstrap draws of the training motion: {named}.", draws.count)
 }
 
 fn start(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Result<Start, Error> {
@@ -203,9 +237,9 @@ fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
 }
 
 /// The answer in sentences.
-fn story(analysis: &Analysis<'_>, tracing: &Tracing) -> String {
+fn story(analysis: &Analysis<'_>, tracing: &Tracing, in_draws: Option<String>) -> String {
     let mut text = String::new();
-    for line in explain_page::headline(analysis, tracing) {
+    for line in explain_page::headline(analysis, tracing).into_iter().chain(in_draws) {
         // Writing to a string does not fail.
         let _ = writeln!(text, "{line}");
     }

@@ -59,9 +59,9 @@ pub fn outputs(analysis: &Analysis<'_>, report: &ReportJson, page: String) -> Re
     let json = |file| move |source| Error::Json { file, source };
     let model = serde_json::to_string_pretty(&analysis.model).map_err(json("model.json"))?;
     Ok(vec![
-        OutputFile { name: "model.json", text: model + "\n" },
-        OutputFile { name: "report.json", text: report.to_json().map_err(json("report.json"))? },
-        OutputFile { name: "report.html", text: page },
-        OutputFile { name: "identified.urdf", text: identified_urdf(analysis)? },
+        OutputFile { name: "model.json".to_owned(), text: model + "\n" },
+        OutputFile { name: "report.json".to_owned(), text: report.to_json().map_err(json("report.json"))? },
+        OutputFile { name: "report.html".to_owned(), text: page },
+        OutputFile { name: "identified.urdf".to_owned(), text: identified_urdf(analysis)? },
     ])
 }

@@ -1,7 +1,7 @@
 //! The command `phiw`.
 
 use clap::Parser;
-use phiw::arguments::{Arguments, Command, RetargetArguments};
+use phiw::arguments::{Arguments, Command, NextArguments, RetargetArguments};
 use phiw::console::Console;
 use std::io::Write;
 use std::process::ExitCode;
@@ -17,6 +17,7 @@ fn main() -> ExitCode {
             phiw::explain::explain(explain, &Console::of_terminal(explain.session.quiet))
         }
         Command::Retarget(arguments) => return retarget(arguments),
+        Command::Next(arguments) => return next(arguments),
     };
     match outcome {
         Ok(outcome) => {
@@ -43,6 +44,23 @@ fn retarget(arguments: &RetargetArguments) -> ExitCode {
             }
             outcome.failures.iter().for_each(|failure| eprintln!("failed: {}", failure.reason));
             ExitCode::from(u8::from(!outcome.failures.is_empty()))
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_status())
+        }
+    }
+}
+
+/// Chooses the next motion.
+fn next(arguments: &NextArguments) -> ExitCode {
+    match phiw::next::next(arguments, &Console::of_terminal(arguments.quiet)) {
+        Ok(outcome) => {
+            if !arguments.quiet {
+                outcome.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+                let _ = std::io::stdout().write_all(outcome.summary.as_bytes());
+            }
+            ExitCode::SUCCESS
         }
         Err(error) => {
             eprintln!("error: {error}");

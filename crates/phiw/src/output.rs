@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// A file of the result folder.
 pub struct OutputFile {
     /// Its name.
-    pub name: &'static str,
+    pub name: String,
     /// Its content.
     pub text: String,
 }
@@ -21,6 +21,17 @@ pub fn check_folder(folder: &Path) -> Result<(), Error> {
         Some(file) if !file.is_dir() => Err(Error::OutIsFile { out: folder.into(), file: file.into() }),
         _ => Ok(()),
     }
+}
+
+/// Finds out early whether a file can be there: it is no folder, and no folder above it is a file.
+///
+/// # Errors
+/// [`Error::OutIsFolder`], [`Error::OutIsFile`].
+pub fn check_file(file: &Path) -> Result<(), Error> {
+    if file.is_dir() || file.file_name().is_none() {
+        return Err(Error::OutIsFolder { out: file.into() });
+    }
+    file.parent().map_or(Ok(()), check_folder)
 }
 
 /// Writes the files under other names, then renames them: whoever looks sees the old file or the new one, whole.
@@ -40,7 +51,7 @@ pub fn write_folder(folder: &Path, files: &[OutputFile]) -> Result<(), Error> {
         std::fs::write(&path, &file.text).map_err(unwritable(&path))?;
     }
     for (path, file) in partial.0.iter().zip(files) {
-        let target = folder.join(file.name);
+        let target = folder.join(&file.name);
         std::fs::rename(path, &target).map_err(unwritable(&target))?;
     }
     partial.0.clear();
@@ -78,7 +89,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         // A folder where the second file should go: it cannot be replaced by a file.
         std::fs::create_dir_all(folder.path().join("b/full")).unwrap();
-        let file = |name| OutputFile { name, text: "new".into() };
+        let file = |name: &str| OutputFile { name: name.to_owned(), text: "new".into() };
         assert!(write_folder(folder.path(), &[file("b"), file("c")]).is_err());
         assert_eq!(names(folder.path()), ["b"]);
         write_folder(folder.path(), &[file("a"), file("c")]).unwrap();
@@ -94,5 +105,9 @@ mod tests {
         assert!(check_folder(&file.join("below")).is_err());
         assert!(check_folder(&folder.path().join("new/newer")).is_ok());
         assert!(check_folder(Path::new("relative-and-new")).is_ok());
+        assert!(check_file(&file).is_ok());
+        assert!(check_file(&file.join("below")).is_err());
+        assert!(check_file(folder.path()).is_err());
+        assert!(check_file(Path::new("relative-and-new")).is_ok());
     }
 }

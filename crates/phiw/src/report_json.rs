@@ -55,6 +55,7 @@ pub fn program(analysis: &Analysis<'_>) -> ProgramJson {
         }),
         evidence: Vec::new(),
         cannot_be_told: Vec::new(),
+        draws: None,
     }
 }
 

@@ -9,7 +9,7 @@ use crate::Error;
 use crate::arguments::RetargetArguments;
 use crate::console::Console;
 use crate::output::check_folder;
-use phiw_bspline_retarget::human::MarkerMap;
+use phiw_bspline_retarget::human::{MapError, MarkerMap};
 use phiw_bspline_retarget::{MarkerRecording, RetargetOptions, Retargeter, read_recording};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use std::collections::BTreeMap;
@@ -35,7 +35,8 @@ pub fn retarget(arguments: &RetargetArguments, console: &Console) -> Result<Reta
         Some(path) => {
             MarkerMap::from_toml(&text(path)?).map_err(|source| Error::Map { path: path.clone(), source })?
         }
-        None => default_map(&arguments.c3d),
+        None => default_map(&arguments.c3d)
+            .map_err(|source| Error::Map { path: PathBuf::from("the built-in map"), source })?,
     };
     let mut options = RetargetOptions {
         interval_s: arguments.interval,
@@ -62,12 +63,11 @@ fn check_names(files: &[PathBuf]) -> Result<(), Error> {
 }
 
 /// The built-in map that names most markers of the first recording that can be read.
-fn default_map(files: &[PathBuf]) -> MarkerMap {
-    let known = [MarkerMap::ue_adl(), MarkerMap::embedded()];
+fn default_map(files: &[PathBuf]) -> Result<MarkerMap, MapError> {
+    let (seated, embedded) = (MarkerMap::ue_adl()?, MarkerMap::embedded()?);
     let recording = files.iter().find_map(|file| read_recording(file, Some("m")).ok());
     let share = |map: &MarkerMap| recording.as_ref().map_or(0.0, |recording| share_named(map, recording));
-    let [seated, embedded] = known;
-    if share(&embedded) > share(&seated) { embedded } else { seated }
+    Ok(if share(&embedded) > share(&seated) { embedded } else { seated })
 }
 
 /// Share of a map's markers that a recording has.

@@ -4,7 +4,9 @@ use crate::Error;
 use crate::arguments::SessionArguments;
 use phiw_dynamics::urdf::{Finding, UrdfOptions, read_urdf};
 use phiw_dynamics::{JointType, Tree};
-use phiw_identification::{BlockSource, Data, EffectError, LogFile, LogSet, Progress, Variants};
+use phiw_identification::{
+    BlockSource, Data, EffectError, LogFile, LogSet, Progress, Variants, check_excitation,
+};
 use phiw_residual::{Catalogue, SignalRanges};
 use phiw_telemetry::ConditioningOptions;
 
@@ -32,6 +34,16 @@ impl Session {
     /// # Errors
     /// An input is wrong: robot, effect, or log.
     pub fn open(arguments: &SessionArguments, progress: Progress<'_>) -> Result<Self, Error> {
+        let session = Self::open_unexcited(arguments, progress)?;
+        check_excitation(&session.tree, session.logs.training())?;
+        Ok(session)
+    }
+
+    /// [`Session::open`] where joints may stand still in all logs.
+    ///
+    /// # Errors
+    /// An input is wrong: robot, effect, or log.
+    pub fn open_unexcited(arguments: &SessionArguments, progress: Progress<'_>) -> Result<Self, Error> {
         let catalogue = Catalogue::default();
         let declared = declared(&arguments.declare, &catalogue)?;
         let (tree, xml, findings) = read_robot(arguments)?;
@@ -40,7 +52,7 @@ impl Session {
             parallel_cutoff_hz: arguments.parallel_cutoff_hz,
             ..ConditioningOptions::default()
         };
-        let logs = LogSet::open(&tree, &arguments.train, &arguments.validate, &options, progress)?;
+        let logs = LogSet::open_unexcited(&tree, &arguments.train, &arguments.validate, &options, progress)?;
         Ok(Session { tree, xml, findings, declared, catalogue, logs, arguments: arguments.clone() })
     }
 
@@ -71,7 +83,7 @@ impl Session {
 }
 
 /// Each declared kind once, if all are known.
-fn declared(names: &[String], catalogue: &Catalogue) -> Result<Vec<String>, EffectError> {
+pub(crate) fn declared(names: &[String], catalogue: &Catalogue) -> Result<Vec<String>, EffectError> {
     let mut declared: Vec<String> = Vec::new();
     for name in names.iter().map(|name| name.trim()).filter(|name| !name.is_empty() && *name != "rigid_body")
     {
@@ -85,7 +97,8 @@ fn declared(names: &[String], catalogue: &Catalogue) -> Result<Vec<String>, Effe
     Ok(declared)
 }
 
-fn read_robot(arguments: &SessionArguments) -> Result<(Tree, String, Vec<Finding>), Error> {
+/// The robot on its fixed base, the URDF's text, and what in it should not be trusted.
+pub(crate) fn read_robot(arguments: &SessionArguments) -> Result<(Tree, String, Vec<Finding>), Error> {
     let path = || arguments.urdf.clone();
     let xml = std::fs::read_to_string(&arguments.urdf)
         .map_err(|source| Error::Unreadable { path: path(), source })?;

@@ -101,7 +101,7 @@ fn closing(
     if !not_expressed.is_empty() {
         writeln!(text, "identified.urdf cannot express {}: model.json has all", not_expressed.join(", "))?;
     }
-    let names: Vec<&str> = files.iter().map(|file| file.name).collect();
+    let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
     writeln!(text, "{} in {}", names.join(", "), folder.display())
 }
 

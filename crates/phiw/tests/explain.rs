@@ -39,6 +39,8 @@ impl Scene {
         phiw.args(["--declare", "viscous_friction"]).arg("--out").arg(self.path(out));
         if let [model] = more {
             phiw.arg("--model").arg(model);
+        } else {
+            phiw.args(more);
         }
         String::from_utf8(phiw.assert().success().get_output().stdout.clone()).unwrap()
     }
@@ -99,6 +101,23 @@ fn a_missing_friction_is_named_and_the_model_with_it_is_the_next_declared_model(
     scene.run("explain", "again", &[&model]);
     let again = scene.report("again");
     assert_eq!((again.verdict, again.effects.len()), (Some(Verdict::Sufficient), 0));
+}
+
+#[test]
+fn bootstrap_draws_say_how_often_an_effect_is_named() {
+    let scene = Scene::new(|_, qd, torque| torque[1] += 2.0 * (qd[1] / 0.005).tanh());
+    let printed = scene.run("explain", "out", &[Path::new("--draws"), Path::new("3")]);
+    let report = scene.report("out");
+    let draws =
+        report.phiw.as_ref().and_then(|program| program.draws.as_ref()).expect("draws were asked for");
+    assert_eq!(draws.count, 3);
+    let first = &draws.named[0];
+    assert_eq!(
+        (first.kind.as_str(), first.joints[0].as_str(), first.draws),
+        ("coulomb_friction", "joint_2", 3)
+    );
+    assert_eq!(report.phiw.as_ref().map(|program| program.evidence[0].stability), Some(1.0));
+    assert!(printed.contains("Named on 3 bootstrap draws"), "{printed}");
 }
 
 #[test]

@@ -11,7 +11,7 @@ const MOTIONS: usize = 3;
 /// A folder with a robot and some of the embedded motions, cut short.
 fn scene() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    for (number, mut motion) in embedded_motions(5).step_by(40).take(MOTIONS).enumerate() {
+    for (number, mut motion) in embedded_motions(5).unwrap().step_by(40).take(MOTIONS).enumerate() {
         let markers = motion.recording.labels.len();
         motion.recording.positions_m.truncate(120 * markers);
         std::fs::write(folder.path().join(format!("m{number}.c3d")), motion.to_c3d()).unwrap();

@@ -57,7 +57,12 @@ pub enum SupportError {
 /// # Errors
 /// The text is not of this form, a link is not there, or a sole has fewer than three corners, is not flat or has no area.
 pub fn feet_from_toml(text: &str, tree: &Tree) -> Result<Vec<Foot>, SupportError> {
-    let file: SupportFile = toml::from_str(text).map_err(|error| SupportError::Syntax(error.to_string()))?;
+    let syntax = |error: toml::de::Error| {
+        let before = error.span().map_or("", |span| text.get(..span.start).unwrap_or_default());
+        let line = 1 + before.matches('\n').count();
+        SupportError::Syntax(format!("line {line}: {}", error.message()))
+    };
+    let file: SupportFile = toml::from_str(text).map_err(syntax)?;
     file.foot
         .into_iter()
         .map(|FootEntry { link, sole }| {

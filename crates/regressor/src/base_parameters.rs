@@ -168,20 +168,70 @@ impl BaseParameters {
     pub fn to_standard(&self, base: &[f64], reference: &[f64]) -> Result<Vec<f64>, RegressorError> {
         check_size("base parameters", base.len(), self.count())?;
         let held = self.from_standard(reference)?;
-        let weights = parameter_scales(reference);
-        let weighted = Mat::from_fn(self.count(), self.standard_size, |row, column| {
-            self.map[(row, column)] * weights[column] * weights[column]
-        });
+        let weighted = self.weighted(reference);
         let gram = &weighted * self.map.transpose();
         let missing = Mat::from_fn(self.count(), 1, |row, _| base[row] - held[row]);
         let multipliers = gram.full_piv_lu().solve(&missing);
         let change = weighted.transpose() * multipliers;
         Ok(reference.iter().enumerate().map(|(column, value)| value + change[(column, 0)]).collect())
     }
+
+    /// The gradient with respect to the base parameters of something whose gradient with respect to the standard ones is `gradient`, where these
+    /// follow the base parameters as in [`Self::to_standard`].
+    ///
+    /// # Errors
+    /// A slice has the wrong length.
+    pub fn gradient_of_base(&self, gradient: &[f64], reference: &[f64]) -> Result<Vec<f64>, RegressorError> {
+        check_size("the gradient", gradient.len(), self.standard_size)?;
+        check_size("standard parameters", reference.len(), self.standard_size)?;
+        let weighted = self.weighted(reference);
+        let gram = &weighted * self.map.transpose();
+        let gradient = Mat::from_fn(self.standard_size, 1, |row, _| gradient[row]);
+        let solution = gram.full_piv_lu().solve(&weighted * gradient);
+        Ok((0..self.count()).map(|row| solution[(row, 0)]).collect())
+    }
+
+    /// A belief about the standard parameters, as rows for a factor: each is `reference`, give or take `share` of [`parameter_scales`].
+    ///
+    /// Rows of \[Φ f\] with unit variance, row by row: `count` rows of `count` + 1 numbers. They hold all that this belief says of the base parameters;
+    /// once these are found, [`Self::to_standard`] gives the standard parameters that are then the likeliest.
+    ///
+    /// # Errors
+    /// `reference` has the wrong length.
+    pub fn prior_rows(&self, reference: &[f64], share: f64) -> Result<Vec<f64>, RegressorError> {
+        let mean = self.from_standard(reference)?;
+        let (count, scales) = (self.count(), parameter_scales(reference));
+        // Their covariance is map · scales² · mapᵀ = RᵀR, and R⁻ᵀ w has unit variance.
+        let spread = Mat::from_fn(self.standard_size, count, |standard, base| {
+            share * scales[standard] * self.map[(base, standard)]
+        });
+        let mut inverse = Mat::<f64>::identity(count, count);
+        let qr = spread.qr();
+        faer::linalg::triangular_solve::solve_upper_triangular_in_place(
+            qr.thin_R(),
+            inverse.as_mut(),
+            faer::Par::Seq,
+        );
+        let mut rows = Vec::with_capacity(count * (count + 1));
+        for row in 0..count {
+            let entries = (0..count).map(|column| inverse[(column, row)]);
+            rows.extend(entries.clone());
+            rows.push(entries.zip(&mean).map(|(entry, mean)| entry * mean).sum());
+        }
+        Ok(rows)
+    }
+
+    /// The map with each column times the square of its parameter's magnitude in `reference`.
+    fn weighted(&self, reference: &[f64]) -> Mat<f64> {
+        let weights = parameter_scales(reference);
+        Mat::from_fn(self.count(), self.standard_size, |row, column| {
+            self.map[(row, column)] * weights[column] * weights[column]
+        })
+    }
 }
 
-/// A typical magnitude for each standard parameter: from the body's own mass and size where it has them.
-fn parameter_scales(standard: &[f64]) -> Vec<f64> {
+/// A typical magnitude for each standard parameter, ten for each body: its mass, and that mass 0.2 m away.
+pub fn parameter_scales(standard: &[f64]) -> Vec<f64> {
     let bodies = standard.len() / PARAMETERS_PER_BODY;
     let total: f64 = standard.chunks_exact(PARAMETERS_PER_BODY).map(|body| body[0].abs()).sum();
     let mean_mass = if total > 0.0 { total / bodies.max(1) as f64 } else { 1.0 };

@@ -4,7 +4,7 @@ use phiw_dynamics::random_tree::{RandomNumbers, RandomState, RandomTreeOptions, 
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
 use phiw_dynamics::{Lanes, Tree, Workspace};
 use phiw_regressor::factor::FactorBuilder;
-use phiw_regressor::{BaseParameters, BaseParametersOptions, JointTorqueRegressor};
+use phiw_regressor::{BaseParameters, BaseParametersOptions, JointTorqueRegressor, parameter_scales};
 use proptest::prelude::*;
 use std::path::PathBuf;
 
@@ -79,8 +79,9 @@ proptest! {
     fn base_parameters_say_all_that_standard_ones_say((tree, state, _) in trees()) {
         let base = BaseParameters::of_tree(&tree, BaseParametersOptions::default()).unwrap();
         // Joints that follow one coordinate at different ratios are analytic functions of it, whose independence fades
-        // without a gap.
+        // without a gap: what is left of them then has few digits.
         prop_assert!(tree.has_mimic() || base.rank_gap() > 1e3, "rank gap {}", base.rank_gap());
+        prop_assume!(base.rank_gap() > 1e3);
         let standard = tree.inertial_parameters();
         let parameters = base.from_standard(&standard).unwrap();
         let phi = dense_regressor(&tree, &state);
@@ -94,11 +95,47 @@ proptest! {
         let lifted = base.to_standard(&changed, &standard).unwrap();
         assert_relative(&base.from_standard(&lifted).unwrap(), &changed, 1e-9);
         assert_relative(&base.to_standard(&parameters, &standard).unwrap(), &standard, 1e-9);
+
+        // A gradient follows: what the standard parameters change by, times theirs, is what the base parameters change by, times its own.
+        let gradient: Vec<f64> = (0..standard.len()).map(|index| (1.0 + index as f64).sin()).collect();
+        let dot = |left: &[f64], right: &[f64]| left.iter().zip(right).map(|(a, b)| a * b).sum::<f64>();
+        let moved: Vec<f64> = lifted.iter().zip(&standard).map(|(new, old)| new - old).collect();
+        let step: Vec<f64> = changed.iter().zip(&parameters).map(|(new, old)| new - old).collect();
+        let pulled = base.gradient_of_base(&gradient, &standard).unwrap();
+        assert_relative(&[dot(&pulled, &step)], &[dot(&gradient, &moved)], 1e-7);
+    }
+
+    /// A belief about standard parameters says of the base parameters what many draws of the standard ones say: the rows have mean zero and unit
+    /// variance, independent of each other.
+    #[test]
+    fn prior_rows_have_unit_variance((tree, _, _) in trees(), share in 0.05..1.0) {
+        prop_assume!(!tree.has_mimic());
+        let base = BaseParameters::of_tree(&tree, BaseParametersOptions::default()).unwrap();
+        let reference = tree.inertial_parameters();
+        let rows = base.prior_rows(&reference, share).unwrap();
+        let scales = parameter_scales(&reference);
+        // The covariance of the rows, by pushing each standard parameter's own deviation through.
+        let mut covariance = vec![0.0; base.count() * base.count()];
+        for (standard, scale) in scales.iter().enumerate() {
+            let mut moved = reference.clone();
+            moved[standard] += share * scale;
+            let w = base.from_standard(&moved).unwrap();
+            let deviation: Vec<f64> = rows.chunks_exact(base.count() + 1)
+                .map(|row| row[..base.count()].iter().zip(&w).map(|(a, b)| a * b).sum::<f64>() - row[base.count()]).collect();
+            for (row, a) in deviation.iter().enumerate() {
+                for (column, b) in deviation.iter().enumerate() {
+                    covariance[row * base.count() + column] += a * b;
+                }
+            }
+        }
+        let identity: Vec<f64> = (0..covariance.len()).map(|k| f64::from(u8::from(k % (base.count() + 1) == 0))).collect();
+        assert_relative(&covariance, &identity, 1e-6);
     }
 
     #[test]
     fn condition_number_is_that_of_the_svd_of_phi((tree, _, _) in trees(), seed in any::<u64>()) {
         let base = BaseParameters::of_tree(&tree, BaseParametersOptions::default()).unwrap();
+        prop_assume!(base.rank_gap() > 1e3);
         let columns = base.count();
         let mut random = RandomNumbers::new(seed);
         let mut rows = Vec::new();

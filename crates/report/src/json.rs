@@ -153,6 +153,29 @@ pub struct ProgramJson {
     /// What cannot be told from these logs, and which motion would tell.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cannot_be_told: Vec<CannotBeToldJson>,
+    /// What bootstrap draws of the training motion named, if they were asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub draws: Option<DrawsJson>,
+}
+
+/// What bootstrap draws of the training motion named.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct DrawsJson {
+    /// How many draws there were.
+    pub count: usize,
+    /// Every effect that was named on any, the most frequent first.
+    pub named: Vec<NamedInDrawsJson>,
+}
+
+/// How often an effect was named.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct NamedInDrawsJson {
+    /// Its name in the catalogue.
+    pub kind: String,
+    /// The joints that it acts on.
+    pub joints: Vec<String>,
+    /// Number of draws on which it was named.
+    pub draws: usize,
 }
 
 /// How sure an effect is.

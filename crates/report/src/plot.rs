@@ -10,10 +10,12 @@ mod canvas;
 mod decimation;
 mod iterations;
 mod joint_bars;
+mod motion_map;
 mod palette;
 mod panel;
 mod residual_against_signal;
 mod spectrum;
+mod support_map;
 mod svg_backend;
 mod time_series;
 
@@ -22,8 +24,10 @@ pub use canvas::Svg;
 pub use decimation::{Decimator, LINE_POINTS, Polyline, decimate};
 pub use iterations::{IterationLine, Iterations, iterations};
 pub use joint_bars::{BarGroup, JointBars, joint_bars};
+pub use motion_map::{MapRow, MotionMap, motion_map};
 pub use residual_against_signal::{ResidualAgainstSignal, residual_against_signal};
 pub use spectrum::{Spectrum, SpectrumLine, spectrum};
+pub use support_map::{SupportMap, support_map};
 pub use time_series::{ResidualPanel, TorquePanel, residual_panel, torque_panel};
 
 pub(crate) use palette::css as palette_css;

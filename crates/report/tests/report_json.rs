@@ -97,6 +97,14 @@ fn additions_of_the_program_come_last() {
             joints: vec![vec!["joint_1".into(), "joint_2".into()]],
             telling_motion: "one joint alone".into(),
         }],
+        draws: Some(DrawsJson {
+            count: 10,
+            named: vec![NamedInDrawsJson {
+                kind: "torque_offset".into(),
+                joints: vec!["joint_1".into()],
+                draws: 9,
+            }],
+        }),
     });
     let text = report.to_json().unwrap();
     assert!(text.find("\"phiw\"") > text.find("\"remaining\""));

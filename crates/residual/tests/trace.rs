@@ -275,3 +275,26 @@ fn what_the_logs_cannot_tell_is_listed() {
         tracing.remaining.silent.iter().map(|spec| (spec.kind.as_str(), spec.joints.as_slice())).collect();
     assert!(silent.contains(&("rotor_inertia", &["shoulder".to_owned()])), "{silent:?}");
 }
+
+/// A gain scales all of the torque, friction included. Beside a held model nothing else can take up the friction's part, which was once named a friction of its own.
+#[test]
+fn a_gain_scales_the_held_friction_too() {
+    let gain = |_: &State<'_>, torque: &mut [f64]| torque[1] *= 1.15;
+    let tracing = traced_on(folds().0, &DECLARED, 11, &gain, true);
+    assert_eq!(named(&tracing), [("torque_gain".to_owned(), vec!["elbow".to_owned()])]);
+}
+
+/// What swings once a second has no correlation over a quarter of a second, and is no noise for that.
+#[test]
+fn a_residual_that_swings_once_a_second_has_structure() {
+    let one_hertz = |state: &State<'_>, torque: &mut [f64]| {
+        torque[1] += 0.15 * (std::f64::consts::TAU * state.t).sin();
+    };
+    let tracing = traced(11, &one_hertz);
+    assert!(
+        matches!(tracing.verdict, Verdict::Unexplained | Verdict::PartlyExplained),
+        "{:?} {:?}",
+        tracing.verdict,
+        named(&tracing)
+    );
+}

@@ -62,6 +62,34 @@ pub struct Signals<'a> {
 }
 
 impl Block {
+    /// Samples as they are, all of them outputs and none filtered: for signals that need no conditioning, such as those of a planned
+    /// motion or of a simulator.
+    ///
+    /// `signals` are positions, velocities and accelerations, row-major `[sample × joints]`; `tau` likewise, or empty.
+    pub fn unfiltered(joints: usize, t: Vec<f64>, signals: [Vec<f64>; 3], tau: Vec<f64>) -> Self {
+        let [q, qd, qdd] = signals;
+        let period = match t.as_slice() {
+            [first, .., last] => (last - first) / (t.len() - 1) as f64,
+            _ => 1.0,
+        };
+        Block {
+            log: 0,
+            segment: 0,
+            session_offset: 0.0,
+            joints,
+            outputs: (0..t.len()).collect(),
+            t,
+            q,
+            qd,
+            qdd,
+            tau,
+            temp: None,
+            motion_bandwidth_hz: 0.1 / period,
+            warm_up: 0,
+            filter: Arc::new(ParallelFilter::identity()),
+        }
+    }
+
     /// Samples in the block.
     pub fn len(&self) -> usize {
         self.t.len()

@@ -41,6 +41,11 @@ impl ParallelFilter {
         ParallelFilter { half_length, decimation, taps, sums }
     }
 
+    /// The filter that leaves everything as it is.
+    pub(crate) fn identity() -> Self {
+        ParallelFilter { half_length: 0, decimation: 1, taps: vec![1.0], sums: vec![0.0, 1.0] }
+    }
+
     /// Samples on one side of the middle one.
     pub fn half_length(&self) -> usize {
         self.half_length
@@ -54,6 +59,12 @@ impl ParallelFilter {
     /// Taps at offsets −half…half.
     pub fn taps(&self) -> &[f64] {
         &self.taps
+    }
+
+    /// Autocorrelation that white noise has after the filter, `lag` samples apart.
+    pub fn noise_autocorrelation(&self, lag: usize) -> f64 {
+        let product: f64 = self.taps.iter().zip(self.taps.iter().skip(lag)).map(|(a, b)| a * b).sum();
+        product / self.taps.iter().map(|tap| tap * tap).sum::<f64>()
     }
 
     /// Filters rows of `width` values. `range` are the samples at hand, `outputs` the samples to put out,

@@ -29,7 +29,7 @@ struct Facts {
 ///
 /// # Errors
 /// A recording cannot be read, made or retargeted.
-pub fn measure(scene: &Scene, seed: u64, out: &Path, page: &mut Page) -> anyhow::Result<()> {
+pub(super) fn measure(scene: &Scene, seed: u64, out: &Path, page: &mut Page) -> anyhow::Result<()> {
     page.heading("Databases");
     let folder = tempfile::tempdir()?;
     let mut sets: Vec<(&str, Vec<PathBuf>, bool)> = Vec::new();
@@ -102,10 +102,13 @@ pub fn measure(scene: &Scene, seed: u64, out: &Path, page: &mut Page) -> anyhow:
 }
 
 /// The embedded motions as C3D files.
-fn embedded(seed: u64, folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+///
+/// # Errors
+/// One cannot be written.
+pub fn embedded(seed: u64, folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let folder = folder.join("embedded");
     std::fs::create_dir_all(&folder)?;
-    embedded_motions(seed)
+    embedded_motions(seed)?
         .map(|motion| {
             let file = folder.join(format!("{}.c3d", motion.name));
             std::fs::write(&file, motion.to_c3d())?;
@@ -115,7 +118,10 @@ fn embedded(seed: u64, folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
 }
 
 /// Each left trial played with the right trial of the same subject and task, as C3D files beside the static trials.
-fn two_handed(seated: &Path, folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+///
+/// # Errors
+/// A recording cannot be read or written.
+pub fn two_handed(seated: &Path, folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let folder = folder.join("two_handed");
     std::fs::create_dir_all(&folder)?;
     let mut files = Vec::new();
@@ -161,7 +167,11 @@ fn read_facts(folder: &Path) -> anyhow::Result<Vec<Facts>> {
     Ok(facts)
 }
 
-fn c3d_files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+/// The C3D files of a folder, sorted.
+///
+/// # Errors
+/// The folder cannot be read.
+pub fn c3d_files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in folder.read_dir().with_context(|| folder.display().to_string())? {
         let path = entry?.path();

@@ -3,9 +3,33 @@
 use super::load::Loads;
 use super::plant::{States, rigid_torque};
 use super::trajectory::Motion;
+use phiw_dynamics::{Tree, Workspace};
+use std::f64::consts::TAU;
 
 /// Step of the central differences that turn the link's torque into the spring's rates \[s\].
 const STEP: f64 = 1e-3;
+/// Lowest resonance of a joint on its spring with the motor held \[Hz\]: twice the highest frequency of the motions. Nobody can move a robot as these logs say
+/// it moved once the motion's band holds the resonance.
+const LOWEST_RESONANCE: f64 = 3.0;
+/// Samples from one look at the inertia to the next.
+const STRIDE: usize = 20;
+
+/// The greatest compliance with which the joint's resonance stays above the motions' band, whatever the pose \[rad/(N·m), m/N\].
+pub fn softest(tree: &Tree, motions: &[Motion], times: &[Vec<f64>], joint: usize) -> f64 {
+    let joints = tree.joint_count();
+    let mut workspace = Workspace::new(tree);
+    let mut matrix = vec![0.0; joints * joints];
+    let mut inertia = 0.0_f64;
+    for (motion, times) in motions.iter().zip(times) {
+        for &time in times.iter().step_by(STRIDE) {
+            let pose: Vec<f64> = (0..joints).map(|joint| motion.state(joint, time)[0]).collect();
+            if tree.mass_matrix(&pose, &mut workspace, &mut matrix).is_ok() {
+                inertia = inertia.max(matrix[joint * joints + joint]);
+            }
+        }
+    }
+    1.0 / (inertia * (TAU * LOWEST_RESONANCE).powi(2))
+}
 
 /// Replaces the state of the joint by its motor's: θ = q + compliance·τ of the link, and its derivatives.
 ///

@@ -1,5 +1,6 @@
 //! A secret: one undeclared effect with its form, its joints and its size.
 
+use super::elasticity::softest;
 use super::friction::Friction;
 use super::kind::Name;
 use super::load::{HeldBody, WorldForce};
@@ -67,6 +68,7 @@ impl Form {
             Form::Tilt { .. } => [0.005, 0.35],
             Form::Gain => [0.02, 0.4],
             Form::Payload(_) | Form::LoadStep { .. } => [1e-3, 30.0],
+            // Its softest depends on what it carries: see [`super::elasticity::softest`].
             Form::Elasticity => [1e-7, 0.2],
             _ => [1e-9, 1e9],
         }
@@ -121,7 +123,10 @@ impl Secret {
         motions: &[Motion],
         times: &[Vec<f64>],
     ) -> f64 {
-        let [lowest, highest] = self.form.bounds();
+        let [lowest, mut highest] = self.form.bounds();
+        if let (Form::Elasticity, [joint]) = (&self.form, self.joints.as_slice()) {
+            highest = highest.min(softest(tree, motions, times, *joint));
+        }
         let sign = self.scale.signum();
         let mut magnitude = self.scale.abs().clamp(lowest, highest);
         // Almost all sizes grow in proportion to the scale, the others still with it: a damped fixed point finds them.

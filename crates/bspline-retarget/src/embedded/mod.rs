@@ -9,7 +9,7 @@ mod task;
 pub use task::{TASKS, Task};
 
 use crate::c3d::{C3dFormat, write_c3d};
-use crate::human::{HumanBody, MarkerMap, SEGMENT_PARAMETERS};
+use crate::human::{HumanBody, MapError, MarkerMap, SEGMENT_PARAMETERS};
 use crate::recording::MarkerRecording;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -57,16 +57,43 @@ impl EmbeddedMotion {
 }
 
 /// All motions of Table 1, 110 of them, the same for the same seed.
-pub fn embedded_motions(seed: u64) -> impl Iterator<Item = EmbeddedMotion> {
+///
+/// # Errors
+/// None, as long as the embedded map fits itself, which is tested; as [`MarkerMap::embedded`] otherwise.
+pub fn embedded_motions(seed: u64) -> Result<impl Iterator<Item = EmbeddedMotion>, MapError> {
+    let model = Model::new()?;
     let numbered = TASKS.iter().flat_map(|task| (0..task.count).map(move |number| (task, number)));
-    numbered.enumerate().map(move |(index, (task, number))| {
+    Ok(numbered.enumerate().map(move |(index, (task, number))| {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(index as u64 + 1);
-        motion(task, number, &mut random)
-    })
+        motion(&model, task, number, &mut random)
+    }))
 }
 
-fn motion(task: &'static Task, number: usize, random: &mut ChaCha8Rng) -> EmbeddedMotion {
+/// The human model of the embedded map, and its markers' labels.
+struct Model {
+    body: HumanBody,
+    labels: Vec<String>,
+}
+
+impl Model {
+    fn new() -> Result<Self, MapError> {
+        let map = MarkerMap::embedded()?;
+        let labels: Vec<String> = map
+            .segments
+            .values()
+            .flat_map(|segment| segment.at.keys().chain(segment.at_end.keys()))
+            .cloned()
+            .collect();
+        // A body is made for a recording: one that shows every marker.
+        let positions_m = vec![[0.0; 3]; labels.len()];
+        let recording = MarkerRecording { rate_hz: RATE_HZ, labels: labels.clone(), positions_m };
+        let body = HumanBody::new(&map, &recording, &BTreeMap::new(), None, false, 0)?;
+        Ok(Model { body, labels })
+    }
+}
+
+fn motion(model: &Model, task: &'static Task, number: usize, random: &mut ChaCha8Rng) -> EmbeddedMotion {
     // The shortest and the longest of a task are as Table 1 says.
     let share = match number {
         0 => 0.0,
@@ -75,7 +102,9 @@ fn motion(task: &'static Task, number: usize, random: &mut ChaCha8Rng) -> Embedd
     };
     let duration_s = task.shortest_s + share * (task.longest_s - task.shortest_s);
     let frames = (duration_s * RATE_HZ).round() as usize + 1;
-    let (body, mut recording) = body(frames);
+    let Model { body, labels } = model;
+    let positions_m = vec![[0.0; 3]; frames * labels.len()];
+    let mut recording = MarkerRecording { rate_hz: RATE_HZ, labels: labels.clone(), positions_m };
     let size = 1.0 + SIZE_SPREAD * normal(random);
     let lengths_m: Vec<f64> = SEGMENT_PARAMETERS
         .iter()
@@ -121,23 +150,6 @@ fn motion(task: &'static Task, number: usize, random: &mut ChaCha8Rng) -> Embedd
         coordinates,
         lengths_m,
     }
-}
-
-/// The human model of the embedded map, and an empty recording for it.
-fn body(frames: usize) -> (HumanBody, MarkerRecording) {
-    let map = MarkerMap::embedded();
-    let labels: Vec<String> = map
-        .segments
-        .values()
-        .flat_map(|segment| segment.at.keys().chain(segment.at_end.keys()))
-        .cloned()
-        .collect();
-    let positions_m = vec![[0.0; 3]; frames * labels.len()];
-    let recording = MarkerRecording { rate_hz: RATE_HZ, labels, positions_m };
-    // The map names the labels of this very recording.
-    let body = HumanBody::new(&map, &recording, &BTreeMap::new(), None, false, 0)
-        .unwrap_or_else(|error| unreachable!("the embedded map does not fit itself: {error}"));
-    (body, recording)
 }
 
 /// Hides markers for a while.

@@ -1,8 +1,8 @@
 //! A person with markers: the skeleton's coordinates, its lengths, and the markers of one recording.
 
-use super::kinematics::{Kinematics, Node, NodeMotion, Point, Source};
+use super::kinematics::{Kinematics, MotionKind, NodeMotion, Point, Source};
 use super::marker_map::{JointMode, MapError, MarkerMap};
-use super::skeleton::{Motion, SEGMENT_PARAMETERS, Segment, joints, length_to, length_to_end};
+use super::skeleton::{Along, Joint, Motion, SEGMENT_PARAMETERS, Segment, joints, length_to, length_to_end};
 use crate::recording::MarkerRecording;
 use phiw_dynamics::Vec3;
 use std::collections::BTreeMap;
@@ -27,7 +27,11 @@ pub(crate) struct Coordinate {
     pub name: String,
     pub mean: f64,
     pub spread: f64,
+    /// What is anatomically possible; infinite where that is no matter.
+    pub range: (f64, f64),
 }
+
+const ANYWHERE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
 /// The human model for one recording: coordinates over time, parameters ξ^h, markers.
 #[derive(Clone, Debug)]
@@ -37,6 +41,8 @@ pub struct HumanBody {
     pub(crate) trajectories: Vec<Coordinate>,
     /// Columns after the trajectories of human and robot: lengths, joints that keep still, markers' places.
     pub(crate) parameters: Vec<Coordinate>,
+    /// Which parameters are joints that keep still.
+    pub(crate) still: std::ops::Range<usize>,
     /// Node of each segment's frame, in the order of [`Segment::ALL`].
     pub(crate) segment_nodes: [usize; 12],
     /// The recording's marker of each point.
@@ -61,6 +67,7 @@ impl HumanBody {
             kinematics: Kinematics::default(),
             trajectories: Vec::new(),
             parameters: Vec::new(),
+            still: SEGMENT_PARAMETERS.len()..0,
             segment_nodes: [0; 12],
             markers: Vec::new(),
             marker_names: Vec::new(),
@@ -78,6 +85,7 @@ impl HumanBody {
                 name: parameter.name.to_owned(),
                 mean: lengths.map_or(parameter.typical_m, |lengths| lengths[index]),
                 spread: if lengths.is_some() { CALIBRATED_SPREAD_M } else { parameter.spread_m },
+                range: ANYWHERE,
             });
         }
         for segment in Segment::ALL {
@@ -85,7 +93,8 @@ impl HumanBody {
             let mut last = body.slide_along(parent, &length_to(segment), first_parameter);
             for joint in joints(segment) {
                 let name = format!("{}_{}", segment.name(), joint.name);
-                let coordinate = Coordinate { name, mean: joint.rest, spread: joint.spread };
+                let Joint { rest, spread, range, .. } = joint;
+                let coordinate = Coordinate { name, mean: rest, spread, range };
                 let source = match mode(segment) {
                     JointMode::Free => {
                         body.trajectories.push(coordinate);
@@ -98,13 +107,14 @@ impl HumanBody {
                     JointMode::Held => Source::Held(joint.rest),
                 };
                 let motion = match joint.motion {
-                    Motion::Turn(axis, sign) => NodeMotion::Turn { axis, sign },
-                    Motion::Slide(axis) => NodeMotion::Slide(unit(axis)),
+                    Motion::Turn(axis, sign) => NodeMotion { kind: MotionKind::Turn, axis, sign },
+                    Motion::Slide(axis) => NodeMotion { kind: MotionKind::Slide, axis, sign: 1.0 },
                 };
-                last = Some(body.push(last, motion, source));
+                last = Some(body.kinematics.push(last, motion, source));
             }
             body.segment_nodes[segment.index()] = last.unwrap_or(0);
         }
+        body.still.end = body.parameters.len();
         for (name, markers) in &map.segments {
             let Some(segment) = Segment::from_name(name) else { continue };
             for name in &markers.cluster {
@@ -128,6 +138,10 @@ impl HumanBody {
                     Err(error) => return Err(error),
                 }
             }
+        }
+        // Correspondences pull at segments without markers, too.
+        for node in body.segment_nodes {
+            body.kinematics.carry(node);
         }
         if body.markers.len() < 4 {
             return Err(MapError::TooFew(body.markers.len()));
@@ -170,20 +184,15 @@ impl HumanBody {
         self.marker_names.iter().zip(&self.placed).map(place).collect()
     }
 
-    fn push(&mut self, parent: Option<usize>, motion: NodeMotion, source: Source) -> usize {
-        self.kinematics.nodes.push(Node { parent, motion, source });
-        self.kinematics.nodes.len() - 1
-    }
-
     fn slide_along(
         &mut self,
         mut parent: Option<usize>,
-        lengths: &[(usize, [f64; 3])],
+        lengths: &[Along],
         first_parameter: usize,
     ) -> Option<usize> {
-        for &(length, direction) in lengths {
-            let source = Source::Column(first_parameter + length);
-            parent = Some(self.push(parent, NodeMotion::Slide(Vec3(direction)), source));
+        for &(length, axis, sign) in lengths {
+            let motion = NodeMotion { kind: MotionKind::Slide, axis, sign };
+            parent = Some(self.kinematics.push(parent, motion, Source::Column(first_parameter + length)));
         }
         parent
     }
@@ -198,21 +207,17 @@ impl HumanBody {
         if map.marker_spread_m > 0.0 {
             for axis in 0..3 {
                 let name = format!("{name}.{}", ["x", "y", "z"][axis]);
-                self.parameters.push(Coordinate { name, mean: local_m[axis], spread: map.marker_spread_m });
+                let (mean, spread) = (local_m[axis], map.marker_spread_m);
+                self.parameters.push(Coordinate { name, mean, spread, range: ANYWHERE });
                 let source = Source::Column(first_parameter + self.parameters.len() - 1);
-                node = self.push(Some(node), NodeMotion::Slide(unit(axis)), source);
+                let motion = NodeMotion { kind: MotionKind::Slide, axis, sign: 1.0 };
+                node = self.kinematics.push(Some(node), motion, source);
             }
             local = Vec3([0.0; 3]);
         }
-        self.kinematics.points.push(Point { node, local });
+        self.kinematics.add_point(Point { node, local });
         self.markers.push(marker);
         self.marker_names.push(name.to_owned());
         self.placed.push(placed);
     }
-}
-
-fn unit(axis: usize) -> Vec3<f64> {
-    let mut direction = [0.0; 3];
-    direction[axis] = 1.0;
-    Vec3(direction)
 }

@@ -1,10 +1,9 @@
-//! Kinematics of a tree in which lengths are joints too, and its markers' normal equations.
+//! Kinematics of a tree in which lengths are joints too.
 //!
-//! Each node moves by one coordinate: an angle of θ^h, or a length of ξ^h, which is a slide that all samples share. Then J'J of
-//! all markers is the mass matrix of unit points at the markers: composite sums from the leaves to the root give it without
-//! ever forming J.
+//! Each node moves by one coordinate: an angle of θ^h, or a length of ξ^h, which is a slide that all samples share. All of it is
+//! generic over the scalar: a number, or a SIMD register of samples.
 
-use phiw_dynamics::{Mat3, Vec3};
+use phiw_dynamics::{Mat3, Scalar, Spatial, Vec3};
 
 /// Where a node's coordinate comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,11 +14,28 @@ pub(crate) enum Source {
     Column(usize),
 }
 
-/// A rotation about a coordinate axis, or a slide along a direction, in the parent's frame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum NodeMotion {
-    Turn { axis: usize, sign: f64 },
-    Slide(Vec3<f64>),
+impl Source {
+    /// The column, if it is one.
+    pub fn column(self) -> Option<usize> {
+        match self {
+            Source::Held(_) => None,
+            Source::Column(column) => Some(column),
+        }
+    }
+}
+
+/// How a node moves along or about a coordinate axis (0 x, 1 y, 2 z) of its parent's frame, in the sense of the sign.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct NodeMotion {
+    pub kind: MotionKind,
+    pub axis: usize,
+    pub sign: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum MotionKind {
+    Turn,
+    Slide,
 }
 
 #[derive(Clone, Debug)]
@@ -27,6 +43,12 @@ pub(crate) struct Node {
     pub parent: Option<usize>,
     pub motion: NodeMotion,
     pub source: Source,
+    /// Which rotation it has: its own if it turns, else that of the next one above that does; 0 is none.
+    frame: usize,
+    /// Nodes above it that a column moves, nearest first, with the column.
+    pub above: Vec<(usize, usize)>,
+    /// Whether a point hangs on it or further down.
+    pub carries: bool,
 }
 
 /// A marker fixed to a node.
@@ -39,221 +61,190 @@ pub(crate) struct Point {
 /// The tree.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Kinematics {
-    pub nodes: Vec<Node>,
-    pub points: Vec<Point>,
+    nodes: Vec<Node>,
+    points: Vec<Point>,
 }
 
-/// Velocity of the world's origin as if fixed to a body, and its angular velocity: v(p) = linear + angular × p.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Twist {
-    pub linear: Vec3<f64>,
-    pub angular: Vec3<f64>,
-}
-
-/// Unit points in sum: their weight, first moment, and second moment about the world's origin (xx, xy, yy, xz, yz, zz).
-#[derive(Clone, Copy, Debug, Default)]
-struct Masses {
-    weight: f64,
-    first: [f64; 3],
-    second: [f64; 6],
-}
-
-/// Room for one sample.
-pub(crate) struct HumanScratch {
-    pub rotations: Vec<Mat3<f64>>,
-    pub origins: Vec<Vec3<f64>>,
-    pub twists: Vec<Twist>,
-    masses: Vec<Masses>,
-    wrenches: Vec<Twist>,
-}
-
-const ZERO: Vec3<f64> = Vec3([0.0; 3]);
-
-impl Twist {
-    const ZERO: Twist = Twist { linear: ZERO, angular: ZERO };
-    fn dot(&self, other: &Twist) -> f64 {
-        self.linear.dot(other.linear) + self.angular.dot(other.angular)
-    }
-}
-
-impl Masses {
-    fn add_point(&mut self, p: Vec3<f64>) {
-        let [x, y, z] = p.0;
-        self.weight += 1.0;
-        for (sum, value) in self.first.iter_mut().zip([x, y, z]) {
-            *sum += value;
-        }
-        let second = [y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y];
-        for (sum, value) in self.second.iter_mut().zip(second) {
-            *sum += value;
-        }
-    }
-    fn add(&mut self, other: &Masses) {
-        self.weight += other.weight;
-        for (sum, value) in self.first.iter_mut().zip(other.first) {
-            *sum += value;
-        }
-        for (sum, value) in self.second.iter_mut().zip(other.second) {
-            *sum += value;
-        }
-    }
-    /// Σ X' X · twist, the momentum.
-    fn times(&self, twist: &Twist) -> Twist {
-        let first = Vec3(self.first);
-        let [xx, xy, yy, xz, yz, zz] = self.second;
-        let [a, b, c] = twist.angular.0;
-        let turned = Vec3([xx * a + xy * b + xz * c, xy * a + yy * b + yz * c, xz * a + yz * b + zz * c]);
-        Twist {
-            linear: twist.linear.scale(self.weight) + twist.angular.cross(first),
-            angular: first.cross(twist.linear) + turned,
-        }
-    }
+/// Room for one sample, or as many as the scalar has.
+pub(crate) struct HumanScratch<S> {
+    /// The world's, then one for each node; those of nodes that do not turn stay unused.
+    rotations: Vec<Mat3<S>>,
+    origins: Vec<Vec3<S>>,
+    /// Velocity of the world's origin as if fixed to a node, for each node's coordinate.
+    pub(super) twists: Vec<Spatial<S>>,
+    /// What pulls at a node and all below it: force, and moment about the world's origin.
+    pub(crate) wrenches: Vec<Spatial<S>>,
+    pub(crate) masses: Vec<super::composite::Masses<S>>,
 }
 
 impl Kinematics {
-    pub fn scratch(&self) -> HumanScratch {
+    /// Adds a node and gives its index.
+    pub fn push(&mut self, parent: Option<usize>, motion: NodeMotion, source: Source) -> usize {
+        let index = self.nodes.len();
+        let frame = match motion.kind {
+            MotionKind::Turn => index + 1,
+            MotionKind::Slide => parent.map_or(0, |parent| self.nodes[parent].frame),
+        };
+        let above = parent.map_or(Vec::new(), |parent| {
+            let own = self.nodes[parent].source.column().map(|column| (parent, column));
+            own.into_iter().chain(self.nodes[parent].above.iter().copied()).collect()
+        });
+        self.nodes.push(Node { parent, motion, source, frame, above, carries: false });
+        index
+    }
+
+    /// Fixes a marker to a node.
+    pub fn add_point(&mut self, point: Point) {
+        self.carry(point.node);
+        self.points.push(point);
+    }
+
+    /// Something pulls at this node, or will.
+    pub fn carry(&mut self, node: usize) {
+        let mut next = Some(node);
+        while let Some(index) = next.filter(|&index| !self.nodes[index].carries) {
+            self.nodes[index].carries = true;
+            next = self.nodes[index].parent;
+        }
+    }
+
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+    pub fn points(&self) -> &[Point] {
+        &self.points
+    }
+
+    pub fn scratch<S: Scalar>(&self) -> HumanScratch<S> {
         let count = self.nodes.len();
         HumanScratch {
-            rotations: vec![Mat3::identity(); count],
-            origins: vec![ZERO; count],
-            twists: vec![Twist::ZERO; count],
-            masses: vec![Masses::default(); count],
-            wrenches: vec![Twist::ZERO; count],
+            rotations: vec![Mat3::identity(); count + 1],
+            origins: vec![Vec3::zero(); count],
+            twists: vec![Spatial::zero(); count],
+            wrenches: vec![Spatial::zero(); count],
+            masses: vec![super::composite::Masses::zero(); count],
         }
     }
 
     /// Places all nodes; `columns` are the sample's coordinates.
-    pub fn place(&self, columns: &[f64], scratch: &mut HumanScratch) {
+    #[inline(always)]
+    pub fn place<S: Scalar>(&self, columns: &[S], scratch: &mut HumanScratch<S>) {
         for (index, node) in self.nodes.iter().enumerate() {
             let value = match node.source {
-                Source::Held(value) => value,
+                Source::Held(value) => S::constant(value),
                 Source::Column(column) => columns[column],
             };
-            let (rotation, origin) = match node.parent {
-                Some(parent) => (scratch.rotations[parent], scratch.origins[parent]),
-                None => (Mat3::identity(), ZERO),
+            let (origin, frame) = match node.parent {
+                Some(parent) => (scratch.origins[parent], self.nodes[parent].frame),
+                None => (Vec3::zero(), 0),
             };
-            match node.motion {
-                NodeMotion::Slide(direction) => {
-                    scratch.rotations[index] = rotation;
-                    scratch.origins[index] = origin + rotation * direction.scale(value);
+            let NodeMotion { kind, axis, sign } = node.motion;
+            let value = S::constant(sign) * value;
+            match kind {
+                MotionKind::Slide => {
+                    scratch.origins[index] = origin + column(&scratch.rotations[frame], axis).scale(value);
                 }
-                NodeMotion::Turn { axis, sign } => {
-                    scratch.rotations[index] = turned(rotation, axis, sign * value);
+                MotionKind::Turn => {
+                    // Rotations of parents come first.
+                    let (above, own) = scratch.rotations.split_at_mut(node.frame);
+                    turn(&above[frame], axis, value, &mut own[0]);
                     scratch.origins[index] = origin;
                 }
             }
         }
     }
 
-    /// The column that turns a node, if one does.
-    pub fn turns(&self, node: usize) -> Option<usize> {
-        match (self.nodes[node].motion, self.nodes[node].source) {
-            (NodeMotion::Turn { .. }, Source::Column(column)) => Some(column),
-            _ => None,
-        }
-    }
-
     /// Twists of all nodes' coordinates; after [`Self::place`].
-    pub fn twist(&self, scratch: &mut HumanScratch) {
+    #[inline(always)]
+    pub fn twist<S: Scalar>(&self, scratch: &mut HumanScratch<S>) {
         for (index, node) in self.nodes.iter().enumerate() {
-            scratch.twists[index] = match node.motion {
-                NodeMotion::Slide(direction) => {
-                    Twist { linear: scratch.rotations[index] * direction, angular: ZERO }
-                }
-                NodeMotion::Turn { axis, sign } => {
-                    let matrix = scratch.rotations[index].0;
-                    let angular = Vec3([matrix[0][axis], matrix[1][axis], matrix[2][axis]]).scale(sign);
-                    Twist { linear: scratch.origins[index].cross(angular), angular }
-                }
+            let NodeMotion { kind, axis, sign } = node.motion;
+            let axis = column(self.rotation(index, scratch), axis).scale(S::constant(sign));
+            scratch.twists[index] = match kind {
+                MotionKind::Slide => Spatial { linear: axis, angular: Vec3::zero() },
+                MotionKind::Turn => Spatial { linear: scratch.origins[index].cross(axis), angular: axis },
             };
         }
     }
 
+    /// The column that turns a node, if one does.
+    pub fn turns(&self, node: usize) -> Option<usize> {
+        match (self.nodes[node].motion.kind, self.nodes[node].source) {
+            (MotionKind::Turn, Source::Column(column)) => Some(column),
+            _ => None,
+        }
+    }
+
+    /// The node that turns a node: itself, or one above it; `None` if none does.
+    pub fn turner(&self, node: usize) -> Option<usize> {
+        self.nodes[node].frame.checked_sub(1)
+    }
+
+    /// How a node is turned; after [`Self::place`].
+    #[inline(always)]
+    pub fn rotation<'a, S: Scalar>(&self, node: usize, scratch: &'a HumanScratch<S>) -> &'a Mat3<S> {
+        &scratch.rotations[self.nodes[node].frame]
+    }
+
+    /// The velocity that a unit of a node's coordinate gives to what hangs on it; after [`Self::twist`].
+    #[inline(always)]
+    pub fn twist_of<S: Scalar>(&self, node: usize, scratch: &HumanScratch<S>) -> Spatial<S> {
+        scratch.twists[node]
+    }
+
+    /// Where a node is; after [`Self::place`].
+    #[inline(always)]
+    pub fn origin<S: Scalar>(&self, node: usize, scratch: &HumanScratch<S>) -> Vec3<S> {
+        scratch.origins[node]
+    }
+
     /// Where a point is; after [`Self::place`].
-    pub fn position(&self, point: usize, scratch: &HumanScratch) -> Vec3<f64> {
-        let Point { node, local } = self.points[point];
-        scratch.origins[node] + scratch.rotations[node] * local
-    }
-
-    /// Σ |p − measured|² over the points that are seen (finite); after [`Self::place`].
-    pub fn cost(&self, measured: &[[f64; 3]], scratch: &HumanScratch) -> f64 {
-        let mut cost = 0.0;
-        for (index, measured) in measured.iter().enumerate() {
-            if measured[0].is_finite() {
-                let residual = self.position(index, scratch) - Vec3(*measured);
-                cost += residual.dot(residual);
-            }
+    #[inline(always)]
+    pub fn position<S: Scalar>(&self, point: usize, scratch: &HumanScratch<S>) -> Vec3<S> {
+        let Point { node, local } = &self.points[point];
+        let origin = scratch.origins[*node];
+        // Markers whose place is estimated have nodes of their own.
+        if local.0 == [0.0; 3] {
+            return origin;
         }
-        cost
-    }
-
-    /// The cost, with J'r added to `gradient` and, if wanted, J'J to the upper triangle of `normal` (row by row, `size` columns);
-    /// after [`Self::twist`].
-    pub fn normal_equations(
-        &self,
-        measured: &[[f64; 3]],
-        scratch: &mut HumanScratch,
-        gradient: &mut [f64],
-        mut normal: Option<(&mut [f64], usize)>,
-    ) -> f64 {
-        scratch.masses.fill(Masses::default());
-        scratch.wrenches.fill(Twist::ZERO);
-        let mut cost = 0.0;
-        for (index, measured) in measured.iter().enumerate() {
-            if !measured[0].is_finite() {
-                continue;
-            }
-            let position = self.position(index, scratch);
-            let residual = position - Vec3(*measured);
-            cost += residual.dot(residual);
-            let node = self.points[index].node;
-            scratch.masses[node].add_point(position);
-            let wrench = &mut scratch.wrenches[node];
-            wrench.linear += residual;
-            wrench.angular += position.cross(residual);
-        }
-        for index in (0..self.nodes.len()).rev() {
-            let (masses, wrench) = (scratch.masses[index], scratch.wrenches[index]);
-            if masses.weight == 0.0 {
-                continue;
-            }
-            let node = &self.nodes[index];
-            if let Some(parent) = node.parent {
-                scratch.masses[parent].add(&masses);
-                scratch.wrenches[parent].linear += wrench.linear;
-                scratch.wrenches[parent].angular += wrench.angular;
-            }
-            let Source::Column(column) = node.source else { continue };
-            let twist = scratch.twists[index];
-            gradient[column] += twist.dot(&wrench);
-            let Some((normal, size)) = normal.as_mut() else { continue };
-            let momentum = masses.times(&twist);
-            normal[column * *size + column] += twist.dot(&momentum);
-            let mut next = node.parent;
-            while let Some(ancestor) = next {
-                let node = &self.nodes[ancestor];
-                if let Source::Column(other) = node.source {
-                    let value = scratch.twists[ancestor].dot(&momentum);
-                    let (high, low) = (column.max(other), column.min(other));
-                    // A length that comes twice in one chain meets itself on the diagonal, once from each side.
-                    normal[low * *size + high] += if high == low { 2.0 * value } else { value };
-                }
-                next = node.parent;
-            }
-        }
-        cost
+        origin + rotate(self.rotation(*node, scratch), &Vec3::constant(local.0))
     }
 }
 
+/// Where an axis of a frame points.
+#[inline(always)]
+fn column<S: Scalar>(Mat3([x, y, z]): &Mat3<S>, axis: usize) -> Vec3<S> {
+    Vec3([x[axis], y[axis], z[axis]])
+}
+
+/// A vector of a frame, in the world. By reference: a matrix of SIMD registers is too long to hand around.
+#[inline(always)]
+pub(crate) fn rotate<S: Scalar>(Mat3([a, b, c]): &Mat3<S>, Vec3(v): &Vec3<S>) -> Vec3<S> {
+    Vec3([
+        a[0] * v[0] + a[1] * v[1] + a[2] * v[2],
+        b[0] * v[0] + b[1] * v[1] + b[2] * v[2],
+        c[0] * v[0] + c[1] * v[1] + c[2] * v[2],
+    ])
+}
+
+/// A vector of the world, in a frame.
+#[inline(always)]
+pub(crate) fn rotate_back<S: Scalar>(Mat3([a, b, c]): &Mat3<S>, Vec3([x, y, z]): &Vec3<S>) -> Vec3<S> {
+    Vec3([
+        a[0] * *x + b[0] * *y + c[0] * *z,
+        a[1] * *x + b[1] * *y + c[1] * *z,
+        a[2] * *x + b[2] * *y + c[2] * *z,
+    ])
+}
+
 /// The rotation times one about its own axis x, y or z.
-fn turned(rotation: Mat3<f64>, axis: usize, angle: f64) -> Mat3<f64> {
+#[inline(always)]
+fn turn<S: Scalar>(Mat3(rotation): &Mat3<S>, axis: usize, angle: S, Mat3(turned): &mut Mat3<S>) {
     let (sine, cosine) = angle.sin_cos();
     let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
-    let mut matrix = rotation.0;
-    for row in &mut matrix {
-        (row[next], row[last]) =
-            (row[next] * cosine + row[last] * sine, row[last] * cosine - row[next] * sine);
+    for (row, turned) in rotation.iter().zip(turned) {
+        turned[axis] = row[axis];
+        turned[next] = row[next] * cosine + row[last] * sine;
+        turned[last] = row[last] * cosine - row[next] * sine;
     }
-    Mat3(matrix)
 }

@@ -105,26 +105,19 @@ pub enum MapError {
 
 impl MarkerMap {
     /// The map for the set `ue_adl`: seated, arms and shoulders in clusters of four, one marker on the sternum.
-    pub fn ue_adl() -> Self {
-        // The text is part of the crate and covered by its tests.
-        Self::from_toml(include_str!("../../maps/ue_adl.toml")).unwrap_or_else(|_| Self::empty())
+    ///
+    /// # Errors
+    /// None, as long as the file in the crate is a map, which is tested; like [`MarkerMap::from_toml`] otherwise.
+    pub fn ue_adl() -> Result<Self, MapError> {
+        Self::from_toml(include_str!("../../maps/ue_adl.toml"))
     }
 
     /// The map of the embedded motions: markers on all segments of the upper body.
-    pub fn embedded() -> Self {
-        Self::from_toml(include_str!("../../maps/embedded.toml")).unwrap_or_else(|_| Self::empty())
-    }
-
-    fn empty() -> Self {
-        MarkerMap {
-            name: String::new(),
-            units: None,
-            static_suffix: None,
-            marker_spread_m: 0.0,
-            joints: BTreeMap::new(),
-            segments: BTreeMap::new(),
-            robot: Default::default(),
-        }
+    ///
+    /// # Errors
+    /// As [`MarkerMap::ue_adl`].
+    pub fn embedded() -> Result<Self, MapError> {
+        Self::from_toml(include_str!("../../maps/embedded.toml"))
     }
 
     /// Reads a map.

@@ -148,12 +148,15 @@ pub const SEGMENT_PARAMETERS: [SegmentParameter; 11] = [
     length("hand", 0.09, 0.01),
 ];
 
-/// Directions, in a segment's parent, that lengths of ξ^h go along from the parent's frame to the segment's.
-pub(crate) fn length_to(segment: Segment) -> Vec<(usize, [f64; 3])> {
+/// A length of ξ^h, and what it goes along: x (0), y (1) or z (2), in the sense of the sign.
+pub(crate) type Along = (usize, usize, f64);
+
+/// Lengths of ξ^h from the frame of a segment's parent to the segment's, along the parent's axes.
+pub(crate) fn length_to(segment: Segment) -> Vec<Along> {
     match segment {
         Segment::Pelvis => vec![],
-        Segment::Chest => vec![(0, [0.0, 0.0, 1.0])],
-        Segment::Clavicle(_) => vec![(5, [0.0, 0.0, 1.0]), (6, [1.0, 0.0, 0.0])],
+        Segment::Chest => vec![(0, 2, 1.0)],
+        Segment::Clavicle(_) => vec![(5, 2, 1.0), (6, 0, 1.0)],
         Segment::Neck => length_to_end(Segment::Chest),
         Segment::Head => length_to_end(Segment::Neck),
         Segment::UpperArm(side) => length_to_end(Segment::Clavicle(side)),
@@ -162,17 +165,17 @@ pub(crate) fn length_to(segment: Segment) -> Vec<(usize, [f64; 3])> {
     }
 }
 
-/// Directions, in a segment, that lengths of ξ^h go along from its frame to its end.
-pub(crate) fn length_to_end(segment: Segment) -> Vec<(usize, [f64; 3])> {
+/// Lengths of ξ^h from a segment's frame to its end, along its axes.
+pub(crate) fn length_to_end(segment: Segment) -> Vec<Along> {
     match segment {
         Segment::Pelvis => length_to(Segment::Chest),
-        Segment::Chest => vec![(1, [0.0, 0.0, 1.0])],
-        Segment::Neck => vec![(2, [0.0, 0.0, 1.0])],
-        Segment::Head => vec![(3, [0.0, 0.0, 1.0]), (4, [1.0, 0.0, 0.0])],
-        Segment::Clavicle(side) => vec![(7, [0.0, side.sign(), 0.0])],
-        Segment::UpperArm(_) => vec![(8, [0.0, 0.0, -1.0])],
-        Segment::Forearm(_) => vec![(9, [0.0, 0.0, -1.0])],
-        Segment::Hand(_) => vec![(10, [0.0, 0.0, -1.0])],
+        Segment::Chest => vec![(1, 2, 1.0)],
+        Segment::Neck => vec![(2, 2, 1.0)],
+        Segment::Head => vec![(3, 2, 1.0), (4, 0, 1.0)],
+        Segment::Clavicle(side) => vec![(7, 1, side.sign())],
+        Segment::UpperArm(_) => vec![(8, 2, -1.0)],
+        Segment::Forearm(_) => vec![(9, 2, -1.0)],
+        Segment::Hand(_) => vec![(10, 2, -1.0)],
     }
 }
 
@@ -193,10 +196,18 @@ pub(crate) struct Joint {
     pub rest: f64,
     /// How far it is usually from there \[rad, m\]; infinite if it may be anywhere.
     pub spread: f64,
+    /// What is anatomically possible, generously \[rad, m\]; infinite where it is not needed to tell a pose from its double.
+    pub range: (f64, f64),
 }
 
 const fn joint(name: &'static str, motion: Motion, rest: f64, spread: f64) -> Joint {
-    Joint { name, motion, rest, spread }
+    Joint { name, motion, rest, spread, range: (f64::NEG_INFINITY, f64::INFINITY) }
+}
+
+impl Joint {
+    const fn within(self, lower: f64, upper: f64) -> Joint {
+        Joint { range: (lower, upper), ..self }
+    }
 }
 
 /// The coordinates between a segment and its parent, in order. Rest is a seated person with bent elbows.
@@ -223,8 +234,9 @@ pub(crate) fn joints(segment: Segment) -> Vec<Joint> {
         ],
         Segment::Head => vec![joint("nod", Turn(1, 1.0), 0.0, 0.2)],
         Segment::Clavicle(side) => vec![
-            joint("protraction", Turn(2, -side.sign()), 0.0, 0.25),
-            joint("elevation", Turn(0, side.sign()), 0.0, 0.25),
+            joint("protraction", Turn(2, -side.sign()), 0.0, 0.25).within(-0.7, 0.9),
+            joint("elevation", Turn(0, side.sign()), 0.0, 0.25).within(-0.5, 1.0),
+            joint("rotation", Turn(1, -1.0), 0.0, 0.2).within(-0.7, 0.7),
         ],
         Segment::UpperArm(side) => vec![
             joint("flexion", Turn(1, -1.0), 0.2, 0.8),
@@ -232,12 +244,13 @@ pub(crate) fn joints(segment: Segment) -> Vec<Joint> {
             joint("rotation", Turn(2, -side.sign()), 0.0, 0.8),
         ],
         Segment::Forearm(side) => vec![
-            joint("flexion", Turn(1, -1.0), 1.2, 0.8),
-            joint("pronation", Turn(2, -side.sign()), 0.0, 0.8),
+            joint("flexion", Turn(1, -1.0), 1.2, 0.8).within(-0.2, 2.8),
+            joint("pronation", Turn(2, -side.sign()), 0.0, 0.8).within(-2.0, 2.0),
         ],
         Segment::Hand(side) => vec![
-            joint("flexion", Turn(0, -side.sign()), 0.0, 0.5),
-            joint("deviation", Turn(1, -1.0), 0.0, 0.3),
+            joint("flexion", Turn(0, -side.sign()), 0.0, 0.5).within(-1.7, 1.7),
+            joint("deviation", Turn(1, -1.0), 0.0, 0.3).within(-1.0, 1.0),
+            joint("twist", Turn(2, -side.sign()), 0.0, 0.3).within(-0.8, 0.8),
         ],
     }
 }

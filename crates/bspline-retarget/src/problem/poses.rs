@@ -1,17 +1,34 @@
 //! Human and robot in one sample, for whoever looks at a solution.
 
+use super::Problem;
 use super::correspondence::robot_vector;
-use super::{Problem, Scratch};
+use crate::human::HumanScratch;
 use crate::robot::{BodyPoint, RobotModel, world};
-use phiw_dynamics::Vec3;
+use phiw_dynamics::{Placement, Vec3};
+
+/// Room for one pose.
+pub(crate) struct PoseScratch {
+    columns: Vec<f64>,
+    human: HumanScratch<f64>,
+    placements: Vec<Placement<f64>>,
+}
 
 impl Problem<'_> {
+    pub(crate) fn pose_scratch(&self) -> PoseScratch {
+        let bodies = self.robot.map_or(0, |robot| robot.tree.bodies().len());
+        PoseScratch {
+            columns: vec![0.0; self.coordinates() + self.body.parameters.len()],
+            human: self.body.kinematics.scratch(),
+            placements: vec![Placement::identity(); bodies],
+        }
+    }
+
     /// Places human and robot as they are in a sample.
-    fn place(&self, variables: &[f64], sample: usize, scratch: &mut Scratch) {
-        let (n, order) = (self.coordinates(), self.basis.degree() + 1);
-        scratch.columns[n..].copy_from_slice(&variables[n * self.basis.control_points()..]);
-        let weights = &self.values[sample * order..][..order];
-        self.coordinates_at(variables, self.firsts[sample], weights, &mut scratch.columns[..n]);
+    pub(crate) fn pose(&self, variables: &[f64], sample: usize, scratch: &mut PoseScratch) {
+        let n = self.coordinates();
+        let (coordinates, parameters) = scratch.columns.split_at_mut(n);
+        self.coordinates_at(variables, sample, coordinates);
+        parameters.copy_from_slice(&variables[n * self.basis.control_points()..]);
         self.body.kinematics.place(&scratch.columns, &mut scratch.human);
         if let Some(robot) = self.robot {
             let q = &scratch.columns[self.body.trajectories.len()..n];
@@ -20,60 +37,33 @@ impl Problem<'_> {
         }
     }
 
-    /// |p^h − p^m|² \[m²\] of the markers in a sample; NaN where one is missing.
-    pub(crate) fn marker_errors(
-        &self,
-        variables: &[f64],
-        sample: usize,
-        scratch: &mut Scratch,
-        errors: &mut [f64],
-    ) {
-        self.place(variables, sample, scratch);
-        for (point, (error, measured)) in errors.iter_mut().zip(self.measured_at(sample)).enumerate() {
-            let residual = self.body.kinematics.position(point, &scratch.human) - Vec3(*measured);
-            *error = residual.dot(residual);
+    /// |p^h − p^m|² \[m²\] of the markers in a sample that has been placed; NaN where one is missing.
+    pub(crate) fn marker_errors(&self, sample: usize, scratch: &PoseScratch, errors: &mut [f64]) {
+        for (point, error) in errors.iter_mut().enumerate() {
+            *error = self.measured_at(sample, point).map_or(f64::NAN, |measured| {
+                let residual = self.body.kinematics.position(point, &scratch.human) - measured;
+                residual.dot(residual)
+            });
         }
     }
 
-    /// p^r − p^h \[m\] of elbow, wrist and hand, left then right.
-    pub(crate) fn arm_residuals(
-        &self,
-        robot: &RobotModel,
-        variables: &[f64],
-        sample: usize,
-        scratch: &mut Scratch,
-    ) -> [Vec3<f64>; 6] {
-        self.place(variables, sample, scratch);
+    /// p^r − p^h \[m\] of elbow, wrist and hand, left then right, in a sample that has been placed.
+    pub(crate) fn arm_residuals(&self, robot: &RobotModel, scratch: &PoseScratch) -> [Vec3<f64>; 6] {
         std::array::from_fn(|index| {
             let line = &robot.correspondences[index];
             robot_vector(line, &scratch.placements) - self.human_vector(line, &scratch.human)
         })
     }
 
-    /// From shoulder to hand, left and right, of the human at the robot's size, seen from the pelvis \[m\].
-    pub(crate) fn human_hands(
-        &self,
-        robot: &RobotModel,
-        variables: &[f64],
-        sample: usize,
-        scratch: &mut Scratch,
-    ) -> [Vec3<f64>; 2] {
-        self.place(variables, sample, scratch);
-        [2, 5].map(|hand| self.human_vector(&robot.correspondences[hand], &scratch.human))
-    }
-
-    /// The human's vectors of all correspondences in a sample, or those that replace them \[m\].
+    /// The human's vectors of all correspondences in a sample that has been placed, or those that replace them \[m\].
     pub(crate) fn human_vectors(
         &self,
         robot: &RobotModel,
-        variables: &[f64],
         sample: usize,
-        scratch: &mut Scratch,
+        scratch: &PoseScratch,
     ) -> Vec<Vec3<f64>> {
-        self.place(variables, sample, scratch);
-        let replaced = |index| self.targets.iter().find(|(target, _)| *target == index);
-        let vector = |(index, line)| match replaced(index) {
-            Some((_, vectors)) => vectors[sample],
+        let vector = |(index, line)| match self.target(index) {
+            Some(vectors) => vectors[sample],
             None => self.human_vector(line, &scratch.human),
         };
         robot.correspondences.iter().enumerate().map(vector).collect()
@@ -86,14 +76,14 @@ impl Problem<'_> {
         let knots = &self.basis.knots()[point + 1..=point + degree.max(1)];
         let t = knots.iter().sum::<f64>() / knots.len() as f64;
         let share = ((t - start) / (end - start)).clamp(0.0, 1.0);
-        (share * self.samples.saturating_sub(1) as f64).round() as usize
+        (share * self.samples().saturating_sub(1) as f64).round() as usize
     }
 
     /// Where points of the robot are when all its joints are at zero \[m\].
     pub(crate) fn zero_points<const N: usize>(
         &self,
         points: [BodyPoint; N],
-        scratch: &mut Scratch,
+        scratch: &mut PoseScratch,
     ) -> [Vec3<f64>; N] {
         if let Some(robot) = self.robot {
             let _ =

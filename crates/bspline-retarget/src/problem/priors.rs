@@ -1,30 +1,22 @@
 //! w_η η, the third term of (15), and what settles what markers leave open.
 
-use super::{Collect, Problem, Scratch};
+use super::{Collect, Problem};
 
 impl Problem<'_> {
-    /// Human joints away from their rest, robot joints away from zero.
-    pub(super) fn posture(&self, scratch: &mut Scratch, gradient: bool, normal: bool) -> f64 {
-        let size = scratch.columns.len();
-        let humans = self.body.trajectories.iter().map(|c| (c.mean, self.certainty(c.spread)));
-        let robots = (0..self.robot_coordinates()).map(|_| (0.0, self.weights.robot_posture));
-        let mut cost = 0.0;
-        for (column, (mean, weight)) in humans.chain(robots).enumerate() {
-            let away = scratch.columns[column] - mean;
-            cost += weight * away * away;
-            if gradient {
-                scratch.gradient[column] += weight * away;
-            }
-            if normal {
-                scratch.normal[column * size + column] += weight;
-            }
-        }
-        cost
-    }
-
     /// Weight of what is known with a standard deviation; infinite: nothing is known.
     pub(super) fn certainty(&self, spread: f64) -> f64 {
         (self.weights.marker_deviation_m / spread).powi(2)
+    }
+
+    /// What is known of a column of a sample beforehand: its mean, and with what weight.
+    pub(crate) fn known(&self, column: usize) -> (f64, f64) {
+        match self.posture.get(column) {
+            Some(&known) => known,
+            None => {
+                let parameter = &self.body.parameters[column - self.posture.len()];
+                (parameter.mean, self.certainty(parameter.spread))
+            }
+        }
     }
 
     pub(super) fn parameter_prior(&self, parameters: &[f64], collect: &mut Collect<'_>) -> f64 {
@@ -37,10 +29,7 @@ impl Problem<'_> {
             match collect {
                 Collect::Cost => {}
                 Collect::Gradient(gradient) => gradient[first + index] += weight * away,
-                Collect::Normal(arrow) => {
-                    arrow.gradient[first + index] += weight * away;
-                    *arrow.diagonal_mut(first + index) += weight;
-                }
+                Collect::Normal(arrow) => *arrow.diagonal_mut(first + index) += weight,
             }
         }
         cost
@@ -62,17 +51,15 @@ impl Problem<'_> {
                 for coordinate in 0..n {
                     let (i, j) = (point * n + coordinate, other * n + coordinate);
                     cost += twice * weight * variables[i] * variables[j];
-                    let gradient = match collect {
-                        Collect::Cost => continue,
-                        Collect::Gradient(gradient) => &mut **gradient,
-                        Collect::Normal(arrow) => {
-                            arrow.add(point, other, coordinate, weight);
-                            &mut arrow.gradient[..]
+                    match collect {
+                        Collect::Cost => {}
+                        Collect::Gradient(gradient) => {
+                            gradient[i] += weight * variables[j];
+                            if i != j {
+                                gradient[j] += weight * variables[i];
+                            }
                         }
-                    };
-                    gradient[i] += weight * variables[j];
-                    if i != j {
-                        gradient[j] += weight * variables[i];
+                        Collect::Normal(arrow) => arrow.add(point, other, coordinate, weight),
                     }
                 }
             }
@@ -131,10 +118,7 @@ impl Collect<'_> {
         match self {
             Collect::Cost => {}
             Collect::Gradient(gradient) => gradient[variable] += slope,
-            Collect::Normal(arrow) => {
-                arrow.gradient[variable] += slope;
-                *arrow.diagonal_mut(variable) += curvature;
-            }
+            Collect::Normal(arrow) => *arrow.diagonal_mut(variable) += curvature,
         }
     }
 }

@@ -1,8 +1,9 @@
-//! Block-tridiagonal matrices with a dense border: the normal equations of a spline, and their Cholesky factor in O(N).
+//! Block-banded matrices with a dense border: the normal equations of a spline, and their Cholesky factor in O(N).
 //!
-//! A spline of degree p makes a control point meet the p before it. With p control points to a block the matrix is
-//! block-tridiagonal; parameters that all samples share are a dense border.
+//! A spline of degree p makes a control point meet the p after it; parameters that all samples share are a dense border. What stands
+//! in a control point's columns on and below the diagonal, border included, is a dense panel, and the factor of the matrix has the same panels.
 
+use super::Pattern;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{
     LltParams, LltRegularization, cholesky_in_place, cholesky_in_place_scratch,
@@ -10,248 +11,234 @@ use faer::linalg::cholesky::llt::factor::{
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::{matmul::matmul, triangular_solve};
 use faer::{Accum, MatMut, MatRef, Par, Spec};
+use phiw_dynamics::Lanes;
 
-/// A symmetric matrix \[H, B'; B, C\] with a right-hand side; only what lies on or below the diagonal is used.
+/// A symmetric matrix \[H, B'; B, C\]; only what lies on or below the diagonal is used.
 #[derive(Clone)]
 pub(crate) struct Arrow {
     /// Coordinates of a control point.
     point: usize,
     /// Control points.
     points: usize,
-    /// Control points in a block.
-    group: usize,
-    border_size: usize,
-    /// Column-major blocks: on the diagonal, below it, and of the border (border × block).
-    diagonal: Vec<f64>,
-    below: Vec<f64>,
-    border: Vec<f64>,
+    degree: usize,
+    border: usize,
+    /// For each control point a column-major panel, [`Self::height`] × `point`: its own block, those of the `degree` points after it,
+    /// the border. Blocks of points that there are not stay zero.
+    panels: Vec<f64>,
     corner: Vec<f64>,
-    /// Gradient: control points, then border.
-    pub gradient: Vec<f64>,
 }
 
 impl Arrow {
-    pub fn new(point: usize, points: usize, degree: usize, border_size: usize) -> Self {
-        let group = degree.max(1);
-        let (block, blocks) = (group * point, points.div_ceil(group));
+    pub fn new(point: usize, points: usize, degree: usize, border: usize) -> Self {
+        let height = (degree + 1) * point + border;
         Arrow {
             point,
             points,
-            group,
-            border_size,
-            diagonal: vec![0.0; blocks * block * block],
-            below: vec![0.0; blocks.saturating_sub(1) * block * block],
-            border: vec![0.0; blocks * block * border_size],
-            corner: vec![0.0; border_size * border_size],
-            gradient: vec![0.0; points * point + border_size],
+            degree,
+            border,
+            panels: vec![0.0; points * height * point],
+            corner: vec![0.0; border * border],
         }
     }
 
-    fn block(&self) -> usize {
-        self.group * self.point
+    /// Rows of a panel; one that has none counts as one, so that it can be cut into columns.
+    fn height(&self) -> usize {
+        ((self.degree + 1) * self.point + self.border).max(1)
     }
-    fn blocks(&self) -> usize {
-        self.points.div_ceil(self.group)
+    /// Numbers of a panel.
+    fn panel(&self) -> usize {
+        self.height() * self.point
     }
 
     pub fn clear(&mut self) {
-        for values in
-            [&mut self.diagonal, &mut self.below, &mut self.border, &mut self.corner, &mut self.gradient]
-        {
-            values.fill(0.0);
-        }
+        self.panels.fill(0.0);
+        self.corner.fill(0.0);
     }
 
     /// Takes over another matrix of the same shape.
     pub fn copy_from(&mut self, other: &Arrow) {
-        self.diagonal.copy_from_slice(&other.diagonal);
-        self.below.copy_from_slice(&other.below);
-        self.border.copy_from_slice(&other.border);
+        self.panels.copy_from_slice(&other.panels);
         self.corner.copy_from_slice(&other.corner);
-        self.gradient.copy_from_slice(&other.gradient);
     }
 
-    /// Adds a sample `count` times: `normal` is row by row, `size × size` with `size = point + border`; its first `point` rows are
-    /// read. `gradient` has `size` elements. Both are with respect to the sample's own coordinates, which are `weights` times
-    /// the control points `first ..`, and to the border's.
-    pub fn add_sample(
+    /// Adds `K` samples of the same control points: of each, `normals` has the upper triangle, row by row, of `point` rows with
+    /// `point + border` numbers, with respect to the sample's coordinates and the border's, as far as `pattern` goes; `products` are what the weights of the control
+    /// points `first ..` come to in pairs (row by row, `degree + 1` numbers each), `sums` what they come to by themselves.
+    ///
+    /// [`Self::mirror`] has to come after the last.
+    #[inline(always)]
+    pub fn add_windows<const K: usize>(
         &mut self,
         first: usize,
-        weights: &[f64],
-        count: f64,
-        normal: &[f64],
-        gradient: &[f64],
+        pattern: &Pattern,
+        products: &[Lanes<K>],
+        sums: &[Lanes<K>],
+        normals: [&[f64]; K],
     ) {
-        // The same loops, compiled for the registers that this machine has.
-        pulp::Arch::new().dispatch(AddSample { arrow: self, first, weights, count, normal, gradient });
-        let tail = self.points * self.point;
-        add_scaled(&mut self.gradient[tail..], count, &gradient[self.point..]);
-    }
-
-    #[inline(always)]
-    fn add_points(&mut self, first: usize, weights: &[f64], count: f64, normal: &[f64], gradient: &[f64]) {
-        let (n, size, block, border) =
-            (self.point, self.point + self.border_size, self.block(), self.border_size);
-        for (i, &wi) in weights.iter().enumerate() {
-            let wi = count * wi;
-            let (row_block, row) = ((first + i) / self.group, (first + i) % self.group * n);
-            for (j, &wj) in weights[..=i].iter().enumerate() {
-                let (column_block, column) = ((first + j) / self.group, (first + j) % self.group * n);
-                let target = if row_block == column_block {
-                    &mut self.diagonal[row_block * block * block..][..block * block]
-                } else {
-                    &mut self.below[column_block * block * block..][..block * block]
-                };
-                for c in 0..n {
-                    add_scaled(
-                        &mut target[(column + c) * block + row..][..n],
-                        wi * wj,
-                        &normal[c * size..][..n],
-                    );
+        let (n, order) = (self.point, self.degree + 1);
+        let (height, panel, size) = (self.height(), self.panel(), self.point + self.border);
+        for low in 0..order {
+            let columns = self.panels[(first + low) * panel..][..panel].chunks_exact_mut(height);
+            for (c, column) in columns.enumerate() {
+                let rows = normals.map(|normal| &normal[c * size..][..size]);
+                let [own, edge] = pattern.runs(c);
+                for high in low..order {
+                    let (block, weights) =
+                        (&mut column[(high - low) * n..][..n], products[high * order + low]);
+                    for run in own {
+                        add_all(&mut block[run.clone()], weights, rows.map(|row| &row[run.clone()]));
+                    }
+                }
+                let target = &mut column[(order - 1) * n..];
+                for run in edge {
+                    add_all(&mut target[run.clone()], sums[low], rows.map(|row| &row[run.clone()]));
                 }
             }
-            let target = &mut self.border[row_block * block * border..][..block * border];
-            for c in 0..n {
-                add_scaled(
-                    &mut target[(row + c) * border..][..border],
-                    wi,
-                    &normal[c * size + n..][..border],
-                );
-            }
-            add_scaled(&mut self.gradient[(first + i) * n..][..n], wi, &gradient[..n]);
         }
     }
 
-    /// Adds what parameters have with parameters: the upper triangle of the last rows of `normal`, `count` times.
-    pub fn add_corner(&mut self, count: f64, normal: &[f64]) {
-        let (n, border) = (self.point, self.border_size);
-        let size = n + border;
-        for c in 0..border {
-            add_scaled(
-                &mut self.corner[c * border..][..border],
-                count,
-                &normal[(n + c) * size + n..][..border],
-            );
+    /// Completes the blocks below the diagonal ones, of which [`Self::add_windows`] fills the lower triangles: they are symmetric.
+    pub fn mirror(&mut self) {
+        let (n, height) = (self.point, self.height());
+        for panel in self.panels.chunks_exact_mut((height * n).max(1)) {
+            for block in 1..=self.degree {
+                for column in 0..n {
+                    for row in column + 1..n {
+                        panel[row * height + block * n + column] = panel[column * height + block * n + row];
+                    }
+                }
+            }
         }
+    }
+
+    /// Adds `value` where two of the border's rows meet.
+    pub fn add_corner(&mut self, row: usize, column: usize, value: f64) {
+        self.corner[row.min(column) * self.border + row.max(column)] += value;
     }
 
     /// Adds `value` where coordinate `coordinate` of two control points meet.
     pub fn add(&mut self, point: usize, other: usize, coordinate: usize, value: f64) {
-        let (high, low, block) = (point.max(other), point.min(other), self.block());
-        let row = high % self.group * self.point + coordinate;
-        let column = low % self.group * self.point + coordinate;
-        let (row_block, column_block) = (high / self.group, low / self.group);
-        let target = if row_block == column_block { &mut self.diagonal } else { &mut self.below };
-        target[column_block * block * block + column * block + row] += value;
+        let (high, low) = (point.max(other), point.min(other));
+        let row = (high - low) * self.point + coordinate;
+        let at = low * self.panel() + coordinate * self.height() + row;
+        self.panels[at] += value;
     }
 
     /// Element on the diagonal, of all variables in a row.
     pub fn diagonal_mut(&mut self, variable: usize) -> &mut f64 {
-        let (block, tail) = (self.block(), self.points * self.point);
+        let tail = self.points * self.point;
         if variable < tail {
-            let (index, inner) = (variable / block, variable % block);
-            &mut self.diagonal[index * block * block + inner * (block + 1)]
+            let at = variable / self.point * self.panel() + variable % self.point * (self.height() + 1);
+            &mut self.panels[at]
         } else {
-            &mut self.corner[(variable - tail) * (self.border_size + 1)]
+            &mut self.corner[(variable - tail) * (self.border + 1)]
         }
     }
 
-    /// Replaces the matrix by its Cholesky factor and the gradient g by H⁻¹g; false if it is not positive definite.
-    pub fn solve(&mut self) -> bool {
-        self.factor() && {
-            self.substitute();
-            true
-        }
-    }
-
-    fn factor(&mut self) -> bool {
-        let (block, blocks, border) = (self.block(), self.blocks(), self.border_size);
-        // The last block may have rows that no control point has.
-        for unused in self.points * self.point..blocks * block {
-            let (index, inner) = (unused / block, unused % block);
-            self.diagonal[index * block * block + inner * (block + 1)] = 1.0;
-        }
-        for index in 0..blocks {
-            let (done, next) = self.diagonal.split_at_mut((index + 1) * block * block);
-            let diagonal = &mut done[index * block * block..];
-            if !cholesky(diagonal, block) {
+    /// Replaces the matrix by its Cholesky factor; false if it is not positive definite.
+    pub fn factor(&mut self) -> bool {
+        let (n, degree, border) = (self.point, self.degree, self.border);
+        let (height, panel) = (self.height(), self.panel());
+        let size = n.max(border);
+        let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(
+            size,
+            Par::Seq,
+            Spec::<LltParams, f64>::default(),
+        ));
+        let stack = MemStack::new(&mut memory);
+        for point in 0..self.points {
+            let (done, later) = self.panels.split_at_mut((point + 1) * panel);
+            let this = MatMut::from_column_major_slice_mut(&mut done[point * panel..], height, n);
+            let (mut own, mut below) = this.split_at_row_mut(n);
+            if !cholesky(own.as_mut(), stack) {
                 return false;
             }
-            let factor = MatRef::from_column_major_slice(diagonal, block, block);
-            let (done, next_border) = self.border.split_at_mut((index + 1) * block * border);
-            let this_border = &mut done[index * block * border..];
-            right_solve(factor, MatMut::from_column_major_slice_mut(this_border, border, block));
-            let this_border = MatRef::from_column_major_slice(this_border, border, block);
-            subtract_square(
-                MatMut::from_column_major_slice_mut(&mut self.corner, border, border),
-                this_border,
+            triangular_solve::solve_lower_triangular_in_place(
+                own.as_ref(),
+                below.as_mut().transpose_mut(),
+                Par::Seq,
             );
-            if index + 1 < blocks {
-                let below = &mut self.below[index * block * block..][..block * block];
-                right_solve(factor, MatMut::from_column_major_slice_mut(below, block, block));
-                let below = MatRef::from_column_major_slice(below, block, block);
-                let next = &mut next[..block * block];
-                subtract_square(MatMut::from_column_major_slice_mut(next, block, block), below);
-                let next = &mut next_border[..block * border];
-                let next = MatMut::from_column_major_slice_mut(next, border, block);
-                matmul(next, Accum::Add, this_border, below.transpose(), -1.0, Par::Seq);
+            let below = below.as_ref();
+            let edge = below.subrows(degree * n, border);
+            for (ahead, next) in later.chunks_exact_mut(panel.max(1)).take(degree).enumerate() {
+                let next = MatMut::from_column_major_slice_mut(next, height, n);
+                let (blocks, next_edge) = next.split_at_row_mut((degree + 1) * n);
+                let (own, others) = blocks.subrows_mut(0, (degree - ahead) * n).split_at_row_mut(n);
+                let block = below.subrows(ahead * n, n);
+                subtract_square(own, block);
+                let further = below.subrows((ahead + 1) * n, (degree - ahead - 1) * n);
+                matmul(others, Accum::Add, further, block.transpose(), -1.0, Par::Seq);
+                matmul(next_edge, Accum::Add, edge, block.transpose(), -1.0, Par::Seq);
             }
+            subtract_square(MatMut::from_column_major_slice_mut(&mut self.corner, border, border), edge);
         }
-        cholesky(&mut self.corner, border)
+        cholesky(MatMut::from_column_major_slice_mut(&mut self.corner, border, border), stack)
     }
 
-    fn substitute(&mut self) {
-        let (block, blocks, border) = (self.block(), self.blocks(), self.border_size);
-        let tail = self.points * self.point;
-        let mut right = vec![0.0; blocks * block + border];
-        right[..tail].copy_from_slice(&self.gradient[..tail]);
-        right[blocks * block..].copy_from_slice(&self.gradient[tail..]);
-        let (spline, parameters) = right.split_at_mut(blocks * block);
-        let diagonal = |index: usize| &self.diagonal[index * block * block..][..block * block];
-        let below = |index: usize| &self.below[index * block * block..][..block * block];
-        let edge = |index: usize| &self.border[index * block * border..][..block * border];
-        for index in 0..blocks {
-            let (this, next) = spline[index * block..].split_at_mut(block);
-            forward(diagonal(index), this);
-            if index + 1 < blocks {
-                subtract_product(below(index), this, &mut next[..block]);
+    /// Replaces a right-hand side by the solution; after [`Self::factor`].
+    pub fn solve(&self, right: &mut [f64]) {
+        // The same loops, compiled for the registers that this machine has.
+        pulp::Arch::new().dispatch(Substitute { factor: self, right });
+    }
+
+    #[inline(always)]
+    fn substitute(&self, right: &mut [f64]) {
+        let (n, height, panel) = (self.point, self.height(), self.panel());
+        let tail = self.points * n;
+        let (spline, parameters) = right.split_at_mut(tail);
+        // Rows of a panel's blocks that there are.
+        let rows = |point: usize| ((self.degree + 1) * n).min(tail - point * n);
+        // A right-hand side that begins with zeros has nothing to hand on there.
+        let begin = spline.iter().position(|&value| value != 0.0).map_or(self.points, |first| first / n);
+        for point in begin..self.points {
+            let (known, below) = spline[point * n..][..rows(point)].split_at_mut(n);
+            for (c, column) in self.panels[point * panel..][..panel].chunks_exact(height).enumerate() {
+                known[c] /= column[c];
+                let solved = -known[c];
+                add_scaled(&mut known[c + 1..], solved, &column[c + 1..n]);
+                add_scaled(below, solved, &column[n..]);
+                add_scaled(parameters, solved, &column[height - self.border..]);
             }
-            subtract_product(edge(index), this, parameters);
         }
-        forward(&self.corner, parameters);
-        backward(&self.corner, parameters);
-        for index in (0..blocks).rev() {
-            let (this, next) = spline[index * block..].split_at_mut(block);
-            subtract_transposed(edge(index), parameters, this);
-            if index + 1 < blocks {
-                subtract_transposed(below(index), &next[..block], this);
+        let border = self.border;
+        for c in 0..border {
+            let column = &self.corner[c * border..][..border];
+            parameters[c] /= column[c];
+            let solved = -parameters[c];
+            add_scaled(&mut parameters[c + 1..], solved, &column[c + 1..]);
+        }
+        for c in (0..border).rev() {
+            let column = &self.corner[c * border..][..border];
+            parameters[c] = (parameters[c] - dot(&column[c + 1..], &parameters[c + 1..])) / column[c];
+        }
+        for point in (0..self.points).rev() {
+            let (own, below) = spline[point * n..][..rows(point)].split_at_mut(n);
+            let columns = self.panels[point * panel..][..panel].chunks_exact(height).enumerate();
+            for (c, column) in columns.rev() {
+                let known = dot(&column[c + 1..n], &own[c + 1..])
+                    + dot(&column[n..], below)
+                    + dot(&column[height - border..], parameters);
+                own[c] = (own[c] - known) / column[c];
             }
-            backward(diagonal(index), this);
         }
-        self.gradient[..tail].copy_from_slice(&spline[..tail]);
-        self.gradient[tail..].copy_from_slice(parameters);
     }
 }
 
-/// [`Arrow::add_points`] with its arguments: what a closure would be, but inlined where the registers are known.
-struct AddSample<'a> {
-    arrow: &'a mut Arrow,
-    first: usize,
-    weights: &'a [f64],
-    count: f64,
-    normal: &'a [f64],
-    gradient: &'a [f64],
+/// [`Arrow::substitute`] with its arguments.
+struct Substitute<'a> {
+    factor: &'a Arrow,
+    right: &'a mut [f64],
 }
 
-impl pulp::NullaryFnOnce for AddSample<'_> {
+impl pulp::NullaryFnOnce for Substitute<'_> {
     type Output = ();
     #[inline(always)]
     fn call(self) {
-        self.arrow.add_points(self.first, self.weights, self.count, self.normal, self.gradient);
+        self.factor.substitute(self.right);
     }
 }
 
-/// `target` ← `target` + `factor` · `values`.
+/// `target` ← `target` + `factor` · `values`, as far as both go.
 #[inline(always)]
 fn add_scaled(target: &mut [f64], factor: f64, values: &[f64]) {
     for (sum, value) in target.iter_mut().zip(values) {
@@ -259,64 +246,43 @@ fn add_scaled(target: &mut [f64], factor: f64, values: &[f64]) {
     }
 }
 
-fn cholesky(matrix: &mut [f64], size: usize) -> bool {
-    let mut memory =
-        MemBuffer::new(cholesky_in_place_scratch::<f64>(size, Par::Seq, Spec::<LltParams, f64>::default()));
-    let matrix = MatMut::from_column_major_slice_mut(matrix, size, size);
-    let stack = MemStack::new(&mut memory);
-    cholesky_in_place(matrix, LltRegularization::default(), Par::Seq, stack, Spec::default()).is_ok()
+/// `target` ← `target` + Σ `factors` · `values`; all of one length.
+#[inline(always)]
+fn add_all<const K: usize>(target: &mut [f64], Lanes(factors): Lanes<K>, values: [&[f64]; K]) {
+    let length = target.len();
+    let values = values.map(|values| &values[..length]);
+    for at in 0..length {
+        let mut sum = target[at];
+        for k in 0..K {
+            sum += factors[k] * values[k][at];
+        }
+        target[at] = sum;
+    }
 }
 
-/// `matrix` ← `matrix` · L⁻ᵀ.
-fn right_solve(factor: MatRef<'_, f64>, matrix: MatMut<'_, f64>) {
-    triangular_solve::solve_lower_triangular_in_place(factor, matrix.transpose_mut(), Par::Seq);
+/// Σ a·b as far as both go.
+#[inline(always)]
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let length = a.len().min(b.len());
+    let ((a, a_rest), (b, b_rest)) = (a[..length].as_chunks::<8>(), b[..length].as_chunks::<8>());
+    // Eight sums: one alone would have to wait for itself.
+    let mut sums = [0.0; 8];
+    for (a, b) in a.iter().zip(b) {
+        for k in 0..8 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>() + sums.iter().sum::<f64>()
+}
+
+fn cholesky(matrix: MatMut<'_, f64>, stack: &mut MemStack) -> bool {
+    cholesky_in_place(matrix, LltRegularization::default(), Par::Seq, stack, Spec::default()).is_ok()
 }
 
 /// Lower triangle of `target` ← `target` − A·Aᵀ.
 fn subtract_square(target: MatMut<'_, f64>, a: MatRef<'_, f64>) {
     let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
     triangular::matmul(target, lower, Accum::Add, a, full, a.transpose(), full, -1.0, Par::Seq);
-}
-
-/// `target` ← `target` − A·x, A column-major.
-fn subtract_product(a: &[f64], x: &[f64], target: &mut [f64]) {
-    let rows = target.len();
-    for (column, &x) in x.iter().enumerate() {
-        for (sum, value) in target.iter_mut().zip(&a[column * rows..][..rows]) {
-            *sum -= value * x;
-        }
-    }
-}
-
-/// `target` ← `target` − Aᵀ·x, A column-major.
-fn subtract_transposed(a: &[f64], x: &[f64], target: &mut [f64]) {
-    let rows = x.len();
-    for (column, sum) in target.iter_mut().enumerate() {
-        *sum -= a[column * rows..][..rows].iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
-    }
-}
-
-/// x ← L⁻¹x.
-fn forward(factor: &[f64], x: &mut [f64]) {
-    let size = x.len();
-    for column in 0..size {
-        let values = &factor[column * size..][..size];
-        x[column] /= values[column];
-        let solved = x[column];
-        for row in column + 1..size {
-            x[row] -= values[row] * solved;
-        }
-    }
-}
-
-/// x ← L⁻ᵀx.
-fn backward(factor: &[f64], x: &mut [f64]) {
-    let size = x.len();
-    for column in (0..size).rev() {
-        let values = &factor[column * size..][..size];
-        let known: f64 = (column + 1..size).map(|row| values[row] * x[row]).sum();
-        x[column] = (x[column] - known) / values[column];
-    }
 }
 
 #[cfg(test)]
@@ -345,8 +311,12 @@ mod tests {
                 let weights: Vec<f64> = (0..=degree).map(|_| random()).collect();
                 let jacobian: Vec<f64> = (0..size).map(|_| random()).collect();
                 let normal: Vec<f64> = (0..size * size).map(|i| jacobian[i / size] * jacobian[i % size]).collect();
-                arrow.add_sample(first, &weights, 1.0, &normal, &jacobian);
-                arrow.add_corner(1.0, &normal);
+                let products: Vec<f64> = weights.iter().flat_map(|a| weights.iter().map(move |b| a * b)).collect();
+                let one = |values: &[f64]| values.iter().map(|&value| Lanes([value])).collect::<Vec<_>>();
+                arrow.add_windows(first, &Pattern::dense(point, border), &one(&products), &one(&weights), [&normal]);
+                for row in 0..border {
+                    (row..border).for_each(|c| arrow.add_corner(row, c, normal[(point + row) * size + point + c]));
+                }
                 let mut row = vec![0.0; all];
                 for (i, weight) in weights.iter().enumerate() {
                     (0..point).for_each(|c| row[(first + i) * point + c] += weight * jacobian[c]);
@@ -357,6 +327,7 @@ mod tests {
                     (0..all).for_each(|j| dense[(i, j)] += row[i] * row[j]);
                 }
             }
+            arrow.mirror();
             for i in 0..all {
                 *arrow.diagonal_mut(i) += 0.5;
                 dense[(i, i)] += 0.5;
@@ -364,8 +335,10 @@ mod tests {
             arrow.add(1, 0, 0, 0.01);
             dense[(point, 0)] += 0.01;
             dense[(0, point)] += 0.01;
-            prop_assert!(arrow.solve());
-            let residual = &dense * faer::Mat::from_fn(all, 1, |i, _| arrow.gradient[i]) - &right;
+            prop_assert!(arrow.factor());
+            let mut solution: Vec<f64> = (0..all).map(|i| right[(i, 0)]).collect();
+            arrow.solve(&mut solution);
+            let residual = &dense * faer::Mat::from_fn(all, 1, |i, _| solution[i]) - &right;
             prop_assert!(residual.norm_max() < 1e-10);
         }
     }

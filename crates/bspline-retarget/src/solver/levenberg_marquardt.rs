@@ -1,7 +1,8 @@
 //! Levenberg and Marquardt's method on the arrow structure.
 
+use super::Arrow;
+use super::bounded_step::BoundedStep;
 use crate::problem::{Problem, Scratch};
-use crate::solver::Arrow;
 use crate::weights::Cost;
 
 /// When to stop, and how.
@@ -13,15 +14,11 @@ pub struct Iterations {
     pub tolerance: f64,
     /// Whether the robot's control points are held inside the joint limits, on top of η: then the motion never leaves them.
     pub hard_limits: bool,
-    /// Whether first steps look at a few samples of each span only.
-    pub coarse_first: bool,
-    /// Whether it stays at that: a good start for another problem, at a fraction of the cost.
-    pub coarse_only: bool,
 }
 
 impl Default for Iterations {
     fn default() -> Self {
-        Iterations { most: 60, tolerance: 1e-3, hard_limits: true, coarse_first: true, coarse_only: false }
+        Iterations { most: 60, tolerance: 1e-3, hard_limits: true }
     }
 }
 
@@ -51,34 +48,35 @@ pub struct Solution {
 
 /// Distance of the robot's control points from their limits \[rad, m\].
 const MARGIN: f64 = 1e-9;
-/// Samples that a coarse pass takes of a span.
-const COARSE_SAMPLES: usize = 4;
+/// Steps that are found, one more damped than the other, before it gives up.
+const TRIES: usize = 8;
+/// What is left of a step that was too long.
+const SHORTENED: f64 = 0.4;
+/// Damping at first, as a share of the diagonal, and the least that it comes down to and goes up from.
+const FIRST_DAMPING: f64 = 1e-5;
+const LEAST_DAMPING: f64 = 1e-8;
+const LEAST_RISE: f64 = 1e-6;
+/// A step whose decrease is less of what it promised than the first share was bad, one with more than the second was good.
+const BAD_GOOD: (f64, f64) = (0.25, 0.7);
 
 /// Solves (15) from `start` by damped Gauss-Newton steps, O(N) each.
 pub fn solve(problem: &Problem<'_>, start: Vec<f64>, iterations: &Iterations) -> Solution {
-    let spans = problem.basis().control_points().saturating_sub(problem.basis().degree()).max(1);
-    let stride = problem.samples() / (COARSE_SAMPLES * spans);
     let mut descent = Descent::new(problem, start, iterations);
-    if iterations.coarse_first && stride > 1 {
-        let stop = descent.run(stride, iterations.most, 10.0 * iterations.tolerance);
-        if iterations.coarse_only {
-            return descent.finish(stop);
-        }
-    }
-    let stop = descent.run(1, iterations.most, iterations.tolerance);
-    descent.finish(stop)
+    let stop = descent.run(iterations.most, iterations.tolerance);
+    Solution { variables: descent.variables, cost: descent.cost, iterations: descent.steps, stop }
 }
 
 struct Descent<'a> {
     problem: &'a Problem<'a>,
     variables: Vec<f64>,
-    trial: Vec<f64>,
     cost: Cost,
+    /// Half the gradient at `variables`.
+    gradient: Vec<f64>,
+    trial: Vec<f64>,
+    trial_gradient: Vec<f64>,
     arrow: Arrow,
-    factor: Arrow,
+    bounded: BoundedStep,
     scratch: Scratch,
-    /// Bounds of variables; only robot coordinates have any.
-    bounds: Option<Vec<(f64, f64)>>,
     damping: f64,
     steps: usize,
 }
@@ -86,86 +84,82 @@ struct Descent<'a> {
 impl<'a> Descent<'a> {
     fn new(problem: &'a Problem<'a>, start: Vec<f64>, iterations: &Iterations) -> Self {
         let arrow = problem.arrow();
-        let bounds = iterations.hard_limits.then(|| bounds(problem)).flatten();
+        let bounds = if iterations.hard_limits { bounds(problem) } else { Vec::new() };
         let mut variables = start;
-        clamp(&mut variables, bounds.as_deref());
+        clamp(&mut variables, &bounds);
+        let (mut gradient, mut scratch) = (vec![0.0; variables.len()], problem.scratch());
+        let cost = problem.evaluate(&variables, &mut scratch, Some(&mut gradient));
         Descent {
             problem,
+            cost,
             trial: variables.clone(),
+            trial_gradient: gradient.clone(),
+            bounded: BoundedStep::new(&arrow, variables.len(), bounds),
+            gradient,
             variables,
-            cost: Cost::default(),
-            factor: arrow.clone(),
             arrow,
-            scratch: problem.scratch(),
-            bounds,
-            damping: 1e-4,
+            scratch,
+            damping: FIRST_DAMPING,
             steps: 0,
         }
     }
 
-    fn finish(self, stop: Stop) -> Solution {
-        Solution { variables: self.variables, cost: self.cost, iterations: self.steps, stop }
-    }
-
-    fn run(&mut self, stride: usize, most: usize, tolerance: f64) -> Stop {
-        let Descent { problem, .. } = *self;
-        self.cost = problem.normal_equations(&self.variables, stride, &mut self.scratch, &mut self.arrow);
+    fn run(&mut self, most: usize, tolerance: f64) -> Stop {
         for _ in 0..most {
             let before = self.cost.total();
-            let Some(after) = self.step(stride) else { return Stop::NoDecrease };
-            let decrease = before - after.total();
-            self.cost = after;
+            self.problem.normal_equations(&self.variables, &mut self.scratch, &mut self.arrow);
+            let Some(promised) = self.step() else { return Stop::NoDecrease };
             self.steps += 1;
-            if decrease <= tolerance * before {
+            // A short step says nothing of how much there is still to come: what the whole one promised does.
+            if promised.max(before - self.cost.total()) <= tolerance * before {
                 return Stop::Converged;
             }
-            self.cost = problem.normal_equations(&self.variables, stride, &mut self.scratch, &mut self.arrow);
         }
         Stop::MostIterations
     }
 
-    /// One step that decreases the cost, or none.
-    fn step(&mut self, stride: usize) -> Option<Cost> {
-        for _ in 0..12 {
-            self.factor.copy_from(&self.arrow);
-            for variable in 0..self.variables.len() {
-                let diagonal = self.factor.diagonal_mut(variable);
-                *diagonal += self.damping * *diagonal + 1e-12;
-            }
-            self.freeze();
-            if self.factor.solve() {
-                for ((trial, value), step) in
-                    self.trial.iter_mut().zip(&self.variables).zip(&self.factor.gradient)
-                {
-                    *trial = value - step;
-                }
-                clamp(&mut self.trial, self.bounds.as_deref());
-                let cost = self.problem.strided_cost(&self.trial, stride, &mut self.scratch);
-                if cost.total() < self.cost.total() {
-                    std::mem::swap(&mut self.variables, &mut self.trial);
-                    self.damping = (self.damping * 0.1).max(1e-9);
-                    return Some(cost);
+    /// One step that decreases the cost, and what the whole of it promised; `None` if there is none.
+    fn step(&mut self) -> Option<f64> {
+        for _ in 0..TRIES {
+            if self.bounded.find(&self.arrow, &self.variables, &self.gradient, self.damping) {
+                // A shorter step costs no new factor.
+                for share in [1.0, SHORTENED] {
+                    let Some(kept) = self.go(share) else { continue };
+                    if share < 1.0 || kept < BAD_GOOD.0 {
+                        self.damping = (8.0 * self.damping).max(LEAST_RISE);
+                    } else if kept > BAD_GOOD.1 {
+                        self.damping = (0.1 * self.damping).max(LEAST_DAMPING);
+                    }
+                    return Some(self.bounded.predicted(1.0));
                 }
             }
-            self.damping *= 8.0;
+            self.damping = (20.0 * self.damping).max(LEAST_RISE);
         }
         None
     }
 
-    /// Variables at a bound that the gradient pushes against stay there.
-    fn freeze(&mut self) {
-        let Some(bounds) = &self.bounds else { return };
-        for (variable, &(lower, upper)) in bounds.iter().enumerate() {
-            let (value, slope) = (self.variables[variable], self.arrow.gradient[variable]);
-            if (value <= lower && slope > 0.0) || (value >= upper && slope < 0.0) {
-                *self.factor.diagonal_mut(variable) += 1e12;
-            }
+    /// Goes a share of the step if that decreases the cost: by how much of what it promised.
+    fn go(&mut self, share: f64) -> Option<f64> {
+        for ((trial, value), step) in self.trial.iter_mut().zip(&self.variables).zip(&self.bounded.step) {
+            *trial = value - share * step;
         }
+        clamp(&mut self.trial, &self.bounded.bounds);
+        let cost = self.problem.evaluate(&self.trial, &mut self.scratch, Some(&mut self.trial_gradient));
+        let decrease = self.cost.total() - cost.total();
+        // What is not a number is no decrease.
+        if decrease.is_nan() || decrease <= 0.0 {
+            return None;
+        }
+        std::mem::swap(&mut self.variables, &mut self.trial);
+        std::mem::swap(&mut self.gradient, &mut self.trial_gradient);
+        self.cost = cost;
+        Some(decrease / self.bounded.predicted(share))
     }
 }
 
-fn bounds(problem: &Problem<'_>) -> Option<Vec<(f64, f64)>> {
-    let robot = problem.robot?;
+/// Bounds of the control points; none without a robot.
+fn bounds(problem: &Problem<'_>) -> Vec<(f64, f64)> {
+    let Some(robot) = problem.robot else { return Vec::new() };
     let joints = (0..robot.tree.joint_count()).map(|joint| {
         let limits = robot.tree.joint(joint).limits;
         // So far inside that rounding does not carry a curve out again.
@@ -174,11 +168,11 @@ fn bounds(problem: &Problem<'_>) -> Option<Vec<(f64, f64)>> {
     let free = (f64::NEG_INFINITY, f64::INFINITY);
     let human = std::iter::repeat_n(free, problem.body.trajectories.len());
     let point: Vec<(f64, f64)> = human.chain(joints).collect();
-    Some(point.repeat(problem.basis().control_points()))
+    point.repeat(problem.basis().control_points())
 }
 
-fn clamp(variables: &mut [f64], bounds: Option<&[(f64, f64)]>) {
-    for (value, &(lower, upper)) in variables.iter_mut().zip(bounds.unwrap_or_default()) {
+fn clamp(variables: &mut [f64], bounds: &[(f64, f64)]) {
+    for (value, &(lower, upper)) in variables.iter_mut().zip(bounds) {
         *value = value.max(lower).min(upper);
     }
 }

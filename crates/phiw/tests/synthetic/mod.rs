@@ -42,7 +42,11 @@ pub fn recording(seed: u64, seconds: f64) -> Recording {
 
 /// The same of a robot of the same joints.
 pub fn recording_of(urdf: &str, seed: u64, seconds: f64) -> Recording {
-    let tree = read_urdf(urdf, &UrdfOptions::default()).unwrap().tree;
+    recording_of_tree(&read_urdf(urdf, &UrdfOptions::default()).unwrap().tree, seed, seconds)
+}
+
+/// The same of a robot that no URDF describes.
+pub fn recording_of_tree(tree: &Tree, seed: u64, seconds: f64) -> Recording {
     let mut random = RandomNumbers::new(seed);
     let joints = tree.joint_count();
     let sines: Vec<[[f64; 3]; 5]> = (0..joints)
@@ -55,7 +59,7 @@ pub fn recording_of(urdf: &str, seed: u64, seconds: f64) -> Recording {
         .collect();
     let mut recording =
         Recording { joints: tree.joint_names().map(str::to_owned).collect(), ..Recording::default() };
-    let mut workspace = Workspace::new(&tree);
+    let mut workspace = Workspace::new(tree);
     let mut torque = vec![0.0; joints];
     for row in 0..(seconds * RATE) as usize {
         let t = row as f64 / RATE;

@@ -44,6 +44,26 @@ impl Factor {
         Factor { columns, rows, r }
     }
 
+    /// The factor whose upper triangle is `entries`, row by row from the diagonal on, exactly as [`Self::triangle`] gave it; it stands for
+    /// `rows` rows.
+    ///
+    /// # Errors
+    /// There are not `columns`·(`columns` + 1)/2 entries.
+    pub fn of_triangle(columns: usize, rows: u64, entries: &[f64]) -> Result<Self, RegressorError> {
+        check_size("entries of a triangle", entries.len(), columns * (columns + 1) / 2)?;
+        let mut r = Mat::zeros(columns, columns);
+        let places = (0..columns).flat_map(|row| (row..columns).map(move |column| (row, column)));
+        places.zip(entries).for_each(|(place, value)| r[place] = *value);
+        Ok(Factor { columns, rows, r })
+    }
+
+    /// The entries of the upper triangle, row by row from the diagonal on.
+    pub fn triangle(&self) -> Vec<f64> {
+        (0..self.columns)
+            .flat_map(|row| (row..self.columns).map(move |column| self.r[(row, column)]))
+            .collect()
+    }
+
     /// The same factor standing for `rows` rows: for one that was written down and is read back.
     pub fn standing_for(self, rows: u64) -> Self {
         Factor { rows, ..self }

@@ -46,7 +46,8 @@ impl EffectKind for TorqueOffset {
     }
 }
 
-/// (1 + ε) on the measured torque: the column is the torque of the rigid body; the scaled friction is the friction's matter.
+/// (1 + ε) on the measured torque: the column is all torque that the model knows of, friction included. Where the friction is fitted its own columns take up that
+/// part of the change; where it is held nothing else would.
 pub struct TorqueGain;
 
 impl EffectKind for TorqueGain {
@@ -62,7 +63,7 @@ impl EffectKind for TorqueGain {
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
-            out[0] = sample.reference_torque().get(joint).copied().unwrap_or_default();
+            out[0] = sample.total_torque().get(joint).copied().unwrap_or_default();
         };
         let parameters = [("gain_error", ParameterKind::Ratio, -1.0)];
         let needs = Needs { torque: true, ..Needs::default() };

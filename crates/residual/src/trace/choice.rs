@@ -42,7 +42,7 @@ const FIRST_ORDER: f64 = 0.25;
 /// Times the residual that a held model left when it was fitted.
 const AS_IT_WAS: f64 = 1.1;
 /// A rival that is less probable is none.
-pub(super) const LEAST_RIVAL: f64 = 0.05;
+pub const LEAST_RIVAL: f64 = 0.05;
 
 impl Search<'_> {
     /// The best candidate if it is believed, and the ranking.
@@ -238,6 +238,13 @@ impl Search<'_> {
         let highest = standings.iter().map(|standing| standing.score).fold(f64::NEG_INFINITY, f64::max);
         standings.retain(|standing| standing.score >= highest - near_score(highest));
         standings.sort_by_key(|standing| complexity(&fitted.stage, standing.judged));
+        // The odds are those of the choice itself: one with more parameters than the one chosen has to be better by what the choice asks for.
+        let counted = |standing: &Standing<'_, Self>| complexity(&fitted.stage, standing.judged).0;
+        let fewest = standings.first().map_or(0, counted);
+        for standing in standings.iter_mut().filter(|standing| counted(standing) > fewest) {
+            standing.score -= near_score(highest);
+        }
+        let highest = standings.iter().map(|standing| standing.score).fold(f64::NEG_INFINITY, f64::max);
         let weigh = |score: f64| (score - highest).max(-700.0).exp();
         let sum: f64 = standings.iter().map(|standing| weigh(standing.score)).sum();
         let rivals: Vec<RivalEffect> = standings

@@ -20,8 +20,12 @@ pub struct TraceOptions {
     pub least_size: f64,
     /// A residual over the noise floor by less than this is noise.
     pub floor_margin: f64,
-    /// Autocorrelation over a quarter of a second from which a residual is structure.
-    pub structured_correlation: f64,
+    /// Autocorrelation over 0.25 to 0.5 s from which a residual is structure: that of the declared model, and that of one to which effects were added. To say that
+    /// an effect explains all asks for more than to say that nothing is missing.
+    pub structured_correlation: [f64; 2],
+    /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which it is structure: the noise of a robot's sensors is of one
+    /// colour, and raises all residuals over their floors alike.
+    pub structured_ratio: f64,
 }
 
 impl Default for TraceOptions {
@@ -33,7 +37,8 @@ impl Default for TraceOptions {
             least_of_others: 0.025,
             least_size: 0.01,
             floor_margin: 1.15,
-            structured_correlation: 0.2,
+            structured_correlation: [0.3, 0.2],
+            structured_ratio: 8.0,
         }
     }
 }

@@ -19,6 +19,7 @@ mod stage;
 mod tracing;
 mod verdict;
 
+pub use choice::LEAST_RIVAL;
 pub use floor::noise_floor;
 pub use input::{HeldModel, TraceInput, TraceOptions};
 pub use probe::Dependence;

@@ -6,7 +6,8 @@ use phiw_telemetry::FilterScratch;
 /// What the residual of each torque looks like on some folds.
 #[derive(Clone, Debug, Default)]
 pub struct ResidualShape {
-    /// Autocorrelation of each torque's residual a quarter of a second apart: near zero for noise, whatever its colour within the filter's band.
+    /// Autocorrelation of each torque's residual, less what the filter alone gives to noise: the largest of those 0.25 to 0.5 s apart. Near zero for
+    /// noise, whatever its colour within the filter's band. At several distances, since that of a residual that swings once a second is zero at one of them.
     pub autocorrelation: Vec<f64>,
     /// For each joint, spatial frequencies \[periods·2π over the unit of position\] at which its residual has peaks, strongest first.
     pub ripple_frequencies: Vec<Vec<f64>>,
@@ -14,19 +15,22 @@ pub struct ResidualShape {
     pub rows: u64,
 }
 
-/// Distance of two samples whose correlation is structure and not the noise's colour \[s\].
-const STRUCTURE_LAG: f64 = 0.25;
+/// Distances of two samples whose correlation is structure and not the noise's colour \[s\].
+const STRUCTURE_LAGS: [f64; 3] = [0.25, 0.35, 0.5];
 /// Peaks of the residual over the position that are tried as ripple.
 const PEAKS: usize = 4;
 /// Highest spatial frequency that is tried \[1/rad\].
 const HIGHEST_FREQUENCY: f64 = 130.0;
 
 struct Collector {
-    lag: usize,
+    /// Distances in outputs, ascending.
+    lags: [usize; STRUCTURE_LAGS.len()],
+    /// What noise has there after the filter.
+    of_noise: [f64; STRUCTURE_LAGS.len()],
     ring: Vec<Vec<f64>>,
     filled: usize,
-    products: Vec<f64>,
-    squares: Vec<f64>,
+    /// For each torque and distance: sum of the products, sum of the squares.
+    products: Vec<[(f64, f64); STRUCTURE_LAGS.len()]>,
     grids: Vec<Grid>,
 }
 
@@ -90,11 +94,11 @@ pub fn residual_shape(
 ) -> Result<ResidualShape, IdentificationError> {
     let torques = design.rows().len();
     let mut collector = Collector {
-        lag: 0,
+        lags: Default::default(),
+        of_noise: Default::default(),
         ring: Vec::new(),
         filled: 0,
-        products: vec![0.0; torques],
-        squares: vec![0.0; torques],
+        products: vec![Default::default(); torques],
         grids: ranges.iter().map(|&range| Grid::new(range)).collect(),
     };
     let mut scratch = design.scratch();
@@ -115,7 +119,10 @@ pub fn residual_shape(
             let outputs = block.outputs.clone();
             if let [first, second, ..] = outputs[..] {
                 let period = block.t[second] - block.t[first];
-                collector.begin((STRUCTURE_LAG / period).round().max(1.0) as usize, continues);
+                let lags = STRUCTURE_LAGS.map(|lag| (lag / period).round().max(1.0) as usize);
+                collector.begin(lags, continues);
+                let filter = block.parallel_filter();
+                collector.of_noise = lags.map(|lag| filter.noise_autocorrelation(lag * filter.decimation()));
             }
             let mut evaluated = Ok(());
             block.filter(
@@ -128,7 +135,7 @@ pub fn residual_shape(
                 },
                 |output, t, row| {
                     if !folds.iter().any(|fold| fold.log == block.log && fold.start <= t && t < fold.end) {
-                        return collector.begin(collector.lag, false);
+                        return collector.begin(collector.lags, false);
                     }
                     rows += 1;
                     for (torque, layout) in design.rows().iter().enumerate() {
@@ -155,19 +162,24 @@ pub fn residual_shape(
     if let Some(error) = failure {
         return Err(error.into());
     }
-    let correlation = |(product, square): (&f64, &f64)| if *square > 0.0 { product / square } else { 0.0 };
+    let correlation = |&(product, square): &(f64, f64)| if square > 0.0 { product / square } else { 0.0 };
+    let largest = |sums: &[(f64, f64); STRUCTURE_LAGS.len()]| {
+        let by_size = |a: &f64, b: &f64| a.abs().total_cmp(&b.abs());
+        sums.iter().map(correlation).max_by(by_size).unwrap_or_default()
+    };
     Ok(ResidualShape {
-        autocorrelation: collector.products.iter().zip(&collector.squares).map(correlation).collect(),
+        autocorrelation: collector.products.iter().map(largest).collect(),
         ripple_frequencies: collector.grids.iter().map(Grid::peaks).collect(),
         rows,
     })
 }
 
 impl Collector {
-    fn begin(&mut self, lag: usize, continues: bool) {
-        if lag != self.lag {
-            self.ring = vec![vec![0.0; self.squares.len()]; lag];
-            self.lag = lag;
+    fn begin(&mut self, lags: [usize; STRUCTURE_LAGS.len()], continues: bool) {
+        if lags != self.lags {
+            let longest = lags.into_iter().max().unwrap_or_default();
+            self.ring = vec![vec![0.0; self.products.len()]; longest];
+            self.lags = lags;
             self.filled = 0;
         } else if !continues {
             self.filled = 0;
@@ -180,17 +192,18 @@ impl Collector {
                 grid.add(positions[joint], residual[joint]);
             }
         }
-        if self.lag == 0 {
+        let size = self.ring.len();
+        if size == 0 {
             return;
         }
-        let slot = self.filled % self.lag;
-        for torque in 0..residual.len() {
-            if self.filled >= self.lag {
-                self.products[torque] += self.ring[slot][torque] * residual[torque];
-                self.squares[torque] += residual[torque] * residual[torque];
+        for (place, lag) in self.lags.into_iter().enumerate().filter(|(_, lag)| *lag <= self.filled) {
+            let before = &self.ring[(self.filled - lag) % size];
+            for ((sums, before), now) in self.products.iter_mut().zip(before).zip(residual) {
+                sums[place].0 += before * now - self.of_noise[place] * now * now;
+                sums[place].1 += now * now;
             }
-            self.ring[slot][torque] = residual[torque];
         }
+        self.ring[self.filled % size].copy_from_slice(residual);
         self.filled += 1;
     }
 }

@@ -113,10 +113,14 @@ impl Search<'_> {
         ranking: Vec<Ranked>,
         shape: &ResidualShape,
     ) -> Result<Remaining, IdentificationError> {
+        let least = self.options.structured_correlation[usize::from(!self.found.is_empty())];
+        let over = |row: usize| held_out.rmse[row] / self.input.noise_floor[row];
+        let nearest = (0..held_out.rmse.len()).map(over).fold(f64::INFINITY, f64::min).max(1.0);
         let structured: Vec<usize> = (0..held_out.rmse.len())
             .filter(|&row| {
-                held_out.rmse[row] > self.options.floor_margin * self.input.noise_floor[row]
-                    && shape.autocorrelation[row].abs() > self.options.structured_correlation
+                let stands_out = over(row) > self.options.structured_ratio * nearest;
+                let correlated = shape.autocorrelation[row].abs() > least;
+                over(row) > self.options.floor_margin && (stands_out || correlated)
             })
             .collect();
         let reference = self.fixed.reference(&self.specs, parameters)?;

@@ -1,0 +1,75 @@
+//! When the curriculum ends.
+
+use crate::IterationRecord;
+use serde::{Deserialize, Serialize};
+
+/// Why a curriculum ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EndReason {
+    /// The number of iterations that was asked for.
+    Count,
+    /// Another motion would change little.
+    Converged,
+}
+
+/// Decides after each iteration whether it was the last.
+pub trait EndCriterion: Send + Sync {
+    /// Why the curriculum ends here; none if it goes on.
+    fn reason(&self, history: &[IterationRecord]) -> Option<EndReason>;
+}
+
+/// The paper's: a fixed number of iterations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FixedCount(pub usize);
+
+impl Default for FixedCount {
+    /// Five.
+    fn default() -> Self {
+        FixedCount(5)
+    }
+}
+
+impl EndCriterion for FixedCount {
+    fn reason(&self, history: &[IterationRecord]) -> Option<EndReason> {
+        (history.len() >= self.0).then_some(EndReason::Count)
+    }
+}
+
+/// The curriculum has converged when its last motion neither made Φ much better nor moved the model's torques.
+///
+/// Both are known on a real robot: cond(Φ) is the paper's own proposal for an end condition (its section 6); the torques are those that the
+/// new and the old parameters predict for all motions of the dataset, which unlike a measured torque error has no floor of noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Converged {
+    /// Largest change of the predicted torques, over their RMS, that counts as none.
+    pub torque_change: f64,
+    /// Largest share by which cond(Φ) may still fall.
+    pub condition_change: f64,
+    /// Iterations at least.
+    pub least: usize,
+    /// Iterations at most.
+    pub most: usize,
+}
+
+impl Default for Converged {
+    /// Torques within 2 %, cond within 10 %, two to ten iterations.
+    fn default() -> Self {
+        Converged { torque_change: 0.02, condition_change: 0.1, least: 2, most: 10 }
+    }
+}
+
+impl EndCriterion for Converged {
+    fn reason(&self, history: &[IterationRecord]) -> Option<EndReason> {
+        if history.len() >= self.most {
+            return Some(EndReason::Count);
+        }
+        let [.., before, last] = history else { return None };
+        let (Some(before), Some(cond)) = (before.condition_number, last.condition_number) else {
+            return None;
+        };
+        let settled = last.torque_change.is_some_and(|change| change <= self.torque_change)
+            && cond >= (1.0 - self.condition_change) * before;
+        (history.len() >= self.least && settled).then_some(EndReason::Converged)
+    }
+}

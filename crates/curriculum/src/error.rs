@@ -1,0 +1,57 @@
+//! What can go wrong in a curriculum.
+
+use phiw_dynamics::DimensionError;
+use phiw_identification::{EffectError, IdentificationError};
+use phiw_plant::PlantError;
+use phiw_regressor::RegressorError;
+use phiw_telemetry::LogError;
+
+/// Why an iteration can not be done.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CurriculumError {
+    /// A motion is not one.
+    #[error("the motion {name}: {problem}")]
+    Motion {
+        /// Its name.
+        name: String,
+        /// What is wrong with it, and how to mend it.
+        problem: String,
+    },
+    /// There is nothing to choose from.
+    #[error("there are no motions to choose from: retarget some first (phiw retarget)")]
+    NoMotions,
+    /// A number lies outside what makes sense.
+    #[error("{what} is {value}: it must be {must_be}")]
+    Value {
+        /// Which number.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        must_be: &'static str,
+    },
+    /// A saved run is not of this robot or these motions.
+    #[error(
+        "the saved run does not fit: {0}; use the robot and the motions that it was begun with, or begin anew"
+    )]
+    SavedRun(String),
+    /// A slice does not fit the robot.
+    #[error(transparent)]
+    Dimension(#[from] DimensionError),
+    /// An effect can not be built.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+    /// The estimate failed.
+    #[error(transparent)]
+    Identification(#[from] IdentificationError),
+    /// The plant failed.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// A log can not be conditioned.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The linear algebra failed.
+    #[error(transparent)]
+    Regressor(#[from] RegressorError),
+}

@@ -1,0 +1,127 @@
+//! All that estimators remember of what was measured.
+
+use super::stored::StoredFactor;
+use crate::candidates::grouped_factor;
+use crate::{CurriculumError, Measured};
+use phiw_identification::Design;
+use phiw_regressor::RegressorError;
+use phiw_regressor::factor::Factor;
+use phiw_regressor::least_squares::{Group, GroupedFactor};
+use phiw_telemetry::Block;
+use serde::{Deserialize, Serialize};
+
+/// Time between two instants at which the motion's sensitivity is looked at \[s\].
+const INSTANT_EVERY_S: f64 = 0.4;
+
+/// Which instants of a log become rows of Φ.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RowsAt {
+    /// The stamps: position, velocity and acceleration as they were measured there, as the paper has it.
+    Stamps,
+    /// The middle of each period: what the motion was on average while one command was held. Position by Hermite's cubic, velocity
+    /// Δq/T, acceleration Δq̇/T, so that inertia and viscous friction balance the command exactly, however fast the motion changes within a period.
+    #[default]
+    Periods,
+}
+
+/// One instant of a motion that stands for many.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Instant {
+    /// How many rows it stands for.
+    pub weight: f64,
+    /// Time over which one command was held \[s\].
+    pub period_s: f64,
+    /// `[q, q̇, q̈]`.
+    pub state: [Vec<f64>; 3],
+}
+
+/// What was measured, reduced to what estimators and selections need; it depends on the length of the logs by some instants only.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(into = "StoredEvidence", try_from = "StoredEvidence")]
+pub struct Evidence {
+    rows_at: RowsAt,
+    factor: GroupedFactor,
+    instants: Vec<Instant>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct StoredEvidence {
+    rows_at: RowsAt,
+    factor: StoredFactor,
+    instants: Vec<Instant>,
+}
+
+impl From<Evidence> for StoredEvidence {
+    fn from(evidence: Evidence) -> Self {
+        let Evidence { rows_at, factor, instants } = evidence;
+        StoredEvidence { rows_at, factor: StoredFactor::from(&factor), instants }
+    }
+}
+
+impl TryFrom<StoredEvidence> for Evidence {
+    type Error = RegressorError;
+
+    fn try_from(stored: StoredEvidence) -> Result<Self, RegressorError> {
+        let StoredEvidence { rows_at, factor, instants } = stored;
+        Ok(Evidence { rows_at, factor: factor.try_into()?, instants })
+    }
+}
+
+impl Evidence {
+    /// Nothing yet.
+    ///
+    /// # Errors
+    /// None that a design can cause.
+    pub fn none(design: &Design, rows_at: RowsAt) -> Result<Self, CurriculumError> {
+        let group = |row: &phiw_identification::RowLayout| Group {
+            parameters: row.parameters.clone(),
+            factor: Factor::empty(row.parameters.len() + 1),
+        };
+        let groups = design.rows().iter().map(group).collect();
+        let factor = GroupedFactor::new(design.parameter_count(), groups)?;
+        Ok(Evidence { rows_at, factor, instants: Vec::new() })
+    }
+
+    /// Takes in a log.
+    ///
+    /// # Errors
+    /// It is not of this robot, or has no derivatives where [`RowsAt`] asks for them.
+    pub fn add(&mut self, design: &Design, measured: &Measured) -> Result<(), CurriculumError> {
+        let block = match self.rows_at {
+            RowsAt::Stamps => measured.at_stamps()?,
+            RowsAt::Periods => measured.over_periods()?,
+        };
+        self.instants.extend(instants(&block, measured.period_s));
+        self.factor = self.factor.merge(&grouped_factor(design, block)?)?;
+        Ok(())
+    }
+
+    /// R of \[Φ f\], one for each torque.
+    pub fn factor(&self) -> &GroupedFactor {
+        &self.factor
+    }
+
+    /// Instants that stand for the motion.
+    pub fn instants(&self) -> &[Instant] {
+        &self.instants
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.factor.rows() == 0
+    }
+}
+
+/// Evenly spaced samples, each in the middle of those that it stands for.
+fn instants(block: &Block, period_s: f64) -> Vec<Instant> {
+    let stride = ((INSTANT_EVERY_S / period_s).round() as usize).max(1);
+    let stretches = block.len().div_ceil(stride);
+    let stretch = |index: usize| {
+        let end = ((index + 1) * stride).min(block.len());
+        let row = block.row((index * stride).midpoint(end - 1));
+        let state = [&block.q, &block.qd, &block.qdd].map(|signal| signal[row.clone()].to_vec());
+        Instant { weight: (end - index * stride) as f64, period_s, state }
+    };
+    (0..stretches).map(stretch).collect()
+}

@@ -1,0 +1,308 @@
+//! Maximum likelihood where the noise moves the robot.
+
+use super::sensitivity::{Sensitivity, cholesky, packed, place};
+use super::{Estimate, Estimator, Evidence};
+use crate::robot::spheres;
+use crate::{CurriculumError, RobotModel};
+use faer::prelude::Solve;
+use faer::{Mat, Side};
+use phiw_dynamics::check_size;
+use phiw_identification::Design;
+use phiw_regressor::least_squares::GroupedFactor;
+
+/// The parameters under which the *motion* that was measured is most likely, given the commands.
+///
+/// The paper's plant adds noise δ to the commanded torque f on its way to the robot, and logs the command: Φ(q, q̇, q̈)·w = f + δ, and δ
+/// is in q̈. What is random is the motion, not the right-hand side. Its density is that of δ times the Jacobian
+/// |∂δ/∂q̈| = det J(q; w), J the mass matrix (and what half a period of friction adds to it), so with σ_j the noise of torque j
+///
+/// −log L(w) = Σ_t ½‖Φ_t w − f_t‖²_σ − Σ_t log det J_t(w).
+///
+/// Least squares is the first sum alone, and shrinks every inertia to explain the noise's own accelerations; the second sum is what
+/// a robot without inertia would be unlikely for. J is linear in w and log det is concave, so the problem is convex: damped Newton steps
+/// find its only minimum from anywhere inside. Bodies that make some J indefinite can not exist, and lie outside. A closed loop does no
+/// harm: a command may depend on the past as it likes. (Compare the prediction-error view of closed-loop identification, Forssell & Ljung
+/// 1999.)
+///
+/// σ must be known: the noise of the actuators, as a data sheet gives it. With σ free, a robot with more inertia and more noise
+/// is nearly as likely, and little is gained over least squares.
+///
+/// Right for rows over periods ([`super::RowsAt::Periods`]) and exact encoders, to first order in how much friction slows a joint within one
+/// period. Noise in the logged torque, which moves nothing, is taken for noise that does; where that dominates,
+/// [`super::WeightedLeastSquares`] is right.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MotionLikelihood {
+    /// σ: standard deviation of each torque's noise \[N·m, N\].
+    pub torque_noise: Vec<f64>,
+    /// Newton steps at most.
+    pub most_steps: usize,
+    /// The last step's length in standard deviations of the parameters (all together) at which the minimum counts as found.
+    pub settled: f64,
+}
+
+impl MotionLikelihood {
+    /// For torques with this noise \[N·m, N\].
+    pub fn new(torque_noise: Vec<f64>) -> Self {
+        MotionLikelihood { torque_noise, most_steps: 40, settled: 0.05 }
+    }
+}
+
+impl Estimator for MotionLikelihood {
+    fn name(&self) -> &'static str {
+        "motion_likelihood"
+    }
+
+    fn estimate(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        present: &RobotModel,
+        present_parameters: &[f64],
+    ) -> Result<Estimate, CurriculumError> {
+        check_size(
+            "standard deviations of the torques' noise",
+            self.torque_noise.len(),
+            design.rows().len(),
+        )?;
+        if let Some(&value) = self.torque_noise.iter().find(|noise| !(noise.is_finite() && **noise > 0.0)) {
+            return Err(CurriculumError::Value {
+                what: "the noise of a torque",
+                value,
+                must_be: "finite and > 0",
+            });
+        }
+        let precision: Vec<f64> = self.torque_noise.iter().map(|noise| noise.powi(-2)).collect();
+        let sensitivities: Result<Vec<Sensitivity>, CurriculumError> =
+            evidence.instants().iter().map(|instant| Sensitivity::of(design, instant)).collect();
+        let problem = Problem::new(evidence.factor(), sensitivities?, precision);
+        let mut w = column(present_parameters);
+        if problem.log_determinants(&w).is_none() {
+            // Random parameters are no bodies; spheres of the same mass at the same place are.
+            let mut start = design.base().from_standard(&spheres(&present.standard))?;
+            start.extend(present_parameters[start.len()..].iter().map(|value| value.abs()));
+            w = column(&start);
+        }
+        let mut curvature = Mat::zeros(0, 0);
+        let mut freshness = 0;
+        for step in 0..self.most_steps {
+            let (gradient, factors) = problem.gradient(&w);
+            // The curvature of log det changes slowly: it is the dearest part.
+            if step < 2 || step % 4 == 0 {
+                curvature = problem.log_determinant_curvature(&factors);
+                freshness = step;
+            }
+            let hessian = problem.hessian(&curvature);
+            let Ok(factor) = hessian.llt(Side::Lower) else { break };
+            let direction = factor.solve(&gradient);
+            let decrement = (0..w.nrows()).map(|k| direction[(k, 0)] * gradient[(k, 0)]).sum::<f64>();
+            let moved = problem.line_search(&mut w, &direction, decrement);
+            if !moved || (decrement.max(0.0).sqrt() < self.settled && step > freshness) || decrement < 1e-8 {
+                break;
+            }
+        }
+        let standard_deviations = match problem.hessian(&curvature).llt(Side::Lower) {
+            Ok(factor) => {
+                let covariance = factor.solve(Mat::<f64>::identity(w.nrows(), w.nrows()));
+                (0..w.nrows()).map(|k| covariance[(k, k)].max(0.0).sqrt()).collect()
+            }
+            Err(_) => vec![f64::NAN; w.nrows()],
+        };
+        Ok(Estimate { parameters: (0..w.nrows()).map(|k| w[(k, 0)]).collect(), standard_deviations })
+    }
+}
+
+fn column(values: &[f64]) -> Mat<f64> {
+    Mat::from_fn(values.len(), 1, |row, _| values[row])
+}
+
+/// −log L and its derivatives.
+struct Problem<'a> {
+    factor: &'a GroupedFactor,
+    /// RᵀR of each torque over all parameters: for steps only, so half the digits are enough.
+    grams: Vec<Mat<f64>>,
+    sensitivities: Vec<Sensitivity>,
+    /// 1/σ² of each torque.
+    precision: Vec<f64>,
+}
+
+impl<'a> Problem<'a> {
+    fn new(factor: &'a GroupedFactor, sensitivities: Vec<Sensitivity>, precision: Vec<f64>) -> Self {
+        let gram = |group: &phiw_regressor::least_squares::Group| {
+            let size = group.factor.parameters();
+            let r = group.factor.as_mat().get(..size, ..size);
+            r.transpose() * r
+        };
+        Problem { grams: factor.groups().iter().map(gram).collect(), factor, sensitivities, precision }
+    }
+
+    /// R_j·w − z_j of a torque.
+    fn residual(&self, group: usize, w: &Mat<f64>) -> Mat<f64> {
+        let group = &self.factor.groups()[group];
+        let size = group.factor.parameters();
+        let r = group.factor.as_mat();
+        let own = Mat::from_fn(size, 1, |row, _| w[(group.parameters[row], 0)]);
+        r.get(.., ..size) * own - r.get(.., size..)
+    }
+
+    /// Σ weight·log det J; none where some J is not positive definite.
+    fn log_determinants(&self, w: &Mat<f64>) -> Option<f64> {
+        let mut sum = 0.0;
+        for sensitivity in &self.sensitivities {
+            let lower = self.cholesky(sensitivity, w)?;
+            sum += sensitivity.weight
+                * (0..self.precision.len()).map(|row| 2.0 * lower[place(row, row)].ln()).sum::<f64>();
+        }
+        Some(sum)
+    }
+
+    fn cholesky(&self, sensitivity: &Sensitivity, w: &Mat<f64>) -> Option<Vec<f64>> {
+        let j = &sensitivity.packed * w;
+        cholesky(self.precision.len(), j.col_as_slice(0))
+    }
+
+    fn cost(&self, w: &Mat<f64>) -> f64 {
+        let Some(log_determinants) = self.log_determinants(w) else { return f64::INFINITY };
+        let squares: f64 = (0..self.grams.len())
+            .map(|group| 0.5 * self.precision[group] * self.residual(group, w).squared_norm_l2())
+            .sum();
+        squares - log_determinants
+    }
+
+    /// The gradient, and Cholesky's factors of all J.
+    fn gradient(&self, w: &Mat<f64>) -> (Mat<f64>, Vec<Vec<f64>>) {
+        let mut gradient = Mat::zeros(w.nrows(), 1);
+        for (index, group) in self.factor.groups().iter().enumerate() {
+            let size = group.factor.parameters();
+            let own = group.factor.as_mat().get(.., ..size).transpose() * self.residual(index, w);
+            for (row, &parameter) in group.parameters.iter().enumerate() {
+                gradient[(parameter, 0)] += self.precision[index] * own[(row, 0)];
+            }
+        }
+        let mut factors = Vec::with_capacity(self.sensitivities.len());
+        for sensitivity in &self.sensitivities {
+            let lower = self.cholesky(sensitivity, w).unwrap_or_default();
+            if !lower.is_empty() {
+                let inverse = packed_inverse(self.precision.len(), &lower);
+                gradient -= sensitivity.packed.transpose() * inverse * faer::Scale(sensitivity.weight);
+            }
+            factors.push(lower);
+        }
+        (gradient, factors)
+    }
+
+    /// Σ weight·tr(J⁻¹ J_k J⁻¹ J_l).
+    fn log_determinant_curvature(&self, factors: &[Vec<f64>]) -> Mat<f64> {
+        let parameters = self.factor.parameter_count();
+        let mut curvature = Mat::zeros(parameters, parameters);
+        // A part of the instants is enough for a step's length; all of them count in the gradient.
+        const EVERY: usize = 4;
+        let all: f64 = self.sensitivities.iter().map(|sensitivity| sensitivity.weight).sum();
+        let chosen = || self.sensitivities.iter().zip(factors).skip(EVERY / 2).step_by(EVERY);
+        let part: f64 = chosen().map(|(sensitivity, _)| sensitivity.weight).sum();
+        for (sensitivity, lower) in chosen().filter(|(_, lower)| !lower.is_empty()) {
+            let mut reduced = sensitivity.packed.clone();
+            for parameter in 0..parameters {
+                reduce(self.precision.len(), lower, reduced.col_as_slice_mut(parameter));
+            }
+            let weight = sensitivity.weight * all / part;
+            faer::linalg::matmul::matmul(
+                &mut curvature,
+                faer::Accum::Add,
+                reduced.transpose(),
+                &reduced,
+                weight,
+                faer::Par::Seq,
+            );
+        }
+        curvature
+    }
+
+    fn hessian(&self, curvature: &Mat<f64>) -> Mat<f64> {
+        let mut hessian = curvature.clone();
+        for ((group, gram), precision) in self.factor.groups().iter().zip(&self.grams).zip(&self.precision) {
+            for (column, &right) in group.parameters.iter().enumerate() {
+                for (row, &left) in group.parameters.iter().enumerate() {
+                    hessian[(left, right)] += precision * gram[(row, column)];
+                }
+            }
+        }
+        // Directions that nothing determines stay where they are.
+        for k in 0..hessian.nrows() {
+            hessian[(k, k)] = hessian[(k, k)] * (1.0 + 1e-10) + 1e-12;
+        }
+        hessian
+    }
+
+    /// Moves `w` along −direction as far as −log L falls enough (Armijo); false if it does not fall at all.
+    fn line_search(&self, w: &mut Mat<f64>, direction: &Mat<f64>, decrement: f64) -> bool {
+        let before = self.cost(w);
+        let mut length = 1.0;
+        while length > 1e-6 {
+            let trial = &*w - direction * faer::Scale(length);
+            let cost = self.cost(&trial);
+            if cost <= before - 0.1 * length * decrement {
+                *w = trial;
+                return true;
+            }
+            length *= 0.5;
+        }
+        false
+    }
+}
+
+/// The inverse from Cholesky's factor, packed with √2 beside the diagonal.
+fn packed_inverse(n: usize, lower: &[f64]) -> Mat<f64> {
+    let mut inverse = Mat::zeros(packed(n), 1);
+    let mut unit = vec![0.0; n];
+    for index in 0..n {
+        unit.fill(0.0);
+        unit[index] = 1.0;
+        solve_lower(n, lower, &mut unit);
+        for row in (0..n).rev() {
+            for below in row + 1..n {
+                unit[row] -= lower[place(below, row)] * unit[below];
+            }
+            unit[row] /= lower[place(row, row)];
+        }
+        for row in index..n {
+            let scale = if row == index { 1.0 } else { std::f64::consts::SQRT_2 };
+            inverse[(place(row, index), 0)] = scale * unit[row];
+        }
+    }
+    inverse
+}
+
+fn solve_lower(n: usize, lower: &[f64], x: &mut [f64]) {
+    for row in 0..n {
+        let known: f64 = (0..row).map(|k| lower[place(row, k)] * x[k]).sum();
+        x[row] = (x[row] - known) / lower[place(row, row)];
+    }
+}
+
+/// S → L⁻¹ S L⁻ᵀ, packed, in place.
+fn reduce(n: usize, lower: &[f64], column: &mut [f64]) {
+    let mut full = vec![0.0; n * n];
+    for row in 0..n {
+        for col in 0..=row {
+            let scale = if row == col { 1.0 } else { std::f64::consts::FRAC_1_SQRT_2 };
+            let value = scale * column[place(row, col)];
+            full[row * n + col] = value;
+            full[col * n + row] = value;
+        }
+    }
+    // Rows are columns of a symmetric matrix: solve each, transpose, solve each again.
+    for _ in 0..2 {
+        full.chunks_exact_mut(n).for_each(|row| solve_lower(n, lower, row));
+        for row in 0..n {
+            for col in 0..row {
+                full.swap(row * n + col, col * n + row);
+            }
+        }
+    }
+    for row in 0..n {
+        for col in 0..=row {
+            let scale = if row == col { 1.0 } else { std::f64::consts::SQRT_2 };
+            column[place(row, col)] = scale * full[row * n + col];
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! From what was measured to parameters: equation (4), and estimators that know where the noise comes from.
+
+mod evidence;
+mod least_squares;
+mod likelihood;
+mod sensitivity;
+mod stored;
+
+pub use evidence::{Evidence, Instant, RowsAt};
+pub use least_squares::{LeastSquares, WeightedLeastSquares};
+pub use likelihood::MotionLikelihood;
+
+use crate::{CurriculumError, RobotModel};
+use phiw_identification::Design;
+
+/// Estimated parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// w: base parameters, then those of the effects.
+    pub parameters: Vec<f64>,
+    /// Standard deviation of each, as the estimator sees it; NaN where it does not know.
+    pub standard_deviations: Vec<f64>,
+}
+
+/// Estimates parameters from all that has been measured.
+pub trait Estimator: Send + Sync {
+    /// Its name, for reports: `least_squares`.
+    fn name(&self) -> &'static str;
+
+    /// The parameters of `design`.
+    ///
+    /// `present` is what was believed before, with the parameters of the design: what the evidence does not determine stays as it is there.
+    ///
+    /// # Errors
+    /// The evidence is not of this design, or can not be solved.
+    fn estimate(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        present: &RobotModel,
+        present_parameters: &[f64],
+    ) -> Result<Estimate, CurriculumError>;
+}

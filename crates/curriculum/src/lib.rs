@@ -1,0 +1,36 @@
+#![doc = include_str!("../README.md")]
+#![warn(missing_docs)]
+
+mod candidates;
+mod constraint;
+mod controller;
+mod curriculum;
+mod end;
+mod error;
+mod estimation;
+mod experiment;
+mod measured;
+mod motion;
+mod record;
+mod relaxation;
+mod robot;
+pub mod selection;
+mod triangle;
+
+pub use candidates::{Candidate, Candidates};
+pub use constraint::{Constraint, Safety, Unconstrained, ZmpConstraint};
+pub use controller::{Controller, FeedForward};
+pub use curriculum::{Curriculum, Plan, unreliable_model};
+pub use end::{Converged, EndCriterion, EndReason, FixedCount};
+pub use error::CurriculumError;
+pub use estimation::{
+    Estimate, Estimator, Evidence, Instant, LeastSquares, MotionLikelihood, RowsAt, WeightedLeastSquares,
+};
+pub use experiment::{BuildBackend, Experiment, SimulatedRobot, Trial};
+pub use measured::Measured;
+pub use motion::{Motion, MotionDataset};
+pub use record::{IterationRecord, Run};
+pub use relaxation::{ConditionRelaxation, Learnt, Maximum, Relaxation, Scale};
+pub use robot::{KnownEffect, Robot, RobotModel};
+pub use selection::Selection;
+pub use triangle::Triangle;

@@ -1,0 +1,111 @@
+//! What the robot did: the measured Qⁱ and fⁱ.
+
+use crate::CurriculumError;
+use phiw_telemetry::{Block, Recording};
+use serde::{Deserialize, Serialize};
+
+/// A log with velocities, evenly sampled. Arrays are row-major, `[row × joints]`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// Number of joints.
+    pub joints: usize,
+    /// Time between two rows \[s\].
+    pub period_s: f64,
+    /// Positions \[rad, m\].
+    pub q: Vec<f64>,
+    /// Velocities \[rad/s, m/s\].
+    pub qd: Vec<f64>,
+    /// Accelerations; empty if they were not measured.
+    pub qdd: Vec<f64>,
+    /// Torques as they were logged \[N·m, N\]. Over a period the one at its beginning is held.
+    pub tau: Vec<f64>,
+    /// For each row, whether the base stood still from it to the next; empty if it is bolted down. Rows in which it did not are no rows of a robot
+    /// on a fixed base, and do not count.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub still: Vec<bool>,
+}
+
+impl Measured {
+    /// From a recording.
+    ///
+    /// # Errors
+    /// It has no velocities, or fewer than two rows.
+    pub fn from_recording(recording: &Recording) -> Result<Self, CurriculumError> {
+        let wrong = |problem: &str| CurriculumError::Motion {
+            name: "as measured".to_owned(),
+            problem: problem.to_owned(),
+        };
+        let [first, .., last] = recording.t.as_slice() else {
+            return Err(wrong("it has fewer than two rows"));
+        };
+        let period_s = (last - first) / (recording.t.len() - 1) as f64;
+        let qd = recording
+            .qd
+            .clone()
+            .ok_or_else(|| wrong("it has no velocities: let the sensors measure them"))?;
+        Ok(Measured {
+            joints: recording.joints.len(),
+            period_s,
+            q: recording.q.clone(),
+            qd,
+            qdd: recording.qdd.clone().unwrap_or_default(),
+            tau: recording.tau.clone(),
+            still: Vec::new(),
+        })
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.q.len().checked_div(self.joints).unwrap_or(0)
+    }
+
+    /// Share of the rows in which the base stood still.
+    pub fn still_share(&self) -> f64 {
+        let still = self.still.iter().filter(|still| **still).count();
+        if self.still.is_empty() { 1.0 } else { still as f64 / self.still.len() as f64 }
+    }
+
+    /// The rows as they are.
+    ///
+    /// # Errors
+    /// Accelerations were not measured.
+    pub(crate) fn at_stamps(&self) -> Result<Block, CurriculumError> {
+        if self.qdd.len() != self.q.len() {
+            let problem = "it has no accelerations: take rows over periods, which need none".to_owned();
+            return Err(CurriculumError::Motion { name: "as measured".to_owned(), problem });
+        }
+        let signals = [self.q.clone(), self.qd.clone(), self.qdd.clone()];
+        Ok(self.counted(0.0, signals, self.tau.clone()))
+    }
+
+    /// A block of the rows that count, stamped `shift_s` after their own.
+    fn counted(&self, shift_s: f64, mut signals: [Vec<f64>; 3], mut tau: Vec<f64>) -> Block {
+        let rows = tau.len() / self.joints.max(1);
+        let counts = |row: usize| self.still.get(row).copied().unwrap_or(true);
+        let t =
+            (0..rows).filter(|&row| counts(row)).map(|row| row as f64 * self.period_s + shift_s).collect();
+        for values in signals.iter_mut().chain([&mut tau]) {
+            let mut index = 0;
+            values.retain(|_| {
+                index += 1;
+                counts((index - 1) / self.joints)
+            });
+        }
+        Block::unfiltered(self.joints, t, signals, tau)
+    }
+
+    /// One row for each period: the middle position of Hermite's cubic, and the means of velocity and acceleration.
+    pub(crate) fn over_periods(&self) -> Result<Block, CurriculumError> {
+        let rows = self.rows().saturating_sub(1);
+        let (count, period) = (rows * self.joints, self.period_s);
+        let mut signals = [0; 3].map(|_| Vec::with_capacity(count));
+        for index in 0..count {
+            let next = index + self.joints;
+            let ([q0, q1], [v0, v1]) = ([self.q[index], self.q[next]], [self.qd[index], self.qd[next]]);
+            signals[0].push(0.5 * (q0 + q1) - 0.125 * period * (v1 - v0));
+            signals[1].push((q1 - q0) / period);
+            signals[2].push((v1 - v0) / period);
+        }
+        Ok(self.counted(0.5 * period, signals, self.tau[..count].to_vec()))
+    }
+}

@@ -1,0 +1,79 @@
+//! What is written down of an iteration, and of a run: everything that is needed to go on.
+
+use crate::selection::Choice;
+use crate::{EndReason, Evidence, Measured, RobotModel};
+use serde::{Deserialize, Serialize};
+
+/// One iteration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct IterationRecord {
+    /// Name of the motion.
+    pub motion: String,
+    /// Why this one.
+    pub choice: Choice,
+    /// Number of motions that the constraint allowed.
+    pub allowed: usize,
+    /// The constraint allowed none, and the safest was taken.
+    pub forced: bool,
+    /// The reduction coefficient α.
+    pub alpha: f64,
+    /// Smallest distance of the reference's ZMP from the border of the support, under the belief of the time \[m\]; none without one.
+    pub margin_m: Option<f64>,
+    /// When the robot fell, since the motion's start \[s\]. Its log then counts for nothing.
+    pub fell_at_s: Option<f64>,
+    /// Share of the log's rows in which the base stood still; only these count.
+    pub still_share: f64,
+    /// RMS of each joint's tracking error \[rad, m\].
+    pub tracking_error: Vec<f64>,
+    /// cond(Φ) of all that has been measured so far, this motion included; none before anything has been.
+    pub condition_number: Option<f64>,
+    /// RMS over all motions of the dataset of how far the model's torques have moved in this iteration, over their RMS; none where the model
+    /// has grown.
+    pub torque_change: Option<f64>,
+    /// The belief after this iteration.
+    pub model: RobotModel,
+    /// Standard deviations of its parameter vector; `null` where the estimator does not know.
+    pub standard_deviations: Vec<Option<f64>>,
+}
+
+/// A run of a curriculum: all that is needed to go on with it, to the last bit.
+///
+/// It is a plain value. Whoever keeps it in a file after each iteration can be killed at any moment.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Run {
+    /// Seed of all that is random in it.
+    pub seed: u64,
+    /// The first belief.
+    pub initial: RobotModel,
+    /// The present belief.
+    pub model: RobotModel,
+    /// α of the first iteration.
+    pub first_alpha: Option<f64>,
+    /// All that was measured; none before the first measurement, and once the run has ended.
+    pub evidence: Option<Evidence>,
+    /// The logs themselves, where the model may grow: new columns need them.
+    pub logs: Vec<Measured>,
+    /// Motions on which the robot fell, and which it is not asked for again.
+    pub excluded: Vec<usize>,
+    /// The iterations so far.
+    pub history: Vec<IterationRecord>,
+    /// Why it ended; none while it goes on.
+    pub ended: Option<EndReason>,
+}
+
+impl Run {
+    /// A run that begins with a belief.
+    pub fn new(seed: u64, initial: RobotModel) -> Self {
+        Run {
+            seed,
+            model: initial.clone(),
+            initial,
+            first_alpha: None,
+            evidence: None,
+            logs: Vec::new(),
+            excluded: Vec::new(),
+            history: Vec::new(),
+            ended: None,
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! How the constraint is relaxed from iteration to iteration: section 5.2.2.
+
+use crate::Safety;
+
+/// Gives the reduction coefficient α of each iteration.
+pub trait Relaxation: Send + Sync {
+    /// α of the first iteration, when nothing has been measured, from how safe the motions look.
+    fn first(&self, motions: &[Safety]) -> f64;
+
+    /// α of a later iteration.
+    fn next(&self, learnt: &Learnt) -> f64;
+}
+
+/// How far a run has come, for a relaxation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Learnt {
+    /// α of the first iteration.
+    pub first_alpha: f64,
+    /// cond(Φ) after the first measurement.
+    pub first_condition_number: f64,
+    /// cond(Φ) of all that has been measured.
+    pub condition_number: f64,
+}
+
+/// How α_max is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Maximum {
+    /// This value; the paper's robot has 0.74.
+    Fixed(f64),
+    /// Such that this share of the motions is allowed at first (rounded up): how the paper's 0.74 came about, with 0.05.
+    Share(f64),
+}
+
+/// How a is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Scale {
+    /// This value; the paper's robot has 2.5·10⁻⁴.
+    Fixed(f64),
+    /// Such that α of the second iteration is this share of α_max. cond has no natural scale: it depends on the robot and
+    /// on the units of its parameters, and with a fixed a that suits another robot α never leaves α_max, or falls to 0 at once.
+    Share(f64),
+}
+
+/// Equation (20): α = a·(cond(Φ) − b), but at most α_max.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConditionRelaxation {
+    /// α_max.
+    pub maximum: Maximum,
+    /// a.
+    pub scale: Scale,
+    /// b.
+    pub bias: f64,
+}
+
+impl Default for ConditionRelaxation {
+    /// 5 % of the motions at first and b = 1, as in the paper; a by [`Scale::Share`] of 0.8.
+    fn default() -> Self {
+        ConditionRelaxation { maximum: Maximum::Share(0.05), scale: Scale::Share(0.8), bias: 1.0 }
+    }
+}
+
+impl Relaxation for ConditionRelaxation {
+    fn first(&self, motions: &[Safety]) -> f64 {
+        match self.maximum {
+            Maximum::Fixed(alpha) => alpha,
+            Maximum::Share(share) => {
+                let mut reductions: Vec<f64> =
+                    motions.iter().map(|safety| safety.largest_reduction).collect();
+                reductions.sort_by(|a, b| b.total_cmp(a));
+                let wanted = (share * reductions.len() as f64).ceil().max(1.0) as usize;
+                // The region can only shrink, and not beyond a point.
+                reductions.get(wanted - 1).copied().unwrap_or(0.0).clamp(0.0, 1.0)
+            }
+        }
+    }
+
+    fn next(&self, learnt: &Learnt) -> f64 {
+        let scale = match self.scale {
+            Scale::Fixed(scale) => scale,
+            Scale::Share(share) => share * learnt.first_alpha / (learnt.first_condition_number - self.bias),
+        };
+        let alpha = scale * (learnt.condition_number - self.bias);
+        // Without a finite cond nothing has been learnt.
+        if alpha.is_nan() { learnt.first_alpha } else { alpha.clamp(0.0, learnt.first_alpha.max(0.0)) }
+    }
+}

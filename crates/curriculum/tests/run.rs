@@ -1,0 +1,166 @@
+//! Whole runs: what they reach, that they are the same however they are interrupted, and that falls count.
+
+mod arm;
+
+use arm::Arm;
+use phiw_curriculum::selection::{Choice, Question};
+use phiw_curriculum::*;
+use rand_chacha::ChaCha8Rng;
+
+fn rms(left: &[f64], right: &[f64]) -> f64 {
+    let sum: f64 = left.iter().zip(right).map(|(a, b)| (a - b).powi(2)).sum();
+    (sum / left.len() as f64).sqrt()
+}
+
+fn text(run: &Run) -> String {
+    serde_json::to_string(run).unwrap()
+}
+
+#[test]
+fn a_bad_model_becomes_a_good_one() {
+    let arm = Arm::new(0.02);
+    let (experiment, estimator, end) = (arm.experiment(), arm.estimator(), FixedCount(4));
+    let curriculum = arm.curriculum(&experiment, &estimator, &end);
+    let truth = arm.truth.parameters(&arm.robot).unwrap();
+    let mut run = Run::new(1, unreliable_model(&arm.truth, 1));
+    let error = |model: &RobotModel| rms(&model.parameters(&arm.robot).unwrap(), &truth);
+    let before = error(&run.initial);
+    curriculum.run::<CurriculumError>(&mut run, |_| Ok(())).unwrap();
+    assert_eq!((run.history.len(), run.ended), (4, Some(EndReason::Count)));
+    assert!(error(&run.model) < 0.3 * before, "{} from {before}", error(&run.model));
+    assert!(run.history.iter().all(|record| record.condition_number.is_some_and(f64::is_finite)));
+    // Nothing more happens to a run that has ended.
+    let ended = text(&run);
+    curriculum.step(&mut run).unwrap();
+    assert_eq!(text(&run), ended);
+}
+
+/// Killed after any iteration, written and read back, on one thread or many: the same to the last bit.
+#[test]
+fn a_run_is_the_same_however_it_is_interrupted() {
+    let arm = Arm::new(0.05);
+    let (experiment, estimator, end) = (arm.experiment(), arm.estimator(), FixedCount(3));
+    let curriculum = arm.curriculum(&experiment, &estimator, &end);
+    let start = || Run::new(7, unreliable_model(&arm.truth, 7));
+    let mut undisturbed = start();
+    curriculum.run::<CurriculumError>(&mut undisturbed, |_| Ok(())).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+    for killed_after in 0..3 {
+        let mut run = start();
+        (0..killed_after).for_each(|_| curriculum.step(&mut run).unwrap());
+        let mut resumed: Run = serde_json::from_str(&text(&run)).unwrap();
+        pool.install(|| curriculum.run::<CurriculumError>(&mut resumed, |_| Ok(()))).unwrap();
+        assert_eq!(text(&resumed), text(&undisturbed), "killed after {killed_after}");
+    }
+}
+
+#[test]
+fn another_seed_is_another_run() {
+    let arm = Arm::new(0.05);
+    let (experiment, estimator, end) = (arm.experiment(), arm.estimator(), FixedCount(1));
+    let curriculum = arm.curriculum(&experiment, &estimator, &end);
+    let initial = unreliable_model(&arm.truth, 1);
+    let mut runs = [Run::new(1, initial.clone()), Run::new(2, initial)];
+    runs.iter_mut().for_each(|run| curriculum.step(run).unwrap());
+    assert_ne!(runs[0].model, runs[1].model);
+}
+
+/// A robot that falls on every motion but one.
+struct Clumsy {
+    safe: &'static str,
+    robot: SimulatedRobot,
+}
+
+impl Experiment for Clumsy {
+    fn perform(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        motion: &Motion,
+        random: &mut ChaCha8Rng,
+    ) -> Result<Trial, CurriculumError> {
+        let trial = self.robot.perform(robot, model, motion, random)?;
+        Ok(Trial { fell_at_s: (motion.name != self.safe).then_some(1.0), ..trial })
+    }
+}
+
+#[test]
+fn a_fall_teaches_nothing_and_is_not_repeated() {
+    let arm = Arm::new(0.05);
+    let (estimator, end) = (arm.estimator(), FixedCount(6));
+    let experiment = Clumsy { safe: "sine_0", robot: arm.experiment() };
+    let curriculum = arm.curriculum(&experiment, &estimator, &end);
+    let mut run = Run::new(3, unreliable_model(&arm.truth, 3));
+    curriculum.run::<CurriculumError>(&mut run, |_| Ok(())).unwrap();
+    let fell = run.history.iter().filter(|record| record.fell_at_s.is_some());
+    let mut names: Vec<&str> = fell.map(|record| record.motion.as_str()).collect();
+    let count = names.len();
+    names.sort_unstable();
+    names.dedup();
+    assert!(count > 0 && names.len() == count && !names.contains(&"sine_0"), "{names:?}");
+    for pair in run.history.windows(2).filter(|pair| pair[1].fell_at_s.is_some()) {
+        assert_eq!(pair[0].model, pair[1].model);
+    }
+    assert_ne!(run.model, run.initial);
+}
+
+/// Always the first that is allowed.
+struct First;
+
+impl Selection for First {
+    fn name(&self) -> &'static str {
+        "first"
+    }
+    fn choose(&self, question: &Question<'_>, _: &mut ChaCha8Rng) -> Choice {
+        Choice { motion: question.allowed[0], merit: None, runner_up: None }
+    }
+}
+
+/// Allows a motion up to an α that is its number over ten.
+struct Numbered;
+
+impl Constraint for Numbered {
+    fn name(&self) -> &'static str {
+        "numbered"
+    }
+    fn safety(&self, _: &Robot, _: &RobotModel, motion: &Motion) -> Result<Safety, CurriculumError> {
+        let number: f64 = motion.name.trim_start_matches("sine_").parse().unwrap();
+        Ok(Safety { largest_reduction: 0.1 * number, margin_m: 0.0 })
+    }
+}
+
+#[test]
+fn the_constraint_lets_more_in_as_it_is_relaxed() {
+    let arm = Arm::new(0.05);
+    let (experiment, estimator, end) = (arm.experiment(), arm.estimator(), FixedCount(3));
+    let curriculum = Curriculum {
+        selection: &First,
+        constraint: &Numbered,
+        ..arm.curriculum(&experiment, &estimator, &end)
+    };
+    let mut run = Run::new(3, unreliable_model(&arm.truth, 3));
+    // One of six motions is 5 %, rounded up: the one that may be reduced most.
+    let plan = curriculum.plan(&run).unwrap().unwrap();
+    assert_eq!((plan.allowed, plan.alpha), (vec![5], 0.5));
+    curriculum.run::<CurriculumError>(&mut run, |_| Ok(())).unwrap();
+    let alphas: Vec<f64> = run.history.iter().map(|record| record.alpha).collect();
+    assert!((alphas[1] - 0.4).abs() < 1e-12 && alphas[2] <= alphas[1], "{alphas:?}");
+    assert_eq!(run.history[1].motion, "sine_4");
+    assert!(!run.history.iter().any(|record| record.forced));
+}
+
+#[test]
+fn where_nothing_is_allowed_the_safest_is_taken_and_it_is_said() {
+    let arm = Arm::new(0.05);
+    let (experiment, estimator, end) = (arm.experiment(), arm.estimator(), FixedCount(1));
+    let strict = ConditionRelaxation { maximum: Maximum::Fixed(0.9), ..ConditionRelaxation::default() };
+    let curriculum = Curriculum {
+        constraint: &Numbered,
+        relaxation: &strict,
+        ..arm.curriculum(&experiment, &estimator, &end)
+    };
+    let mut run = Run::new(3, unreliable_model(&arm.truth, 3));
+    curriculum.step(&mut run).unwrap();
+    let record = &run.history[0];
+    assert_eq!((record.motion.as_str(), record.allowed, record.forced), ("sine_5", 0, true));
+}

@@ -1,0 +1,84 @@
+//! Selections against the naive way: merge every candidate, decompose, compare.
+
+mod arm;
+
+use arm::{motions, tree};
+use phiw_curriculum::selection::{AOptimal, DOptimal, Question, RandomMotion, Selection, SmallestCondition};
+use phiw_curriculum::{Candidates, MotionDataset, Robot, Triangle};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+fn candidates(count: usize) -> Candidates {
+    let tree = tree();
+    let robot = Robot::with_viscous_friction(tree.clone(), [0.0; 10]).unwrap();
+    let dataset = MotionDataset::new(7, motions(&tree, count)).unwrap();
+    Candidates::new(&robot, robot.declared(), &dataset, &[1.0; 7]).unwrap()
+}
+
+fn random() -> ChaCha8Rng {
+    ChaCha8Rng::seed_from_u64(3)
+}
+
+/// The allowed motions by cond of the stack, each merged and decomposed in full.
+fn ranked(candidates: &Candidates, allowed: &[usize], measured: Option<&Triangle>) -> Vec<usize> {
+    let cond = |motion: usize| {
+        let mut rows = Vec::new();
+        let parts = [Some(&candidates.all()[motion].triangle), measured];
+        for triangle in parts.into_iter().flatten() {
+            for row in 0..triangle.size() {
+                rows.extend(
+                    (0..triangle.size())
+                        .map(|column| triangle.column(column).get(row).copied().unwrap_or(0.0)),
+                );
+                rows.push(0.0);
+            }
+        }
+        let size = candidates.all()[motion].triangle.size();
+        phiw_regressor::factor::Factor::of_rows(size + 1, &rows).unwrap().condition_number().unwrap()
+    };
+    let mut order: Vec<(f64, usize)> = allowed.iter().map(|&motion| (cond(motion), motion)).collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    order.into_iter().map(|(_, motion)| motion).collect()
+}
+
+#[test]
+fn pruning_loses_neither_the_best_nor_the_next() {
+    let candidates = candidates(12);
+    let all: Vec<usize> = (0..12).collect();
+    for allowed in [&all[..], &all[3..9], &all[5..6]] {
+        let mut measured: Option<Triangle> = None;
+        for _ in 0..5 {
+            let question = Question { candidates: &candidates, allowed, measured: measured.as_ref() };
+            let choice = SmallestCondition.choose(&question, &mut random());
+            let order = ranked(&candidates, allowed, measured.as_ref());
+            assert_eq!(choice.motion, order[0]);
+            assert_eq!(choice.runner_up.map(|next| next.0), order.get(1).copied());
+            measured = Some(question.stack(choice.motion));
+        }
+    }
+}
+
+#[test]
+fn optimal_designs_are_best_by_their_own_measure() {
+    let candidates = candidates(8);
+    let allowed: Vec<usize> = (1..8).collect();
+    let measured = candidates.all()[0].triangle.clone();
+    let question = Question { candidates: &candidates, allowed: &allowed, measured: Some(&measured) };
+    let best = DOptimal.choose(&question, &mut random());
+    let determinant = |motion: usize| question.stack(motion).log_determinant();
+    assert!(allowed.iter().all(|&motion| determinant(motion) <= determinant(best.motion)));
+    let best = AOptimal.choose(&question, &mut random());
+    let trace = |motion: usize| question.stack(motion).inverse_trace();
+    assert!(allowed.iter().all(|&motion| trace(motion) >= trace(best.motion)));
+}
+
+#[test]
+fn random_choice_takes_all_that_is_allowed_and_nothing_else() {
+    let candidates = candidates(6);
+    let question = Question { candidates: &candidates, allowed: &[1, 4, 5], measured: None };
+    let mut random = random();
+    let mut seen = [0; 6];
+    (0..300).for_each(|_| seen[RandomMotion.choose(&question, &mut random).motion] += 1);
+    assert_eq!([seen[0], seen[2], seen[3]], [0; 3]);
+    assert!([1, 4, 5].iter().all(|&motion| seen[motion] > 60), "{seen:?}");
+}

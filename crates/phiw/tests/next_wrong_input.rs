@@ -1,0 +1,109 @@
+//! `phiw next` on wrong input: one message that names the file, the place and the mend, exit status 2, and nothing written.
+
+mod next_scene;
+mod synthetic;
+
+use next_scene::{JOINTS, Scene, tree, urdf};
+use phiw_telemetry::{Recording, TorqueColumns};
+
+/// One message with all parts, exit status 2, nothing written.
+fn check_refused(spoil: impl FnOnce(&Scene) -> &'static str, parts: &[&str]) {
+    let scene = Scene::new(&urdf());
+    let more = spoil(&scene);
+    let line = format!("next --urdf DIR/robot.urdf --motions DIR/motions --out DIR/out/next.csv {more}");
+    let (status, summary, message) = scene.run(&line);
+    assert_eq!((status, summary.as_str()), (2, ""), "{parts:?}: {message}");
+    for part in parts {
+        assert!(message.contains(part), "no `{part}` in: {message}");
+    }
+    assert!(message.lines().count() == 1 || message.contains("try '--help'"), "{message}");
+    assert!(!scene.path("out").exists());
+}
+
+#[test]
+fn wrong_input_is_named() {
+    let rewrite = |file: &'static str, change: &'static dyn Fn(&str) -> String| {
+        move |scene: &Scene| {
+            let text = std::fs::read_to_string(scene.path(file)).unwrap();
+            std::fs::write(scene.path(file), change(&text)).unwrap();
+            "--support DIR/support.toml"
+        }
+    };
+    check_refused(
+        |scene| {
+            std::fs::remove_dir_all(scene.path("motions")).unwrap();
+            ""
+        },
+        &["motions: no such file"],
+    );
+    check_refused(
+        |scene| {
+            std::fs::remove_dir_all(scene.path("motions")).unwrap();
+            std::fs::create_dir(scene.path("motions")).unwrap();
+            ""
+        },
+        &["motions: there are no motions (*.csv)", "phiw retarget"],
+    );
+    check_refused(
+        rewrite("motions/m03.csv", &|text| text.replace("qdd.", "qddot.")),
+        &["m03.csv", "no columns qd.<joint> and qdd.<joint>"],
+    );
+    check_refused(
+        rewrite("motions/m03.csv", &|text| text.replacen("\n0.05,", "\n0.056,", 1)),
+        &["m03.csv", "time stamps are not even"],
+    );
+    check_refused(
+        rewrite("motions/m03.csv", &|text| text.replace("q.joint_2", "q.joint2")),
+        &["m03.csv, line 1: no column `q.joint_2`"],
+    );
+    check_refused(rewrite("support.toml", &|_| "foot = 3".into()), &["support.toml: not a support file"]);
+    check_refused(
+        rewrite("support.toml", &|text| text.replace("\"base\"", "\"bass\"")),
+        &["support.toml: the foot's link \"bass\"", "base, link_1"],
+    );
+    check_refused(
+        rewrite("support.toml", &|text| text.replace("\"base\"", "\"link_2\"")),
+        &["support.toml: the foot `link_2` is moved by the joint `joint_2`", "--hold joint_2"],
+    );
+    check_refused(
+        rewrite("support.toml", &|text| text.replace("0.2", "0.004")),
+        &["none of the 20 motions keeps the ZMP over the support", "calmer motions"],
+    );
+    check_refused(|_| "--support DIR/none.toml", &["none.toml: no such file"]);
+    check_refused(|_| "--measured DIR/none.csv", &["none.csv: no such file"]);
+    check_refused(|_| "--model DIR/robot.urdf", &["robot.urdf: not a model.json"]);
+    check_refused(|_| "--alpha 1.5", &["`1.5` is not a number from 0 to 1"]);
+    check_refused(|_| "--declare friction", &["friction"]);
+}
+
+#[test]
+fn a_joint_that_no_motion_moves_is_named() {
+    let scene = Scene::new(&urdf());
+    for entry in std::fs::read_dir(scene.path("motions")).unwrap() {
+        let path = entry.unwrap().path();
+        let joints: Vec<String> = tree(&urdf(), false).joint_names().map(str::to_owned).collect();
+        let mut motion = Recording::from_csv(&path, &joints, TorqueColumns::Absent).unwrap();
+        motion.q.iter_mut().skip(1).step_by(JOINTS).for_each(|q| *q = 0.25);
+        motion.write_csv(&path).unwrap();
+    }
+    let line = "next --urdf DIR/robot.urdf --motions DIR/motions --out DIR/next.csv";
+    let (status, _, message) = scene.run(line);
+    assert_eq!(status, 2, "{message}");
+    assert!(message.contains("joint `joint_2` moves by 0.0e0 rad in all motions"), "{message}");
+    assert!(message.contains("--hold joint_2=0.2500"), "{message}");
+    let (status, _, message) = scene.run(&format!("{line} --hold joint_2=0.25"));
+    assert_eq!(status, 0, "{message}");
+}
+
+#[test]
+fn the_result_is_a_file() {
+    let scene = Scene::new(&urdf());
+    let (status, _, message) =
+        scene.run("next --urdf DIR/robot.urdf --motions DIR/motions --out DIR/motions");
+    assert_eq!(status, 2);
+    assert!(message.contains("this is a folder; name a file in it"), "{message}");
+    let line = "next --urdf DIR/robot.urdf --motions DIR/motions --quiet --out DIR/new/folder/plan.csv";
+    let (status, summary, message) = scene.run(line);
+    assert_eq!((status, summary.as_str(), message.as_str()), (0, "", ""));
+    assert!(scene.path("new/folder/plan.csv").is_file() && scene.path("new/folder/plan.json").is_file());
+}

@@ -1,0 +1,17 @@
+#![doc = include_str!("../README.md")]
+
+mod balance;
+mod bounds;
+mod motion_balance;
+mod rows;
+mod support_polygon;
+mod workspace;
+mod zero_moment_point;
+
+pub use balance::{Balance, CenterOfMass};
+pub use bounds::Bounds;
+pub use motion_balance::{MotionBalance, Stance, WorstZmp};
+pub use rows::{BalanceRows, standard_deviation};
+pub use support_polygon::{NearestEdge, SupportError, SupportPolygon};
+pub use workspace::{ZmpWorkspace, standing_parameters};
+pub use zero_moment_point::{ZmpModel, multi_body_zmp, point_mass_zmp};

@@ -1,0 +1,86 @@
+//! `cargo xtask paper`: the experiments of section 5 of the paper, and what it left for the future.
+//!
+//! A run is one seed under one arm (the curriculum, random motions, …). Each has a file of its own, written after every iteration, so a
+//! killed command goes on where it was; shards of the runs can be done on many machines and merged.
+
+mod arguments;
+mod arm;
+mod ending;
+mod figures;
+mod jobs;
+mod motions;
+mod numbers;
+mod page;
+mod reliability;
+mod report;
+mod run_file;
+mod score;
+mod setup;
+mod shard;
+mod subject;
+mod tidy;
+
+pub use arguments::{Arguments, Command};
+
+use crate::{environment, mujoco};
+use anyhow::Context;
+use arguments::{MergeArguments, RunArguments};
+use indicatif::{ProgressBar, ProgressStyle};
+use jobs::Outcome;
+use setup::Setup;
+use std::path::Path;
+
+/// Runs the task.
+///
+/// # Errors
+/// A motion or a robot does not read, an engine is not there, or a file can not be written.
+pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
+    match &arguments.command {
+        Some(Command::Merge(merge)) => self::merge(merge),
+        None if arguments.run.slurm.is_some() => shard::slurm(&arguments.run),
+        None => run(&arguments.run),
+    }
+}
+
+fn run(arguments: &RunArguments) -> anyhow::Result<()> {
+    if arguments.backend == crate::plant_experiment::engine::Engine::Mujoco {
+        mujoco::fetch_or_go_on_without();
+    }
+    let out = environment::workspace_root()?.join(&arguments.out);
+    std::fs::create_dir_all(&out).with_context(|| out.display().to_string())?;
+    let setup = Setup::new(arguments, &out)?;
+    setup.settings.keep(&out)?;
+    let jobs = shard::part(jobs::all(arguments), arguments.shard);
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} iterations {elapsed} (left {eta})")?;
+    let bar = ProgressBar::new(jobs.len() as u64 * arguments.iterations as u64).with_style(style);
+    let outcome = jobs::do_all(&setup, &jobs, &out, arguments.stop_after, &|iterations| bar.inc(iterations))?;
+    bar.finish_and_clear();
+    if let Outcome::Stopped = outcome {
+        println!("stopped as told; start the same command again to go on");
+        return Ok(());
+    }
+    if arguments.shard.is_some_and(|shard| shard.count > 1) {
+        println!("shard done: {}", out.display());
+        return Ok(());
+    }
+    finish(&out)
+}
+
+fn merge(arguments: &MergeArguments) -> anyhow::Result<()> {
+    let root = environment::workspace_root()?;
+    let out = root.join(&arguments.out);
+    shard::merge(&arguments.shards.iter().map(|folder| root.join(folder)).collect::<Vec<_>>(), &out)?;
+    finish(&out)
+}
+
+/// Tables, pictures and the page from all runs in a folder.
+fn finish(out: &Path) -> anyhow::Result<()> {
+    let results = report::Results::read(out)?;
+    tidy::write(&results, out)?;
+    let page = report::page(&results);
+    let file = out.join("report.html");
+    std::fs::write(&file, page).with_context(|| file.display().to_string())?;
+    println!("{}", numbers::plain(&results));
+    println!("report: {}", file.display());
+    Ok(())
+}

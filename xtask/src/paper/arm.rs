@@ -1,0 +1,98 @@
+//! What is compared: the arms of the experiment.
+
+use phiw_curriculum::selection::{Choice, Question, RandomMotion, SmallestCondition};
+use phiw_curriculum::{Constraint, MotionDataset, Selection, Unconstrained};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+/// One way to choose motions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Arm {
+    /// The smallest cond under the constraint: (11) and (12).
+    Curriculum,
+    /// Any motion under the constraint.
+    Random,
+    /// The smallest cond, whatever the constraint says.
+    Greedy,
+    /// Any motion of one task: the paper's Open.
+    TaskA,
+    /// Any motion of another task: the paper's Scoop.
+    TaskB,
+}
+
+/// How the robot's base is held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Footing {
+    /// Bolted to the floor.
+    Fixed,
+    /// Standing on the floor, free to topple.
+    Standing,
+}
+
+impl Arm {
+    /// The name in file names and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Arm::Curriculum => "curriculum",
+            Arm::Random => "random",
+            Arm::Greedy => "greedy",
+            Arm::TaskA => "task-a",
+            Arm::TaskB => "task-b",
+        }
+    }
+
+    /// Who chooses.
+    pub fn selection(self, dataset: &MotionDataset, tasks: &[String; 2]) -> Box<dyn Selection> {
+        let of_task = |task: &String| {
+            let motions = dataset.motions().iter().enumerate();
+            let members =
+                motions.filter(|(_, motion)| motion.task == *task).map(|(index, _)| index).collect();
+            Box::new(OfTask { members })
+        };
+        match self {
+            Arm::Curriculum | Arm::Greedy => Box::new(SmallestCondition),
+            Arm::Random => Box::new(RandomMotion),
+            Arm::TaskA => of_task(&tasks[0]),
+            Arm::TaskB => of_task(&tasks[1]),
+        }
+    }
+
+    /// What it may choose.
+    pub fn constraint(self, zmp: &dyn Constraint) -> &dyn Constraint {
+        match self {
+            Arm::Curriculum | Arm::Random => zmp,
+            Arm::Greedy | Arm::TaskA | Arm::TaskB => &Unconstrained,
+        }
+    }
+}
+
+impl Footing {
+    /// The name in file names and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Footing::Fixed => "fixed",
+            Footing::Standing => "standing",
+        }
+    }
+}
+
+/// Any motion of one task.
+struct OfTask {
+    members: Vec<usize>,
+}
+
+impl Selection for OfTask {
+    fn name(&self) -> &'static str {
+        "of_task"
+    }
+
+    fn choose(&self, question: &Question<'_>, random: &mut ChaCha8Rng) -> Choice {
+        let open: Vec<usize> =
+            question.allowed.iter().copied().filter(|motion| self.members.contains(motion)).collect();
+        let from = if open.is_empty() { question.allowed } else { &open };
+        Choice { motion: from[random.random_range(0..from.len())], merit: None, runner_up: None }
+    }
+}

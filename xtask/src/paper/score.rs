@@ -1,0 +1,100 @@
+//! How good a belief is, against the truth that no curriculum sees.
+
+use super::setup::Setup;
+use phiw_curriculum::selection::Question;
+use phiw_curriculum::{Curriculum, Estimator, Evidence, LeastSquares, RobotModel, Run, WeightedLeastSquares};
+use phiw_zmp::{ZmpModel, ZmpWorkspace, standing_parameters};
+use serde::{Deserialize, Serialize};
+
+/// Scores of a belief.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    /// w.
+    pub parameters: Vec<f64>,
+    /// RMSE_w, equation (17).
+    pub rmse_w: f64,
+    /// RMSE_τ, equation (19) \[N·m\].
+    pub rmse_torque: f64,
+    /// RMSE_w of equation (4) on the same logs; none without logs.
+    pub rmse_w_least_squares: Option<f64>,
+    /// RMSE_w of weighted least squares on the same logs.
+    pub rmse_w_weighted: Option<f64>,
+}
+
+/// What one iteration of the run that stands for all chose from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Detail {
+    /// The motion.
+    pub chosen: usize,
+    /// Those that could be chosen.
+    pub allowed: Vec<usize>,
+    /// cond of the stack with each motion.
+    pub condition_numbers: Vec<f64>,
+    /// α.
+    pub alpha: f64,
+    /// ZMP of the chosen reference under the belief of the time \[m\].
+    pub zmp: Vec<[f64; 2]>,
+}
+
+/// sqrt(1/D · ‖a − b‖²), equation (17).
+pub fn rmse_w(estimate: &[f64], truth: &[f64]) -> f64 {
+    let sum: f64 = estimate.iter().zip(truth).map(|(estimate, truth)| (estimate - truth).powi(2)).sum();
+    (sum / truth.len().max(1) as f64).sqrt()
+}
+
+impl Setup {
+    /// Scores a belief, and what simpler estimators would make of the same logs.
+    ///
+    /// # Errors
+    /// The belief is not of this robot.
+    pub fn score(&self, model: &RobotModel, evidence: Option<&Evidence>) -> anyhow::Result<Score> {
+        let parameters = model.parameters(&self.robot)?;
+        let truth = self.settings.truth();
+        let (factor, samples) = &self.validation;
+        let design = self.robot.design(self.robot.declared())?;
+        let bystander = |estimator: &dyn Estimator| -> anyhow::Result<Option<f64>> {
+            let Some(evidence) = evidence.filter(|evidence| !evidence.is_empty()) else { return Ok(None) };
+            let estimate = estimator.estimate(&design, evidence, model, &parameters)?;
+            Ok(Some(rmse_w(&estimate.parameters, &truth)))
+        };
+        Ok(Score {
+            rmse_w: rmse_w(&parameters, &truth),
+            rmse_torque: (factor.residual_sum_of_squares(&parameters)? / samples).sqrt(),
+            rmse_w_least_squares: bystander(&LeastSquares)?,
+            rmse_w_weighted: bystander(&WeightedLeastSquares)?,
+            parameters,
+        })
+    }
+
+    /// What the next iteration chooses from.
+    ///
+    /// # Errors
+    /// The run is not of this robot.
+    pub fn detail(&self, curriculum: &Curriculum<'_>, run: &Run) -> anyhow::Result<Option<Detail>> {
+        let Some(plan) = curriculum.plan(run)? else { return Ok(None) };
+        let measured = match run.evidence.as_ref().filter(|evidence| !evidence.is_empty()) {
+            Some(evidence) => Some(self.candidates.measured(evidence.factor())?),
+            None => None,
+        };
+        let question =
+            Question { candidates: &self.candidates, allowed: &plan.allowed, measured: measured.as_ref() };
+        let condition_numbers =
+            (0..self.dataset.len()).map(|motion| question.stack(motion).condition_number()).collect();
+        let motion = &self.dataset.motions()[plan.choice.motion];
+        let standing = standing_parameters(self.robot.base_link(), &run.model.standard);
+        let mut workspace = ZmpWorkspace::new(self.robot.tree());
+        let mut zmp = Vec::new();
+        for sample in (0..motion.samples()).step_by(2) {
+            let [q, v, a] = motion.sample(sample);
+            let balance = workspace.evaluate(self.robot.tree(), &standing, q, v, a)?;
+            zmp.extend(balance.zmp(ZmpModel::PointMass, self.subject.stance.floor_height()));
+        }
+        Ok(Some(Detail {
+            chosen: plan.choice.motion,
+            allowed: plan.allowed,
+            condition_numbers,
+            alpha: plan.alpha,
+            zmp,
+        }))
+    }
+}

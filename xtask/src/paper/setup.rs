@@ -1,0 +1,277 @@
+//! Everything that all runs share, and what of it decides their results.
+
+use super::arguments::{EstimatorName, Initial, RunArguments};
+use super::motions::{Motions, Source};
+use super::run_file;
+use super::subject::{Subject, SubjectName};
+use crate::plant_experiment::engine::Engine;
+use anyhow::{Context, ensure};
+use phiw_curriculum::{
+    Candidates, ConditionRelaxation, Estimator, Evidence, Experiment, FeedForward, LeastSquares,
+    MotionDataset, MotionLikelihood, Robot, RobotModel, RowsAt, SimulatedRobot, WeightedLeastSquares,
+    ZmpConstraint,
+};
+use phiw_dynamics::{PARAMETERS_PER_BODY, World};
+use phiw_identification::{parameter_name, standard_unit};
+use phiw_plant::Timing;
+use phiw_regressor::factor::Factor;
+use phiw_regressor::least_squares::GroupedFactor;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// What runs share.
+pub struct Setup {
+    /// What decides the results, for files.
+    pub settings: Settings,
+    /// The robot and its truth.
+    pub subject: Subject,
+    /// As declared.
+    pub robot: Robot,
+    /// The true belief.
+    pub truth: RobotModel,
+    /// Motions to choose from.
+    pub dataset: MotionDataset,
+    /// Their factors.
+    pub candidates: Candidates,
+    /// The constraint (12).
+    pub constraint: ZmpConstraint,
+    /// Equation (20).
+    pub relaxation: ConditionRelaxation,
+    /// R of [Φ f] of the validation motions, and their number of samples T.
+    pub validation: (Factor, f64),
+}
+
+/// What decides the results of a run, beside its arm and seed. Runs with different settings are never mixed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// Who computes the physics.
+    pub backend: String,
+    /// The robot.
+    pub robot: SubjectName,
+    /// The motions, in words, and the number that tells them from others.
+    pub motions: String,
+    /// See [`Motions`].
+    pub digest: String,
+    /// The motions to choose from.
+    pub dataset: Vec<MotionFacts>,
+    /// Names of those held out.
+    pub held_out: Vec<String>,
+    /// The two tasks of the task-specific models.
+    pub tasks: [String; 2],
+    /// How parameters are estimated.
+    pub estimator: EstimatorName,
+    /// Torque noise over the torque limit.
+    pub noise: f64,
+    /// Iterations.
+    pub iterations: usize,
+    /// How many initial models.
+    pub initial: Initial,
+    /// The parameters: name, unit and true value of each.
+    pub parameters: Vec<ParameterFacts>,
+    /// Corners of the support \[m\].
+    pub support: Vec<[f64; 2]>,
+}
+
+/// A motion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MotionFacts {
+    /// Its name.
+    pub name: String,
+    /// Its task.
+    pub task: String,
+    /// How long it takes \[s\].
+    pub duration_s: f64,
+    /// cond(Φ) of it alone.
+    pub condition_number: f64,
+}
+
+/// A parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ParameterFacts {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its true value.
+    pub value: f64,
+}
+
+/// File of the settings.
+const FILE: &str = "setup.json";
+/// The stream of the validation, apart from all runs'.
+const VALIDATION_SEED: u64 = u64::MAX;
+
+impl Setup {
+    /// Reads robot and motions, retargets what is not there, and measures the validation motions.
+    ///
+    /// # Errors
+    /// Something is not there or does not read.
+    pub fn new(arguments: &RunArguments, out: &Path) -> anyhow::Result<Self> {
+        let timing = timing(arguments.backend);
+        let subject = Subject::read(arguments.robot, timing.control_period_s)?;
+        arguments.backend.check(&subject.tree)?;
+        let robot = subject.robot()?;
+        let truth = subject.truth(&robot)?;
+        let motions = match &arguments.motions {
+            Some(folder) => Motions::of_folder(folder, &subject)?,
+            None => Motions::retargeted(arguments.dataset, &subject, &out.join("motions"))?,
+        };
+        let dataset = MotionDataset::new(subject.tree.joint_count(), motions.identification)?;
+        let weights = vec![1.0; subject.tree.joint_count()];
+        let candidates = Candidates::new(&robot, robot.declared(), &dataset, &weights)?;
+        let settings = Settings {
+            backend: format!("{:?}", arguments.backend).to_lowercase(),
+            robot: arguments.robot,
+            motions: match (&arguments.motions, arguments.dataset) {
+                (Some(_), _) => "of a folder".to_owned(),
+                (None, Source::Embedded) => "embedded (synthetic)".to_owned(),
+                (None, Source::UeAdl) => "ue_adl (measured on people)".to_owned(),
+            },
+            digest: motions.digest,
+            dataset: dataset
+                .motions()
+                .iter()
+                .zip(candidates.all())
+                .map(|(motion, candidate)| MotionFacts {
+                    name: motion.name.clone(),
+                    task: motion.task.clone(),
+                    duration_s: motion.duration_s(),
+                    condition_number: candidate.condition_number,
+                })
+                .collect(),
+            held_out: motions.validation.iter().map(|motion| motion.name.clone()).collect(),
+            tasks: motions.tasks,
+            estimator: arguments.estimator,
+            noise: arguments.noise,
+            iterations: arguments.iterations,
+            initial: arguments.initial,
+            parameters: parameter_facts(&robot, &truth)?,
+            support: subject.stance.support().corners().to_vec(),
+        };
+        let mut setup = Setup {
+            constraint: ZmpConstraint::new(subject.stance.clone()),
+            relaxation: ConditionRelaxation::default(),
+            validation: (Factor::empty(0), 0.0),
+            settings,
+            subject,
+            robot,
+            truth,
+            dataset,
+            candidates,
+        };
+        setup.validation = setup.validate(arguments.backend, &motions.validation)?;
+        Ok(setup)
+    }
+
+    /// The robot in an engine, bolted down or standing, with noise.
+    pub fn experiment(&self, backend: Engine, standing: bool, noise: f64) -> SimulatedRobot {
+        let (tree, world) = match standing {
+            true => (self.subject.floating.clone(), self.subject.floor()),
+            false => (self.subject.tree.clone(), World::default()),
+        };
+        SimulatedRobot {
+            tree,
+            world,
+            effects: self.subject.frictions(),
+            controller: Box::new(FeedForward { gains: self.subject.gains.clone() }),
+            actuator_noise: noise,
+            timing: timing(backend),
+            fall_tilt_rad: 0.3,
+            build: Box::new(move |tree, world| backend.build(tree, world)),
+        }
+    }
+
+    /// Who estimates.
+    pub fn estimator(&self) -> Box<dyn Estimator> {
+        match self.settings.estimator {
+            EstimatorName::LeastSquares => Box::new(LeastSquares),
+            EstimatorName::Weighted => Box::new(WeightedLeastSquares),
+            EstimatorName::Likelihood => {
+                // Without noise there is no likelihood: a thousandth of the limit stands for rounding.
+                let share = if self.settings.noise > 0.0 { self.settings.noise } else { 1e-3 };
+                Box::new(MotionLikelihood::new(self.subject.torque_noise(share)))
+            }
+        }
+    }
+
+    /// The held-out motions, run with the true model and without noise (section 5.1, equation 19): what is left of the error is the model's.
+    fn validate(
+        &self,
+        backend: Engine,
+        motions: &[phiw_curriculum::Motion],
+    ) -> anyhow::Result<(Factor, f64)> {
+        let experiment = self.experiment(backend, false, 0.0);
+        let measure = |(index, motion): (usize, &phiw_curriculum::Motion)| -> anyhow::Result<GroupedFactor> {
+            let design = self.robot.design(self.robot.declared())?;
+            let mut evidence = Evidence::none(&design, RowsAt::Periods)?;
+            let mut random = ChaCha8Rng::seed_from_u64(VALIDATION_SEED);
+            random.set_stream(index as u64);
+            let trial = experiment.perform(&self.robot, &self.truth, motion, &mut random)?;
+            evidence.add(&design, &trial.measured)?;
+            Ok(evidence.factor().clone())
+        };
+        let factors: anyhow::Result<Vec<GroupedFactor>> =
+            motions.par_iter().enumerate().map(measure).collect();
+        let all = phiw_identification::merge(&factors?)?;
+        let groups = all.groups();
+        let samples = groups.first().map_or(0, |group| group.factor.rows()) as f64;
+        Ok((all.combine(&vec![1.0; groups.len()])?, samples))
+    }
+}
+
+fn timing(backend: Engine) -> Timing {
+    Timing { longest_step_s: backend.longest_step_s(), ..Timing::default() }
+}
+
+fn parameter_facts(robot: &Robot, truth: &RobotModel) -> anyhow::Result<Vec<ParameterFacts>> {
+    let values = truth.parameters(robot)?;
+    let base = robot.base().independent().iter().map(|&standard| {
+        let unit = standard_unit(standard % PARAMETERS_PER_BODY).to_owned();
+        (parameter_name(robot.tree(), standard), unit)
+    });
+    let design = robot.design(robot.declared())?;
+    let effects = design.effect_parameter_info();
+    let effects = effects.iter().map(|info| (format!("{}.{}", info.joint, info.name), info.unit.clone()));
+    Ok(base
+        .chain(effects)
+        .zip(values)
+        .map(|((name, unit), value)| ParameterFacts { name, unit, value })
+        .collect())
+}
+
+impl Settings {
+    /// The settings of a folder of runs.
+    ///
+    /// # Errors
+    /// There are none.
+    pub fn read(folder: &Path) -> anyhow::Result<Self> {
+        let path = folder.join(FILE);
+        let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        serde_json::from_str(&text).with_context(|| path.display().to_string())
+    }
+
+    /// Writes the settings, or checks that those that are there are the same.
+    ///
+    /// # Errors
+    /// They are not.
+    pub fn keep(&self, folder: &Path) -> anyhow::Result<()> {
+        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        if folder.join(FILE).exists() {
+            ensure!(
+                Self::read(folder)? == *self,
+                "{} holds runs with other settings: name another folder with --out, or delete it",
+                folder.display()
+            );
+            return Ok(());
+        }
+        run_file::replace(&folder.join(FILE), serde_json::to_string_pretty(self)?.as_bytes())
+    }
+
+    /// The true parameter vector.
+    pub fn truth(&self) -> Vec<f64> {
+        self.parameters.iter().map(|parameter| parameter.value).collect()
+    }
+}
