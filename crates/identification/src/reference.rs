@@ -40,7 +40,7 @@ impl ReferenceModel {
             return Ok(());
         }
         let mut workspace = Workspace::new(&self.tree);
-        if needs.torque || needs.derivatives {
+        if needs.torque || needs.total_torque || needs.derivatives {
             self.torque(block, &mut workspace, out)?;
             out.total_torque.clone_from(&out.torque);
             self.add_effects(block, &mut out.total_torque);

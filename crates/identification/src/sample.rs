@@ -7,6 +7,8 @@ use phiw_telemetry::Block;
 pub struct Needs {
     /// The torques of the reference model, and their first and second rate of change.
     pub torque: bool,
+    /// The torque of the reference model with its effects in it. A column made of it can stand for any of those effects, and tells nothing in a contest with one.
+    pub total_torque: bool,
     /// The derivatives of the reference model's torques by position, velocity and acceleration of each joint.
     pub derivatives: bool,
     /// Torques of unit gravity along x, y, z with the reference model's inertia.
@@ -20,6 +22,7 @@ impl Needs {
     pub fn union(self, other: Self) -> Self {
         Needs {
             torque: self.torque || other.torque,
+            total_torque: self.total_torque || other.total_torque,
             derivatives: self.derivatives || other.derivatives,
             gravity: self.gravity || other.gravity,
             statics: self.statics || other.statics,

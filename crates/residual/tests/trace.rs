@@ -84,7 +84,19 @@ fn traced_on(
     secret: &dyn Fn(&State<'_>, &mut [f64]),
     held: bool,
 ) -> Tracing {
-    let tree = read_urdf(URDF, &UrdfOptions::default()).unwrap().tree;
+    traced_robot(URDF, train, declared, seed, secret, held)
+}
+
+/// The same on another robot with two joints of those names.
+fn traced_robot(
+    urdf: &str,
+    train: Vec<Fold>,
+    declared: &[&str],
+    seed: u64,
+    secret: &dyn Fn(&State<'_>, &mut [f64]),
+    held: bool,
+) -> Tracing {
+    let tree = read_urdf(urdf, &UrdfOptions::default()).unwrap().tree;
     let catalogue = Catalogue::default();
     let log = record(&tree, seed, secret);
     let surveys = [log.survey().unwrap()];
@@ -282,6 +294,23 @@ fn a_gain_scales_the_held_friction_too() {
     let gain = |_: &State<'_>, torque: &mut [f64]| torque[1] *= 1.15;
     let tracing = traced_on(folds().0, &DECLARED, 11, &gain, true);
     assert_eq!(named(&tracing), [("torque_gain".to_owned(), vec!["elbow".to_owned()])]);
+}
+
+/// The column of a gain is all torque that the model knows of, an effect found before it included. On a joint whose rigid body shares no parameter with another
+/// that column once did the effect's work in its place, as a rival of probability 1.
+#[test]
+fn a_gain_is_no_rival_of_an_effect_that_it_contains() {
+    let lift = URDF.replace(
+        "<joint name=\"elbow\" type=\"revolute\"><parent link=\"upper\"/><child link=\"lower\"/><origin xyz=\"0.4 0 0\"/><axis xyz=\"0 1 0\"/>",
+        "<joint name=\"elbow\" type=\"prismatic\"><parent link=\"upper\"/><child link=\"lower\"/><origin xyz=\"0.4 0 0\"/><axis xyz=\"0 1 0\"/>",
+    );
+    assert_ne!(lift, URDF);
+    let warming =
+        |state: &State<'_>, torque: &mut [f64]| torque[1] += 1.5 * (-state.t / 15.0).exp() * state.qd[1];
+    let tracing = traced_robot(&lift, folds().0, &DECLARED, 11, &warming, false);
+    assert_eq!(named(&tracing), [("thermal_drift".to_owned(), vec!["elbow".to_owned()])]);
+    let rivals: Vec<&str> = tracing.effects[0].rivals.iter().map(|rival| rival.spec.kind.as_str()).collect();
+    assert!(!rivals.contains(&"torque_gain"), "{rivals:?}");
 }
 
 /// What swings once a second has no correlation over a quarter of a second, and is no noise for that.

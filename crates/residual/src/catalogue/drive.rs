@@ -66,7 +66,7 @@ impl EffectKind for TorqueGain {
             out[0] = sample.total_torque().get(joint).copied().unwrap_or_default();
         };
         let parameters = [("gain_error", ParameterKind::Ratio, -1.0)];
-        let needs = Needs { torque: true, ..Needs::default() };
+        let needs = Needs { total_torque: true, ..Needs::default() };
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns).needing(needs))
     }
 }

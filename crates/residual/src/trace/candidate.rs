@@ -133,6 +133,20 @@ impl Candidates {
         Candidates { list: Vec::new(), effects: Vec::new() }
     }
 
+    /// Those that act on one of these torques.
+    pub fn acting_on(self, torques: &[usize]) -> Self {
+        let mut effects: Vec<Option<Box<dyn Effect>>> = self.effects.into_iter().map(Some).collect();
+        let mut kept = Candidates::none();
+        for candidate in self.list {
+            let own: Vec<Box<dyn Effect>> =
+                effects[candidate.effects].iter_mut().filter_map(Option::take).collect();
+            if own.iter().flat_map(|effect| effect.entries()).any(|entry| torques.contains(&entry.row)) {
+                kept.push(candidate.rank, own, candidate.constants);
+            }
+        }
+        kept
+    }
+
     fn push(&mut self, rank: usize, effects: Vec<Box<dyn Effect>>, constants: usize) {
         let first = self.effects.len();
         let specs = effects.iter().map(|effect| effect.spec()).collect();

@@ -26,6 +26,10 @@ pub struct TraceOptions {
     /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which it is structure: the noise of a robot's sensors is of one
     /// colour, and raises all residuals over their floors alike.
     pub structured_ratio: f64,
+    /// Torques whose residual is to be explained: what acts on none of them is no candidate. `None`: all.
+    pub torques: Option<Vec<usize>>,
+    /// Effects (kind and joints) that are no candidates, because they are known not to be there.
+    pub excluded: Vec<EffectSpec>,
 }
 
 impl Default for TraceOptions {
@@ -39,6 +43,8 @@ impl Default for TraceOptions {
             floor_margin: 1.15,
             structured_correlation: [0.3, 0.2],
             structured_ratio: 8.0,
+            torques: None,
+            excluded: Vec::new(),
         }
     }
 }

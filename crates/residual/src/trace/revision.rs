@@ -69,7 +69,6 @@ impl Search<'_> {
     ) -> Result<Option<(usize, Judged)>, IdentificationError> {
         let stage = &fitted.stage;
         let inflation = self.input.rows_per_independent;
-        let all: Vec<usize> = (0..stage.candidates.len()).collect();
         let mut best: Option<(usize, Judged)> = None;
         let mut places = self.removable()?;
         let declared = self.input.declared.len();
@@ -82,7 +81,9 @@ impl Search<'_> {
             let determined = self.determined_without(fitted, place);
             let prior = self.prior_over(&determined)?;
             let evidence = stage.evidence(&determined, weights, prior.as_ref())?;
-            let judged = stage.judge(&evidence, &fitted.refit, &all, Thoroughness::Screening, inflation)?;
+            let rivals = stage.independent_of(place);
+            let judged =
+                stage.judge(&evidence, &fitted.refit, &rivals, Thoroughness::Screening, inflation)?;
             let Some(mut first) = judged.into_iter().next() else { continue };
             let own = stage.design.effect_parameters(place).len() + self.specs[place].constants.len();
             first.score += first.penalty * own as f64 / first.counted.max(1) as f64;
@@ -100,7 +101,6 @@ impl Search<'_> {
         let declared = self.input.declared.len();
         let inflation = self.input.rows_per_independent;
         let training = self.input.data.train.len();
-        let all: Vec<usize> = (0..stage.candidates.len()).collect();
         let every: Vec<usize> = (0..stage.train.groups().len()).collect();
         let mut worst: Option<(usize, f64)> = None;
         for place in declared..self.specs.len() {
@@ -111,7 +111,8 @@ impl Search<'_> {
             let prior = self.prior_over(&determined)?;
             let evidence = stage.evidence(&determined, &fitted.weights, prior.as_ref())?;
             let Some(without) = evidence.refit(&[], &every)? else { continue };
-            let judged = stage.judge(&evidence, &without, &all, Thoroughness::Screening, inflation)?;
+            let rivals = stage.independent_of(place);
+            let judged = stage.judge(&evidence, &without, &rivals, Thoroughness::Screening, inflation)?;
             let parameters: Vec<usize> = stage.design.effect_parameters(place).collect();
             let counted = parameters.len() + self.specs[place].constants.len();
             let own = Finalist {

@@ -125,9 +125,14 @@ impl Search<'_> {
 
     fn candidates(&self, ranges: &SignalRanges) -> Candidates {
         let found = &self.specs[self.input.declared.len()..];
-        let closed: Vec<&EffectSpec> = found.iter().chain(&self.dropped).collect();
+        let closed: Vec<&EffectSpec> =
+            found.iter().chain(&self.dropped).chain(&self.options.excluded).collect();
         let occupied = Occupied { present: &self.specs, closed: &closed, held: self.input.held.is_some() };
-        enumerate(self.fixed.catalogue, self.fixed.tree, ranges, &occupied)
+        let all = enumerate(self.fixed.catalogue, self.fixed.tree, ranges, &occupied);
+        match &self.options.torques {
+            Some(torques) => all.acting_on(torques),
+            None => all,
+        }
     }
 
     /// One pass with candidates beside the model, and the model's own weighted fit.

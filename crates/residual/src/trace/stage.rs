@@ -144,6 +144,18 @@ impl Stage {
         rows
     }
 
+    /// Candidates whose columns would be the same if the model did not have the effect at `place`. A column of all torque that the model knows of has that effect in
+    /// it, and does the effect's work under its own name where nothing else binds it.
+    pub fn independent_of(&self, place: usize) -> Vec<usize> {
+        let rows = self.rows_of(place);
+        let made_of_it = |candidate: &usize| {
+            let mut effects = self.candidates[*candidate].effects.clone();
+            effects.any(|effect| self.design.effects()[self.model_effects + effect].needs().total_torque)
+                && self.rows(*candidate).iter().any(|row| rows.contains(row))
+        };
+        (0..self.candidates.len()).filter(|candidate| !made_of_it(candidate)).collect()
+    }
+
     /// Torques that an effect of the model acts on.
     pub fn rows_of(&self, place: usize) -> Vec<usize> {
         let entries = self.design.effects()[place].entries();
