@@ -4,7 +4,9 @@ mod animation;
 pub mod database;
 mod figure9;
 mod mink;
+mod mjcf;
 mod page;
+mod stick_figure;
 
 use crate::environment;
 use anyhow::Context;
@@ -20,7 +22,7 @@ const HELD: [&str; 2] = ["torso/joint_3", "head/joint_1"];
 /// Command line of `cargo xtask retarget`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Starts of each strategy of figure 9; 0 leaves it out.
+    /// Starts of each strategy of figure 9.
     #[arg(long, default_value_t = 10)]
     starts: usize,
     /// Seed of the starts and of the embedded motions.
@@ -32,6 +34,22 @@ pub struct Arguments {
     /// Folder for the page and the motions; by default `retarget` in the build folder.
     #[arg(long)]
     out: Option<PathBuf>,
+    /// What is measured; everything by default.
+    #[arg(value_enum)]
+    parts: Vec<Part>,
+}
+
+/// A part of the measurements.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Part {
+    /// Whole databases through `phiw retarget`.
+    Databases,
+    /// A film of person and robot.
+    Animation,
+    /// mink on the same markers; needs --mink.
+    Mink,
+    /// Time and cost of the solvers from several starts.
+    Figure9,
 }
 
 /// The robot, the person and the files that the measurements are made on.
@@ -55,12 +73,21 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
     };
     std::fs::create_dir_all(&out).with_context(|| out.display().to_string())?;
     let mut page = page::Page::default();
-    database::measure(&scene, arguments.seed, &out, &mut page)?;
-    animation::draw(&scene, arguments.seed, &mut page)?;
-    if let Some(python) = &arguments.mink {
-        mink::compare(&scene, arguments.seed, python, &mut page)?;
+    let asked = |part| arguments.parts.is_empty() || arguments.parts.contains(&part);
+    if asked(Part::Databases) {
+        database::measure(&scene, arguments.seed, &out, &mut page)?;
     }
-    if arguments.starts > 0 {
+    if asked(Part::Animation) {
+        animation::draw(&scene, arguments.seed, &mut page)?;
+    }
+    match &arguments.mink {
+        Some(python) if asked(Part::Mink) => mink::compare(&scene, arguments.seed, python, &mut page)?,
+        None if arguments.parts.contains(&Part::Mink) => {
+            anyhow::bail!("name the Python to install mink with: --mink python3")
+        }
+        _ => {}
+    }
+    if asked(Part::Figure9) {
         figure9::measure(&scene, arguments.starts, arguments.seed, &mut page)?;
     }
     let file = out.join("retarget.html");

@@ -103,6 +103,8 @@ pub struct Retargeted {
     pub human: Curve,
     /// Names of the human's coordinates.
     pub human_names: Vec<String>,
+    /// The human model, markers in place.
+    pub body: HumanBody,
     /// Parameters ξ^h by name \[m, rad\].
     pub parameters: Vec<(String, f64)>,
     /// The objective's value.
@@ -341,6 +343,7 @@ impl Retargeter {
             quality: quality(problem, &self.robot, &robot, &solution.variables),
             robot,
             human: Curve::new(basis.clone(), humans, part(0..humans))?,
+            body: problem.body.clone(),
             human_names: problem.body.trajectory_names().map(str::to_owned).collect(),
             parameters: problem
                 .body

@@ -95,8 +95,9 @@ pub struct RobotModel {
     pub(crate) head: Option<usize>,
 }
 
-/// Weight of torso and head against a hand: they give way where they can not follow.
-const DIRECTION_WEIGHT: f64 = 0.1;
+/// Weight of torso and head against a hand. With w_g = 100 it is about that of a marker, so small enough that markers say how the person
+/// sits and looks where the robot can not follow, and large enough that it follows where it can.
+const DIRECTION_WEIGHT: f64 = 0.001;
 
 impl RobotModel {
     /// Finds shoulders, elbows, wrists, hands, torso and head of a robot, or takes those of the map.
@@ -139,6 +140,18 @@ impl RobotModel {
     /// Points of the left and the right arm.
     pub fn arms(&self) -> &[Arm; 2] {
         &self.arms
+    }
+    /// Base and middle of the shoulders, if joints move these against each other.
+    pub fn trunk(&self) -> Option<[BodyPoint; 2]> {
+        self.torso.map(|torso| [self.correspondences[torso].from, self.correspondences[torso].to])
+    }
+    /// The head's joint, and a point ahead of it where it looks, if it has one.
+    pub fn gaze(&self) -> Option<[BodyPoint; 2]> {
+        self.head.map(|head| [self.correspondences[head].from, self.correspondences[head].to])
+    }
+    /// Where one of its points is \[m\]; `placements` are those of its bodies.
+    pub fn place(&self, point: BodyPoint, placements: &[Placement<f64>]) -> Vec3<f64> {
+        world(placements, point)
     }
     /// Length of an arm from shoulder to hand, along its segments \[m\].
     pub fn arm_length_m(&self) -> f64 {

@@ -131,7 +131,7 @@ fn the_structured_solver_is_no_worse_than_quasi_newton() {
     let start = retargeter.start(&problem, &person);
     let iterations = phiw_bspline_retarget::solver::Iterations { hard_limits: false, ..Default::default() };
     let ours = solve(&problem, start.clone(), &iterations);
-    let theirs = quasi_newton(&problem, start, &QuasiNewton { most: 150, ..Default::default() });
+    let theirs = quasi_newton(&problem, start, &QuasiNewton { most: 150, ..Default::default() }, &|_| {});
     assert!(ours.cost.total() <= 1.02 * theirs.cost.total(), "{:?} {:?}", ours.cost, theirs.cost);
     let mut gradient = vec![0.0; problem.variables()];
     problem.gradient(&ours.variables, &mut gradient);

@@ -1,16 +1,21 @@
 //! A short film: person and robot as sticks, from the front and from the side.
 
 use super::page::Page;
+use super::stick_figure::{Figure, HEIGHT, View, WIDTH, label};
 use super::{Example, Scene};
-use phiw_bspline_retarget::RetargetOptions;
-use phiw_dynamics::Placement;
+use phiw_bspline_retarget::human::{JointMode, Segment, Side};
+use phiw_bspline_retarget::{MarkerRecording, RetargetOptions, Retargeted, Retargeter, RobotModel};
+use phiw_dynamics::{Placement, Vec3};
 use phiw_report::plot::{BoxGroup, BoxPlot, box_plot};
 use std::fmt::Write;
 
 /// Pictures in a second.
 const PICTURES_PER_S: f64 = 12.5;
-/// Pixels for a metre.
-const SCALE: f64 = 210.0;
+/// Colours of the person and of the robot.
+const PERSON: &str = "#1864ab";
+const ROBOT: &str = "#d9480f";
+/// Moments that are shown side by side.
+const MOMENTS: usize = 6;
 
 /// Retargets an example with the torso following the reach, and draws it.
 ///
@@ -20,101 +25,208 @@ pub fn draw(scene: &Scene, seed: u64, page: &mut Page) -> anyhow::Result<()> {
     let options = RetargetOptions { torso_from_reach: true, ..RetargetOptions::default() };
     let Example { retargeter, recording, calibration, name } = scene.example(seed, options)?;
     let motion = retargeter.retarget(&recording, calibration.as_ref())?;
-    page.heading(&format!("{name}: markers and robot"));
+    page.heading(&format!("{name}: person and robot"));
+    let mut stage = Stage::new(&retargeter, &recording, &motion)?;
     let pictures = (motion.frames as f64 / motion.rate_hz * PICTURES_PER_S) as usize;
-    let tree = retargeter.robot().tree();
-    let mut placements = vec![Placement::identity(); tree.bodies().len()];
-    let (mut q, mut scratch) = (vec![0.0; tree.joint_count()], vec![0.0; motion.robot.basis().degree() + 1]);
-    let center = recording_center(&recording);
-    let heading = heading(&recording);
     let mut frames: Vec<String> = Vec::new();
     for picture in 0..pictures {
         let t = picture as f64 / PICTURES_PER_S;
-        motion.robot.evaluate(0, t, &mut scratch, &mut q);
-        tree.forward_kinematics(&q, &mut placements)?;
+        let figures = stage.at(t)?;
         let mut svg = String::new();
-        for (view, left) in [(View::Front, 0.0), (View::Side, 400.0)] {
-            // The person's markers stand beside the robot, at the same height.
-            let frame = ((t * motion.rate_hz) as usize).min(recording.frames() - 1);
-            for marker in 0..recording.labels.len() {
-                let position = recording.position_m(frame, marker);
-                if position[0].is_finite() {
-                    let [x, y] = view.project(turned(position, center, heading));
-                    let _ =
-                        write!(svg, "<circle cx='{:.0}' cy='{:.0}' r='2.5'/>", left + 100.0 + x, 150.0 - y);
-                }
+        for (place, view) in [View::Front, View::Right].into_iter().enumerate() {
+            for (index, figure) in figures.iter().enumerate() {
+                figure.draw(view, (2 * place + index) as f64 * WIDTH, &mut svg);
             }
-            let mut path = String::new();
-            let origin = |body: usize| placements[body].translation.0;
-            let segments = tree.bodies().iter().enumerate().map(|(index, body)| match body.parent {
-                Some(parent) => (origin(parent), origin(index)),
-                None => ([0.0; 3], origin(index)),
-            });
-            let hands = retargeter.robot().arms().iter().filter_map(|arm| {
-                let body = arm.hand.body?;
-                Some((origin(body), placements[body].point(arm.hand.local).0))
-            });
-            for (from, to) in segments.chain(hands) {
-                let [a, b] = [from, to].map(|[x, y, z]| view.project([x, y, z - 1.2]));
-                let (x, y) = (left + 280.0, 150.0);
-                let _ = write!(path, "M{:.0} {:.0}L{:.0} {:.0}", x + a[0], y - a[1], x + b[0], y - b[1]);
-            }
-            let _ = write!(
-                svg,
-                "<path d='{path}' stroke='#2a6' stroke-width='5' stroke-linecap='round' fill='none'/>"
-            );
         }
+        label(&format!("{t:.1} s"), 2.0 * WIDTH, HEIGHT - 10.0, "#52606d", &mut svg);
         frames.push(svg);
     }
+    let head = if stage.head_measured {
+        ""
+    } else {
+        "; the person's head is dashed, since the recording holds no marker on it"
+    };
     page.picture(
         &film(&frames),
-        "markers of the person (dots) and the robot (lines): from the front, from the left",
+        &format!(
+            "The person as the model that was fitted to the markers (dots), and the robot, at one scale, shoulders at one height. From the \
+             side the far arm is paler. The robot's torso and head follow the reach of its hands{head}."
+        ),
     );
-    strip(&frames, page);
-    // Joint positions over time say whether it is smooth, too.
-    let peaks: Vec<Vec<f64>> = (0..tree.joint_count())
-        .map(|joint| {
-            (0..motion.frames)
-                .step_by(5)
-                .map(|frame| {
-                    motion.robot.evaluate(0, frame as f64 / motion.rate_hz, &mut scratch, &mut q);
-                    q[joint]
-                })
-                .collect()
-        })
-        .collect();
-    let places: Vec<String> = (1..=peaks.len()).map(|joint| joint.to_string()).collect();
-    let groups = [BoxGroup { name: "positions", samples: &peaks }];
-    let plot = BoxPlot {
-        groups: &groups,
-        places: &places,
-        x_label: "joint",
-        y_label: "position [rad]",
-        logarithmic: false,
-    };
-    page.picture(box_plot(&plot).as_str(), "where each joint of the robot is over the motion");
+    let moments =
+        stage.moments()?.into_iter().map(|t| stage.moment(t)).collect::<anyhow::Result<Vec<String>>>()?;
+    page.picture(
+        &strip(&moments),
+        "Moments of it, from the front, between which the robot's hands go equally far.",
+    );
+    page.picture(&positions(&motion), "Where each joint of the robot is over the motion.");
     Ok(())
 }
 
-/// Six moments side by side, for paper.
-fn strip(frames: &[String], page: &mut Page) {
-    let mut svg = String::from("<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 2400 320'>");
-    for moment in 0..6 {
-        let frame = &frames[moment * (frames.len().max(1) - 1) / 5];
-        let _ = write!(
-            svg,
-            "<svg x='{}' width='400' height='320' viewBox='0 0 400 320'>{frame}</svg>",
-            400 * moment
-        );
+/// What is drawn from: both seen from their shoulders at the beginning, looking ahead.
+struct Stage<'a> {
+    robot: &'a RobotModel,
+    recording: &'a MarkerRecording,
+    motion: &'a Retargeted,
+    parameters: Vec<f64>,
+    head_measured: bool,
+    placements: Vec<Placement<f64>>,
+    /// Middle of the shoulders, and cosine and sine of where the person looks.
+    person_origin: [f64; 3],
+    heading: [f64; 2],
+    robot_origin: [f64; 3],
+}
+
+impl<'a> Stage<'a> {
+    fn new(
+        retargeter: &'a Retargeter,
+        recording: &'a MarkerRecording,
+        motion: &'a Retargeted,
+    ) -> anyhow::Result<Self> {
+        let robot = retargeter.robot();
+        let mut stage = Stage {
+            robot,
+            recording,
+            motion,
+            parameters: motion.parameters.iter().map(|&(_, value)| value).collect(),
+            head_measured: retargeter.map().mode(Segment::Head) != JointMode::Held,
+            placements: vec![Placement::identity(); robot.tree().bodies().len()],
+            person_origin: [0.0; 3],
+            heading: [1.0, 0.0],
+            robot_origin: [0.0; 3],
+        };
+        let [left, right] = stage.sticks(0.0, [Side::Left, Side::Right].map(Segment::UpperArm)).map(|s| s[0]);
+        let across = [left[0] - right[0], left[1] - right[1]];
+        let length = f64::hypot(across[0], across[1]).max(1e-9);
+        // Left is y.
+        stage.heading = [across[1] / length, -across[0] / length];
+        stage.person_origin = middle(left, right);
+        stage.place_robot(0.0)?;
+        let [left, right] = robot.arms().map(|arm| robot.place(arm.shoulder, &stage.placements).0);
+        stage.robot_origin = middle(left, right);
+        Ok(stage)
     }
-    svg.push_str("</svg>");
-    page.picture(&svg, "six moments of it, from the front");
+
+    /// Person and robot.
+    fn at(&mut self, t: f64) -> anyhow::Result<[Figure; 2]> {
+        self.place_robot(t)?;
+        Ok([self.person(t), self.robot()])
+    }
+
+    /// Times between which the robot's hands go equally far: where nothing moves there is nothing to see.
+    fn moments(&mut self) -> anyhow::Result<Vec<f64>> {
+        let frames = self.motion.frames;
+        let (mut ways, mut before) = (vec![0.0], None);
+        for frame in 0..frames {
+            self.place_robot(frame as f64 / self.motion.rate_hz)?;
+            let hands = self.robot.arms().map(|arm| self.robot.place(arm.hand, &self.placements));
+            if let Some(before) = before.replace(hands) {
+                let [left, right] = [0, 1].map(|hand| hands[hand] - before[hand]);
+                let way = ways[frame - 1] + left.dot(left).sqrt() + right.dot(right).sqrt();
+                ways.push(way);
+            }
+        }
+        let whole = ways.last().copied().unwrap_or(0.0);
+        let moment = |moment: usize| {
+            let way = moment as f64 / (MOMENTS - 1) as f64 * whole;
+            ways.partition_point(|&gone| gone < way).min(frames.saturating_sub(1)) as f64
+                / self.motion.rate_hz
+        };
+        Ok((0..MOMENTS).map(moment).collect())
+    }
+
+    /// Both from the front, with the time.
+    fn moment(&mut self, t: f64) -> anyhow::Result<String> {
+        let mut svg = String::new();
+        for (index, figure) in self.at(t)?.iter().enumerate() {
+            figure.draw(View::Front, index as f64 * WIDTH, &mut svg);
+        }
+        label(&format!("{t:.1} s"), WIDTH, HEIGHT - 10.0, "#52606d", &mut svg);
+        Ok(svg)
+    }
+
+    fn sticks<const N: usize>(&self, t: f64, segments: [Segment; N]) -> [[[f64; 3]; 2]; N] {
+        let human = &self.motion.human;
+        let mut coordinates = vec![0.0; human.dimension()];
+        human.evaluate(0, t, &mut vec![0.0; human.basis().degree() + 1], &mut coordinates);
+        let sticks = self.motion.body.sticks(&coordinates, &self.parameters);
+        segments.map(|segment| sticks[segment.index()])
+    }
+
+    fn person(&self, t: f64) -> Figure {
+        use Segment::{Chest, Forearm, Hand, Head, Neck, Pelvis, UpperArm};
+        let see = |point| self.seen_from_person(point);
+        let [pelvis, chest, neck, head] = self.sticks(t, [Pelvis, Chest, Neck, Head]);
+        let arm = |side| {
+            let [upper, fore, hand] = self.sticks(t, [UpperArm(side), Forearm(side), Hand(side)]);
+            [upper[0], fore[0], hand[0], hand[1]].map(see).to_vec()
+        };
+        let frame = ((t * self.motion.rate_hz) as usize).min(self.recording.frames() - 1);
+        let markers = self.motion.body.markers().into_iter();
+        let seen = markers.map(|marker| self.recording.position_m(frame, marker.recorded));
+        let ahead = std::array::from_fn(|axis| 2.0 * head[1][axis] - head[0][axis]);
+        Figure {
+            colour: PERSON,
+            trunk: [pelvis[0], chest[0], chest[1], neck[1]].map(see).to_vec(),
+            arms: [arm(Side::Left), arm(Side::Right)],
+            head: Some((see(middle(head[0], head[1])), see(ahead), self.head_measured)),
+            dots: seen.filter(|position| position[0].is_finite()).map(see).collect(),
+        }
+    }
+
+    fn seen_from_person(&self, point: [f64; 3]) -> [f64; 3] {
+        let [cosine, sine] = self.heading;
+        let [x, y, z] = [0, 1, 2].map(|axis| point[axis] - self.person_origin[axis]);
+        [cosine * x + sine * y, cosine * y - sine * x, z]
+    }
+
+    fn place_robot(&mut self, t: f64) -> anyhow::Result<()> {
+        let robot = &self.motion.robot;
+        let mut q = vec![0.0; robot.dimension()];
+        robot.evaluate(0, t, &mut vec![0.0; robot.basis().degree() + 1], &mut q);
+        self.robot.tree().forward_kinematics(&q, &mut self.placements)?;
+        Ok(())
+    }
+
+    fn robot(&self) -> Figure {
+        let see = |point| {
+            let place = self.robot.place(point, &self.placements) - Vec3(self.robot_origin);
+            place.0
+        };
+        let arms = self.robot.arms();
+        let [left, right] = arms.map(|arm| see(arm.shoulder));
+        let gaze = self.robot.gaze().map(|ends| ends.map(see));
+        let mut trunk: Vec<[f64; 3]> = self.robot.trunk().map(|ends| see(ends[0])).into_iter().collect();
+        trunk.push(middle(left, right));
+        trunk.extend(gaze.map(|[head, _]| head));
+        Figure {
+            colour: ROBOT,
+            trunk,
+            arms: arms.map(|arm| [arm.shoulder, arm.elbow, arm.wrist, arm.hand].map(see).to_vec()),
+            // The point ahead is further than a face is deep.
+            head: gaze.map(|[head, ahead]| {
+                (head, std::array::from_fn(|a| head[a] + 0.6 * (ahead[a] - head[a])), true)
+            }),
+            dots: Vec::new(),
+        }
+    }
+}
+
+fn middle(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|axis| 0.5 * (a[axis] + b[axis]))
 }
 
 /// All pictures on top of each other, each shown for its moment.
 fn film(frames: &[String]) -> String {
     let duration = frames.len() as f64 / PICTURES_PER_S;
-    let mut svg = String::from("<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 800 320'>");
+    let mut svg =
+        format!("<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {:.0} {HEIGHT:.0}'>", 4.0 * WIDTH);
+    for (place, view) in ["from the front", "from its right"].into_iter().enumerate() {
+        let left = 2.0 * place as f64 * WIDTH;
+        label("person", left + 0.5 * WIDTH, 20.0, PERSON, &mut svg);
+        label("robot", left + 1.5 * WIDTH, 20.0, ROBOT, &mut svg);
+        label(view, left + WIDTH, 38.0, "#52606d", &mut svg);
+    }
     for (index, frame) in frames.iter().enumerate() {
         let [from, to] = [index, index + 1].map(|index| index as f64 / frames.len() as f64);
         let shown = match index {
@@ -132,53 +244,38 @@ fn film(frames: &[String]) -> String {
     svg
 }
 
-enum View {
-    Front,
-    Side,
-}
-
-impl View {
-    /// Right and up \[pixels\], x forward, y left, z up.
-    fn project(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
-        match self {
-            View::Front => [SCALE * y, SCALE * z],
-            View::Side => [SCALE * x, SCALE * z],
-        }
+/// Moments side by side, in rows of three, for paper.
+fn strip(moments: &[String]) -> String {
+    let (across, rows) = (3, moments.len().div_ceil(3));
+    let [width, height] = [2.0 * WIDTH * across as f64, HEIGHT * rows as f64];
+    let mut svg = format!("<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {width:.0} {height:.0}'>");
+    for (index, moment) in moments.iter().enumerate() {
+        let [x, y] = [(index % across) as f64 * 2.0 * WIDTH, (index / across) as f64 * HEIGHT];
+        let _ = write!(svg, "<g transform='translate({x:.0} {y:.0})'>{moment}</g>");
     }
+    label("person", 0.5 * WIDTH, 20.0, PERSON, &mut svg);
+    label("robot", 1.5 * WIDTH, 20.0, ROBOT, &mut svg);
+    svg.push_str("</svg>");
+    svg
 }
 
-/// The middle of all markers in the first frame that shows any.
-fn recording_center(recording: &phiw_bspline_retarget::MarkerRecording) -> [f64; 3] {
-    let (mut sum, mut count) = ([0.0; 3], 0.0);
-    for position in recording.positions_m.iter().filter(|position| position[0].is_finite()) {
-        (0..3).for_each(|axis| sum[axis] += position[axis]);
-        count += 1.0;
+/// The positions of each joint of the robot as boxes.
+fn positions(motion: &Retargeted) -> String {
+    let mut scratch = vec![0.0; motion.robot.basis().degree() + 1];
+    let mut samples = vec![Vec::new(); motion.robot.dimension()];
+    let mut q = vec![0.0; motion.robot.dimension()];
+    for frame in (0..motion.frames).step_by(5) {
+        motion.robot.evaluate(0, frame as f64 / motion.rate_hz, &mut scratch, &mut q);
+        samples.iter_mut().zip(&q).for_each(|(samples, &value)| samples.push(value));
     }
-    sum.map(|sum| sum / f64::max(count, 1.0))
-}
-
-/// Cosine and sine of the angle that the person is turned: markers whose names begin with L are to the left.
-fn heading(recording: &phiw_bspline_retarget::MarkerRecording) -> [f64; 2] {
-    let mut across = [0.0; 2];
-    for frame in 0..recording.frames() {
-        for (marker, label) in recording.labels.iter().enumerate() {
-            let sign = match label.chars().next() {
-                Some('L') => 1.0,
-                Some('R') => -1.0,
-                _ => continue,
-            };
-            let position = recording.position_m(frame, marker);
-            if position[0].is_finite() {
-                (0..2).for_each(|axis| across[axis] += sign * position[axis]);
-            }
-        }
-    }
-    let length = f64::hypot(across[0], across[1]).max(1e-9);
-    // Left is y.
-    [across[1] / length, -across[0] / length]
-}
-
-fn turned(position: [f64; 3], center: [f64; 3], [cosine, sine]: [f64; 2]) -> [f64; 3] {
-    let [x, y, z] = [0, 1, 2].map(|axis| position[axis] - center[axis]);
-    [cosine * x + sine * y, cosine * y - sine * x, z]
+    let places: Vec<String> = (1..=samples.len()).map(|joint| joint.to_string()).collect();
+    let groups = [BoxGroup { name: "positions", samples: &samples }];
+    let plot = BoxPlot {
+        groups: &groups,
+        places: &places,
+        x_label: "joint",
+        y_label: "position [rad]",
+        logarithmic: false,
+    };
+    box_plot(&plot).as_str().to_owned()
 }

@@ -41,6 +41,8 @@ pub struct HumanBody {
     pub(crate) trajectories: Vec<Coordinate>,
     /// Columns after the trajectories of human and robot: lengths, joints that keep still, markers' places.
     pub(crate) parameters: Vec<Coordinate>,
+    /// Their first column.
+    pub(crate) first_parameter: usize,
     /// Which parameters are joints that keep still.
     pub(crate) still: std::ops::Range<usize>,
     /// Node of each segment's frame, in the order of [`Segment::ALL`].
@@ -67,6 +69,7 @@ impl HumanBody {
             kinematics: Kinematics::default(),
             trajectories: Vec::new(),
             parameters: Vec::new(),
+            first_parameter: 0,
             still: SEGMENT_PARAMETERS.len()..0,
             segment_nodes: [0; 12],
             markers: Vec::new(),
@@ -80,6 +83,7 @@ impl HumanBody {
         let moving = |segment: &Segment| mode(*segment) == JointMode::Free;
         let count: usize = Segment::ALL.iter().filter(|s| moving(s)).map(|&s| joints(s).len()).sum();
         let first_parameter = count + robot_coordinates;
+        body.first_parameter = first_parameter;
         for (index, parameter) in SEGMENT_PARAMETERS.iter().enumerate() {
             body.parameters.push(Coordinate {
                 name: parameter.name.to_owned(),

@@ -4,9 +4,11 @@ mod body;
 mod composite;
 mod kinematics;
 mod marker_map;
+mod outside;
 mod skeleton;
 
 pub use body::{HumanBody, Placed};
 pub(crate) use kinematics::{HumanScratch, rotate, rotate_back};
 pub use marker_map::{JointMode, MapError, MarkerMap, SegmentMarkers};
+pub use outside::{BodyJoint, BodyMarker};
 pub use skeleton::{SEGMENT_PARAMETERS, Segment, SegmentParameter, Side};

@@ -26,13 +26,18 @@ impl Default for QuasiNewton {
     }
 }
 
-struct Objective<'a>(&'a Problem<'a>);
+struct Objective<'a> {
+    problem: &'a Problem<'a>,
+    seen: &'a dyn Fn(f64),
+}
 
 impl CostFunction for Objective<'_> {
     type Param = Vec<f64>;
     type Output = f64;
     fn cost(&self, variables: &Vec<f64>) -> Result<f64, Error> {
-        Ok(self.0.cost(variables).total())
+        let cost = self.problem.cost(variables).total();
+        (self.seen)(cost);
+        Ok(cost)
     }
 }
 
@@ -41,21 +46,28 @@ impl Gradient for Objective<'_> {
     type Gradient = Vec<f64>;
     fn gradient(&self, variables: &Vec<f64>) -> Result<Vec<f64>, Error> {
         let mut gradient = vec![0.0; variables.len()];
-        self.0.gradient(variables, &mut gradient);
+        self.problem.gradient(variables, &mut gradient);
         Ok(gradient)
     }
 }
 
 /// Solves (15) from `start` by L-BFGS with the line search of Moré and Thuente. Over the control points of a spline it is the paper's
 /// method; over a basis of degree 1 with a control point for each sample it is the one without splines.
-pub fn quasi_newton(problem: &Problem<'_>, start: Vec<f64>, options: &QuasiNewton) -> Solution {
+///
+/// `seen` is told the objective whenever it is computed: how far one is at what time.
+pub fn quasi_newton(
+    problem: &Problem<'_>,
+    start: Vec<f64>,
+    options: &QuasiNewton,
+    seen: &dyn Fn(f64),
+) -> Solution {
     let search = MoreThuenteLineSearch::new();
     let solver = LBFGS::new(search, options.memory)
         .with_tolerance_grad(options.gradient)
         .and_then(|solver| solver.with_tolerance_cost(options.decrease));
     let first = start.clone();
     let run = solver.and_then(|solver| {
-        Executor::new(Objective(problem), solver)
+        Executor::new(Objective { problem, seen }, solver)
             .configure(|state| state.param(start).max_iters(options.most))
             .run()
     });
