@@ -15,19 +15,31 @@ mod reliability;
 mod report;
 mod run_file;
 mod score;
+mod secrets;
 mod setup;
 mod shard;
 mod subject;
 mod tidy;
+mod whole_body;
 
-pub use arguments::{Arguments, Command};
+pub use crate::plant_experiment::engine::Engine;
+pub use crate::plant_experiment::secret::SecretKind;
+pub use arguments::{Arguments, Command, EstimatorName, Initial, RunArguments};
+pub use arm::{Arm, Footing};
+pub use figures::{balance, choices};
+pub use jobs::{Job, do_all};
+pub use motions::Source;
+pub use run_file::RunFile;
+pub use score::Score;
+pub use setup::Setup;
+pub use subject::{Subject, SubjectName};
 
 use crate::{environment, mujoco};
 use anyhow::Context;
-use arguments::{MergeArguments, RunArguments};
+use arguments::MergeArguments;
 use indicatif::{ProgressBar, ProgressStyle};
 use jobs::Outcome;
-use setup::Setup;
+use phiw::console::Console;
 use std::path::Path;
 
 /// Runs the task.
@@ -48,7 +60,7 @@ fn run(arguments: &RunArguments) -> anyhow::Result<()> {
     }
     let out = environment::workspace_root()?.join(&arguments.out);
     std::fs::create_dir_all(&out).with_context(|| out.display().to_string())?;
-    let setup = Setup::new(arguments, &out)?;
+    let setup = Setup::new(arguments, &out, &Console::of_terminal(false))?;
     setup.settings.keep(&out)?;
     let jobs = shard::part(jobs::all(arguments), arguments.shard);
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} iterations {elapsed} (left {eta})")?;

@@ -1,8 +1,11 @@
-//! `cargo xtask run`: the best main job that there is so far, on a log that this program makes itself.
+//! `cargo xtask run`: the main job, on motions and logs that this program makes itself.
 //!
-//! Here: `phiw explain`, with report, on an arm whose wrist has a differential that nobody declared. The outcome on the example is the same on
-//! every machine; where logs of a real robot lie beside the workspace, they are explained as well.
+//! First a curriculum on an 18-joint upper body with something in it that nobody declared; then `phiw explain`, with report, on an arm whose wrist
+//! has a differential that nobody declared. The outcome is the same on every machine with the same physics engine; where logs of a real robot lie beside the
+//! workspace, they are explained as well.
 
+mod curriculum;
+mod curriculum_page;
 mod synthetic;
 pub mod synthetic_log;
 
@@ -35,7 +38,7 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-/// Explains the example, and a real robot where its logs are there.
+/// Runs the curriculum, explains the example, and a real robot where its logs are there.
 ///
 /// # Errors
 /// Files cannot be read or written, or the identification fails.
@@ -43,7 +46,11 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     mujoco::fetch_or_go_on_without();
     let root = environment::workspace_root()?;
     let out = root.join(&arguments.out);
-    let mut reports = vec![run(&example(&root, &out)?)?];
+    std::fs::create_dir_all(&out).with_context(|| format!("cannot make {}", out.display()))?;
+    println!("A curriculum on models/upper_body18.urdf with an effect that nobody declares\n");
+    let (report, found) = curriculum::run(&out)?;
+    println!("{found}\n");
+    let mut reports = vec![report, run(&example(&root, &out)?)?];
     let tx40 = root.join("../shared/data/logs/tx40");
     if tx40.exists() {
         let log = |name: &str| vec![tx40.join(name)];

@@ -1,7 +1,7 @@
 //! What each motion of the dataset would tell: its factor, computed once for all iterations and all runs.
 
 use crate::triangle::Triangle;
-use crate::{CurriculumError, MotionDataset, Robot};
+use crate::{CurriculumError, MotionDataset, Robot, RobotModel};
 use phiw_identification::{Design, EffectSpec, Fold, accumulate};
 use phiw_regressor::RegressorError;
 use phiw_regressor::least_squares::GroupedFactor;
@@ -38,8 +38,29 @@ impl Candidates {
         dataset: &MotionDataset,
         weights: &[f64],
     ) -> Result<Self, CurriculumError> {
+        Self::of_designs(&|| robot.design(effects), dataset, weights)
+    }
+
+    /// The same for a belief with any effects, which is the reference of those that need torques.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_model(
+        robot: &Robot,
+        model: &RobotModel,
+        dataset: &MotionDataset,
+        weights: &[f64],
+    ) -> Result<Self, CurriculumError> {
+        Self::of_designs(&|| robot.design_of(model), dataset, weights)
+    }
+
+    fn of_designs(
+        design: &(dyn Fn() -> Result<Design, CurriculumError> + Sync),
+        dataset: &MotionDataset,
+        weights: &[f64],
+    ) -> Result<Self, CurriculumError> {
         let reduce = |motion: &crate::Motion| {
-            let design = robot.design(effects)?;
+            let design = design()?;
             let factor = grouped_factor(&design, motion.block())?.combine(weights)?;
             let triangle = Triangle::of_factor(&factor);
             Ok(Candidate { condition_number: triangle.condition_number(), triangle })
@@ -47,7 +68,7 @@ impl Candidates {
         let candidates: Result<Vec<Candidate>, CurriculumError> =
             dataset.motions().par_iter().map(reduce).collect();
         let candidates = candidates?;
-        let mut everything = Triangle::empty(robot.design(effects)?.parameter_count());
+        let mut everything = Triangle::empty(design()?.parameter_count());
         candidates.iter().for_each(|candidate| everything.absorb(&mut candidate.triangle.clone()));
         Ok(Candidates { weights: weights.to_vec(), candidates, everything })
     }

@@ -28,7 +28,7 @@ impl Controller for FeedForward {
         if let Some(viscous) = viscous_alone(robot, model) {
             return Ok(ComputedTorque::new(RigidBodyModel::new(model.tree(robot)?, viscous)?, gains));
         }
-        let design = robot.design(&model.specs())?;
+        let design = robot.design_of(model)?;
         let parameters = model.parameters(robot)?;
         Ok(ComputedTorque::new(
             ModelTorque { evaluation: vec![0.0; design.evaluation_width()], design, parameters },
@@ -62,7 +62,8 @@ struct ModelTorque {
 
 impl TorqueModel for ModelTorque {
     fn torque(&mut self, q: &[f64], v: &[f64], a: &[f64], torque: &mut [f64]) -> Result<(), DimensionError> {
-        let block = Block::unfiltered(q.len(), vec![0.0], [q, v, a].map(<[f64]>::to_vec), Vec::new());
+        let mut block = Block::unfiltered(q.len(), vec![0.0], [q, v, a].map(<[f64]>::to_vec), Vec::new());
+        self.design.correct(&mut block);
         let mut scratch = self.design.scratch();
         scratch.begin(&block)?;
         scratch.evaluate(&block, 0, &mut self.evaluation)?;

@@ -1,14 +1,18 @@
-//! Algorithm 1, lines 10 to 17: select, measure, estimate, relax.
+//! Algorithm 1, lines 10 to 17: select, measure, estimate, relax; and, where the model may grow, look for what it lacks.
 
 use crate::estimation::RowsAt;
+use crate::growth::{Found, LEAST_GAIN};
 use crate::selection::{Choice, Question};
 use crate::triangle::Triangle;
 use crate::{
-    Candidates, Constraint, CurriculumError, EndCriterion, Estimator, Evidence, Experiment, IterationRecord,
-    Learnt, MotionDataset, Relaxation, Robot, RobotModel, Run, Safety, Selection,
+    Candidates, Constraint, CurriculumError, EndCriterion, Estimate, Estimator, Evidence, Experiment, Growth,
+    IterationRecord, Learnt, Measured, MotionDataset, Relaxation, Rivalry, Robot, RobotModel, Run, Safety,
+    Selection,
 };
+use phiw_identification::EffectSpec;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use std::borrow::Cow;
 
 /// A curriculum: what it is about, and who decides what.
 pub struct Curriculum<'a> {
@@ -16,7 +20,7 @@ pub struct Curriculum<'a> {
     pub robot: &'a Robot,
     /// The motions to choose from.
     pub dataset: &'a MotionDataset,
-    /// Their factors, made once for all runs.
+    /// Their factors under the declared model, made once for all runs.
     pub candidates: &'a Candidates,
     /// Where measurements come from.
     pub experiment: &'a dyn Experiment,
@@ -28,11 +32,16 @@ pub struct Curriculum<'a> {
     pub relaxation: &'a dyn Relaxation,
     /// Line 14: how parameters are estimated.
     pub estimator: &'a dyn Estimator,
+    /// Who looks for what the model lacks; none in the paper.
+    pub growth: Option<&'a dyn Growth>,
     /// When it is over.
     pub end: &'a dyn EndCriterion,
     /// Which instants of a log become rows.
     pub rows_at: RowsAt,
 }
+
+/// Answers of who looks for effects that are put to the estimator's likelihood after one log.
+const MOST_ANSWERS: usize = 3;
 
 /// What a stream of random numbers is for. Each iteration has its own, so that nothing has to be remembered.
 #[derive(Clone, Copy)]
@@ -45,6 +54,14 @@ fn random(seed: u64, iteration: usize, purpose: Purpose) -> ChaCha8Rng {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(16 * (iteration as u64 + 1) + purpose as u64);
     random
+}
+
+/// A belief with what was measured, and how sure it is.
+#[derive(Clone)]
+struct Learning {
+    evidence: Evidence,
+    model: RobotModel,
+    estimate: Estimate,
 }
 
 impl Curriculum<'_> {
@@ -75,30 +92,26 @@ impl Curriculum<'_> {
         let motion = &self.dataset.motions()[plan.choice.motion];
         let mut noise = random(run.seed, run.history.len(), Purpose::Experiment);
         let trial = self.experiment.perform(self.robot, &run.model, motion, &mut noise)?;
-        let specs = run.model.specs();
-        let design = self.robot.design(&specs)?;
-        let before = run.model.parameters(self.robot)?;
-        let mut evidence = match &run.evidence {
-            Some(evidence) => evidence.clone(),
-            None => Evidence::none(&design, self.rows_at)?,
-        };
-        let mut model = run.model.clone();
-        let mut standard_deviations = Vec::new();
+        let mut next = run.clone();
+        next.first_alpha = Some(plan.first_alpha);
+        let mut deviations = Vec::new();
         // A base that tilts is not the fixed base of the columns: the log of a fall is of another robot.
-        if trial.fell_at_s.is_none() {
-            evidence.add(&design, &trial.measured)?;
-            let estimate = self.estimator.estimate(&design, &evidence, &run.model, &before)?;
-            model = run.model.with_parameters(self.robot, &specs, &estimate.parameters)?;
-            let finite = |value: &f64| value.is_finite().then_some(*value);
-            standard_deviations = estimate.standard_deviations.iter().map(finite).collect();
+        if trial.fell_at_s.is_some() {
+            next.excluded.push(plan.choice.motion);
+        } else {
+            let learning = self.learn(&mut next, &trial.measured)?;
+            next.model = learning.model;
+            next.evidence = Some(learning.evidence);
+            deviations = learning.estimate.standard_deviations;
         }
-        let condition_number = match evidence.is_empty() {
-            true => None,
-            false => Some(self.candidates.measured(evidence.factor())?.condition_number())
-                .filter(|c| c.is_finite()),
+        let candidates = self.candidates_of(&next.model)?;
+        let condition_number = match next.evidence.as_ref().filter(|evidence| !evidence.is_empty()) {
+            Some(evidence) => Some(candidates.measured(evidence.factor())?.condition_number()),
+            None => None,
         };
-        let after = model.parameters(self.robot)?;
-        let record = IterationRecord {
+        let (before, after) = (run.model.parameters(self.robot)?, next.model.parameters(self.robot)?);
+        let grown = run.model.specs() != next.model.specs();
+        next.history.push(IterationRecord {
             motion: motion.name.clone(),
             allowed: if plan.forced { 0 } else { plan.allowed.len() },
             forced: plan.forced,
@@ -107,21 +120,133 @@ impl Curriculum<'_> {
             fell_at_s: trial.fell_at_s,
             still_share: trial.measured.still_share(),
             tracking_error: trial.tracking_error,
-            condition_number,
-            torque_change: self.candidates.torque_change(&before, &after),
-            model: model.clone(),
-            standard_deviations,
+            condition_number: condition_number.filter(|cond| cond.is_finite()),
+            torque_change: if grown { None } else { candidates.torque_change(&before, &after) },
+            separates: plan.separates,
+            model: next.model.clone(),
+            standard_deviations: deviations
+                .iter()
+                .map(|std| Some(*std).filter(|std| std.is_finite()))
+                .collect(),
             choice: plan.choice,
-        };
-        if record.fell_at_s.is_some() {
-            run.excluded.push(record.choice.motion);
-        }
-        run.first_alpha = Some(plan.first_alpha);
-        run.model = model;
-        run.evidence = Some(evidence);
-        run.history.push(record);
-        run.ended = self.end.reason(&run.history);
+        });
+        next.ended = self.end.reason(&next.history);
+        *run = next;
         Ok(())
+    }
+
+    /// Line 14, and the search for what the model lacks.
+    fn learn(&self, run: &mut Run, measured: &Measured) -> Result<Learning, CurriculumError> {
+        let evidence = match run.evidence.take() {
+            Some(evidence) => evidence,
+            None => Evidence::none(&self.robot.design_of(&run.model)?, self.rows_at)?,
+        };
+        let mut learning = self.believe(evidence, &run.model, std::slice::from_ref(measured))?;
+        let Some(growth) = self.growth else { return Ok(learning) };
+        run.logs.push(measured.clone());
+        let mut doubted = open_rivalry(run).is_some();
+        let (mut found, mut believed, mut refuted) = (Found::default(), Vec::new(), Vec::new());
+        // What stood in the place of the answer, and is not true, makes way for it.
+        for _ in 0..MOST_ANSWERS {
+            found = growth.look(self.robot, &learning.model, &run.logs, doubted, &refuted)?;
+            (learning, believed) = self.confirmed(learning, found.effects.clone(), &run.logs)?;
+            let wrong: Vec<EffectSpec> =
+                found.effects.iter().filter(|effect| !believed.contains(effect)).cloned().collect();
+            if wrong.is_empty() {
+                break;
+            }
+            refuted.extend(wrong);
+            doubted = false;
+        }
+        run.rivals.clear();
+        for effects in found.rivals.into_iter().filter(|[named, _]| believed.contains(named)) {
+            let instead =
+                |spec: &EffectSpec| if *spec == effects[0] { effects[1].clone() } else { spec.clone() };
+            let other: Vec<EffectSpec> = believed.iter().map(instead).collect();
+            let other = self.fitted(&learning, &other, &run.logs)?;
+            run.rivals.push(Rivalry { beliefs: [learning.model.clone(), other.model], effects });
+        }
+        Ok(learning)
+    }
+
+    /// The model with those of the found `effects` that the estimator's likelihood confirms: the least of them goes until each is worth
+    /// [`LEAST_GAIN`].
+    fn confirmed(
+        &self,
+        learning: Learning,
+        mut effects: Vec<EffectSpec>,
+        logs: &[Measured],
+    ) -> Result<(Learning, Vec<EffectSpec>), CurriculumError> {
+        let mut with = self.fitted(&learning, &effects, logs)?;
+        while let Some(misfit) = self.misfit(&with)? {
+            let mut least: Option<(f64, usize, Learning)> = None;
+            for place in 0..effects.len() {
+                let others = [&effects[..place], &effects[place + 1..]].concat();
+                let without = self.fitted(&learning, &others, logs)?;
+                let gain = self.misfit(&without)?.unwrap_or(f64::INFINITY) - misfit;
+                if least.as_ref().is_none_or(|least| gain < least.0) {
+                    least = Some((gain, place, without));
+                }
+            }
+            match least {
+                Some((gain, place, without)) if gain < LEAST_GAIN => {
+                    effects.remove(place);
+                    with = without;
+                }
+                _ => break,
+            }
+        }
+        Ok((with, effects))
+    }
+
+    /// −log L of what was learnt, if the estimator knows it.
+    fn misfit(&self, learning: &Learning) -> Result<Option<f64>, CurriculumError> {
+        let design = self.robot.design_of(&learning.model)?;
+        self.estimator.misfit(&design, &learning.evidence, &learning.estimate.parameters)
+    }
+
+    /// The same with other `effects` beside the declared ones, fitted to all logs again.
+    fn fitted(
+        &self,
+        learning: &Learning,
+        effects: &[EffectSpec],
+        logs: &[Measured],
+    ) -> Result<Learning, CurriculumError> {
+        let specs = &[self.robot.declared(), effects].concat();
+        if learning.model.specs() == *specs {
+            return Ok(learning.clone());
+        }
+        let model = learning.model.with_effects(self.robot, specs)?;
+        let evidence = Evidence::none(&self.robot.design_of(&model)?, self.rows_at)?;
+        self.believe(evidence, &model, logs)
+    }
+
+    /// Takes in logs and estimates.
+    fn believe(
+        &self,
+        mut evidence: Evidence,
+        present: &RobotModel,
+        logs: &[Measured],
+    ) -> Result<Learning, CurriculumError> {
+        let design = self.robot.design_of(present)?;
+        for log in logs {
+            evidence.add(&design, log)?;
+        }
+        let parameters = present.parameters(self.robot)?;
+        let estimate = self.estimator.estimate(&design, &evidence, present, &parameters)?;
+        let model = present.with_parameters(self.robot, &present.specs(), &estimate.parameters)?;
+        Ok(Learning { evidence, model, estimate })
+    }
+
+    /// The factors of the motions under a belief's columns: those made once, unless the model has grown.
+    ///
+    /// # Errors
+    /// The belief is of another robot.
+    pub fn candidates_of(&self, model: &RobotModel) -> Result<Cow<'_, Candidates>, CurriculumError> {
+        if model.specs() == self.robot.declared() {
+            return Ok(Cow::Borrowed(self.candidates));
+        }
+        Candidates::of_model(self.robot, model, self.dataset, self.candidates.weights()).map(Cow::Owned)
     }
 
     /// What the next iteration would do; none once the run has ended. For a real robot this is all there is to do before it moves.
@@ -134,10 +259,6 @@ impl Curriculum<'_> {
         }
         let safety = self.constraint.all(self.robot, &run.model, self.dataset)?;
         let first_alpha = run.first_alpha.unwrap_or_else(|| self.relaxation.first(&safety));
-        let measured = match &run.evidence {
-            Some(evidence) if !evidence.is_empty() => Some(self.candidates.measured(evidence.factor())?),
-            _ => None,
-        };
         let first = run.history.iter().find_map(|record| record.condition_number);
         let alpha = match (first, run.history.last().and_then(|record| record.condition_number)) {
             (Some(first_condition_number), Some(condition_number)) => {
@@ -152,17 +273,63 @@ impl Curriculum<'_> {
             open.clone().filter(|&motion| safety[motion].largest_reduction >= alpha).collect();
         let forced = allowed.is_empty();
         if forced {
-            allowed.extend(
-                open.max_by(|&a, &b| safety[a].largest_reduction.total_cmp(&safety[b].largest_reduction)),
-            );
+            let by_safety = |a: &usize, b: &usize| {
+                safety[*a].largest_reduction.total_cmp(&safety[*b].largest_reduction).then(b.cmp(a))
+            };
+            allowed.extend(open.max_by(by_safety));
         }
-        let question =
-            Question { candidates: self.candidates, allowed: &allowed, measured: measured.as_ref() };
-        let mut dice = random(run.seed, run.history.len(), Purpose::Selection);
-        let choice = self.selection.choose(&question, &mut dice);
+        let (choice, separates) = match open_rivalry(run) {
+            Some(rivalry) => (self.telling(rivalry, &allowed)?, Some(rivalry.names())),
+            None => (self.select(run, &allowed)?, None),
+        };
         let safety = safety[choice.motion];
-        Ok(Some(Plan { choice, allowed, forced, alpha, first_alpha, safety }))
+        Ok(Some(Plan { choice, separates, allowed, forced, alpha, first_alpha, safety }))
     }
+
+    /// Line 12.
+    fn select(&self, run: &Run, allowed: &[usize]) -> Result<Choice, CurriculumError> {
+        let candidates = self.candidates_of(&run.model)?;
+        let measured: Option<Triangle> = match run.evidence.as_ref().filter(|evidence| !evidence.is_empty()) {
+            Some(evidence) => Some(candidates.measured(evidence.factor())?),
+            None => None,
+        };
+        let question = Question { candidates: &candidates, allowed, measured: measured.as_ref() };
+        let mut dice = random(run.seed, run.history.len(), Purpose::Selection);
+        Ok(self.selection.choose(&question, &mut dice))
+    }
+
+    /// The motion on which two rivals differ most, torques counted by their limits.
+    fn telling(&self, rivalry: &Rivalry, allowed: &[usize]) -> Result<Choice, CurriculumError> {
+        let tree = self.robot.tree();
+        let scale: Vec<f64> = (0..tree.joint_count())
+            .map(|joint| tree.joint(joint).limits.effort)
+            .map(|effort| if effort.is_finite() && effort > 0.0 { effort } else { 1.0 })
+            .collect();
+        let mut differences = Vec::with_capacity(allowed.len());
+        for &motion in allowed {
+            let difference = rivalry.difference(self.robot, &self.dataset.motions()[motion], &scale)?;
+            differences.push((difference, motion));
+        }
+        differences.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        Ok(Choice {
+            motion: differences.first().map_or(0, |best| best.1),
+            merit: differences.first().map(|best| best.0),
+            runner_up: differences.get(1).map(|next| (next.1, next.0)),
+        })
+    }
+}
+
+/// The rivals that the next motion is to tell apart. A pair has one motion, and then the parameters have one: what tells rivals apart need not tell
+/// anything else, and rivals that one motion has not told may be rivals for ever.
+fn open_rivalry(run: &Run) -> Option<&Rivalry> {
+    if run.history.last().is_some_and(|record| record.separates.is_some()) {
+        return None;
+    }
+    let tried = |names: &[String; 2]| {
+        let separated = run.history.iter().filter_map(|record| record.separates.as_ref());
+        separated.into_iter().any(|pair| names.iter().all(|name| pair.contains(name)))
+    };
+    run.rivals.iter().find(|rivalry| !tried(&rivalry.names()))
 }
 
 /// What an iteration is going to do.
@@ -170,6 +337,8 @@ impl Curriculum<'_> {
 pub struct Plan {
     /// The motion, and why.
     pub choice: Choice,
+    /// The two beliefs that it is to tell apart, in words; none if it is chosen for what it tells of the parameters.
+    pub separates: Option<[String; 2]>,
     /// The motions that could be chosen, ascending.
     pub allowed: Vec<usize>,
     /// The constraint allows none, and the safest is the only one.

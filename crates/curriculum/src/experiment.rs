@@ -60,7 +60,9 @@ pub struct SimulatedRobot {
 }
 
 /// Turning rate up to which a base counts as still \[rad/s\]: what a gyroscope tells from its own noise.
-const STILL_RAD_PER_S: f64 = 0.02;
+const STILL_RAD_PER_S: f64 = 0.01;
+/// Time around a movement of the base that does not count either \[s\]: it lands before it rests.
+const SETTLES_S: f64 = 0.1;
 
 impl SimulatedRobot {
     /// For each row of the log, whether the base stood still until the next, as a gyroscope in it would tell; empty on a fixed base.
@@ -75,10 +77,13 @@ impl SimulatedRobot {
             let difference: f64 = before.iter().zip(after).map(|(a, b)| (a - along * b).powi(2)).sum();
             Some(2.0 * difference.sqrt() / period_s)
         };
-        (0_u32..)
+        let moves: Vec<bool> = (0_u32..)
             .map_while(|row| rate(f64::from(row) * period_s))
-            .map(|rate| rate <= STILL_RAD_PER_S)
-            .collect()
+            .map(|rate| rate > STILL_RAD_PER_S)
+            .collect();
+        let reach = (SETTLES_S / period_s).round() as usize;
+        let around = |row: usize| &moves[row.saturating_sub(reach)..(row + reach + 1).min(moves.len())];
+        (0..moves.len()).map(|row| !around(row).contains(&true)).collect()
     }
 }
 

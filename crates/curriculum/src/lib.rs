@@ -9,13 +9,17 @@ mod end;
 mod error;
 mod estimation;
 mod experiment;
+mod growth;
 mod measured;
 mod motion;
 mod record;
 mod relaxation;
+mod rivalry;
 mod robot;
 pub mod selection;
+pub mod standing;
 mod triangle;
+mod whiteness;
 
 pub use candidates::{Candidate, Candidates};
 pub use constraint::{Constraint, Safety, Unconstrained, ZmpConstraint};
@@ -27,10 +31,12 @@ pub use estimation::{
     Estimate, Estimator, Evidence, Instant, LeastSquares, MotionLikelihood, RowsAt, WeightedLeastSquares,
 };
 pub use experiment::{BuildBackend, Experiment, SimulatedRobot, Trial};
+pub use growth::{Found, Growth, TraceResidual};
 pub use measured::Measured;
 pub use motion::{Motion, MotionDataset};
 pub use record::{IterationRecord, Run};
 pub use relaxation::{ConditionRelaxation, Learnt, Maximum, Relaxation, Scale};
+pub use rivalry::Rivalry;
 pub use robot::{KnownEffect, Robot, RobotModel};
 pub use selection::Selection;
 pub use triangle::Triangle;

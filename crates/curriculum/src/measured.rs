@@ -59,6 +59,11 @@ impl Measured {
         self.q.len().checked_div(self.joints).unwrap_or(0)
     }
 
+    /// How long it is \[s\].
+    pub fn duration_s(&self) -> f64 {
+        self.rows().saturating_sub(1) as f64 * self.period_s
+    }
+
     /// Share of the rows in which the base stood still.
     pub fn still_share(&self) -> f64 {
         let still = self.still.iter().filter(|still| **still).count();
@@ -94,8 +99,23 @@ impl Measured {
         Block::unfiltered(self.joints, t, signals, tau)
     }
 
+    /// One row for each period as it was when it began, with the acceleration of the period before: nothing that the noise of a period has done
+    /// to the motion is in its own row. The torques of the rows are `tau`, `[period × joint]` of those that count.
+    pub(crate) fn before_noise(&self, tau: Vec<f64>) -> Block {
+        let count = self.rows().saturating_sub(1) * self.joints;
+        let acceleration = |index: usize| match index.checked_sub(self.joints) {
+            Some(before) => (self.qd[index] - self.qd[before]) / self.period_s,
+            None => 0.0,
+        };
+        let signals =
+            [self.q[..count].to_vec(), self.qd[..count].to_vec(), (0..count).map(acceleration).collect()];
+        let mut block = self.counted(0.0, signals, vec![0.0; count]);
+        block.tau = tau;
+        block
+    }
+
     /// One row for each period: the middle position of Hermite's cubic, and the means of velocity and acceleration.
-    pub(crate) fn over_periods(&self) -> Result<Block, CurriculumError> {
+    pub(crate) fn over_periods(&self) -> Block {
         let rows = self.rows().saturating_sub(1);
         let (count, period) = (rows * self.joints, self.period_s);
         let mut signals = [0; 3].map(|_| Vec::with_capacity(count));
@@ -106,6 +126,6 @@ impl Measured {
             signals[1].push((q1 - q0) / period);
             signals[2].push((v1 - v0) / period);
         }
-        Ok(self.counted(0.5 * period, signals, self.tau[..count].to_vec()))
+        self.counted(0.5 * period, signals, self.tau[..count].to_vec())
     }
 }

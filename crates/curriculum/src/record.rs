@@ -1,7 +1,7 @@
 //! What is written down of an iteration, and of a run: everything that is needed to go on.
 
 use crate::selection::Choice;
-use crate::{EndReason, Evidence, Measured, RobotModel};
+use crate::{EndReason, Evidence, Measured, Rivalry, RobotModel};
 use serde::{Deserialize, Serialize};
 
 /// One iteration.
@@ -30,6 +30,9 @@ pub struct IterationRecord {
     /// RMS over all motions of the dataset of how far the model's torques have moved in this iteration, over their RMS; none where the model
     /// has grown.
     pub torque_change: Option<f64>,
+    /// The two beliefs that the motion was chosen to tell apart, in words; none if it was chosen for what it tells of the parameters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub separates: Option<[String; 2]>,
     /// The belief after this iteration.
     pub model: RobotModel,
     /// Standard deviations of its parameter vector; `null` where the estimator does not know.
@@ -53,6 +56,9 @@ pub struct Run {
     pub evidence: Option<Evidence>,
     /// The logs themselves, where the model may grow: new columns need them.
     pub logs: Vec<Measured>,
+    /// Beliefs that the logs can not tell apart; the next motion is to separate them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rivals: Vec<Rivalry>,
     /// Motions on which the robot fell, and which it is not asked for again.
     pub excluded: Vec<usize>,
     /// The iterations so far.
@@ -71,6 +77,7 @@ impl Run {
             first_alpha: None,
             evidence: None,
             logs: Vec::new(),
+            rivals: Vec::new(),
             excluded: Vec::new(),
             history: Vec::new(),
             ended: None,

@@ -2,7 +2,7 @@
 
 use crate::CurriculumError;
 use phiw_dynamics::{InertialParameters, PARAMETERS_PER_BODY, Tree, check_size};
-use phiw_identification::{Design, EffectCatalogue, EffectSpec};
+use phiw_identification::{Design, EffectCatalogue, EffectSpec, ReferenceModel};
 use phiw_regressor::BaseParameters;
 use phiw_residual::catalogue::Catalogue;
 use rand::{Rng, RngExt};
@@ -59,8 +59,22 @@ impl Robot {
         declared: Vec<EffectSpec>,
         catalogue: Catalogue,
     ) -> Result<Self, CurriculumError> {
-        check_size("coordinates of a robot on a fixed base", tree.configuration_size(), tree.joint_count())?;
         let base = BaseParameters::of_tree(&tree, Default::default())?;
+        Self::with_base(tree, base, base_link, declared, catalogue)
+    }
+
+    /// A robot of which not all motions are possible, with the base parameters that those tell apart which are.
+    ///
+    /// # Errors
+    /// The base floats, or an effect is unknown.
+    pub fn with_base(
+        tree: Tree,
+        base: BaseParameters,
+        base_link: InertialParameters,
+        declared: Vec<EffectSpec>,
+        catalogue: Catalogue,
+    ) -> Result<Self, CurriculumError> {
+        check_size("coordinates of a robot on a fixed base", tree.configuration_size(), tree.joint_count())?;
         let robot = Robot { tree, base, base_link, catalogue, declared };
         robot.design(&robot.declared)?;
         Ok(robot)
@@ -95,6 +109,19 @@ impl Robot {
         let effects: Result<Vec<_>, _> =
             effects.iter().map(|spec| self.catalogue.build(spec, &self.tree)).collect();
         Ok(Design::new(self.tree.clone(), self.base.clone(), effects?))
+    }
+
+    /// The columns of the rigid body and of a belief's effects, with the belief as the reference of effects whose columns need torques.
+    ///
+    /// # Errors
+    /// An effect is unknown, or the belief is of another robot.
+    pub fn design_of(&self, model: &RobotModel) -> Result<Design, CurriculumError> {
+        let known = |effect: &KnownEffect| {
+            Ok((self.catalogue.build(&effect.spec, &self.tree)?, effect.parameters.clone()))
+        };
+        let effects: Result<Vec<_>, CurriculumError> = model.effects.iter().map(known).collect();
+        let reference = ReferenceModel::new(model.tree(self)?).with_effects(effects?);
+        Ok(self.design(&model.specs())?.with_reference(reference))
     }
 
     /// The truth of a simulated robot: the tree's own standard parameters, and one number for each declared effect's parameters.
@@ -163,6 +190,21 @@ impl RobotModel {
         let effects = robot.known_effects(specs, &parameters[count..])?;
         let standard = robot.base.to_standard(&parameters[..count], &self.standard)?;
         Ok(RobotModel { standard, effects })
+    }
+
+    /// The same belief with other effects: those that it has keep their parameters, new ones begin at 0.
+    ///
+    /// # Errors
+    /// An effect is unknown.
+    pub fn with_effects(&self, robot: &Robot, specs: &[EffectSpec]) -> Result<Self, CurriculumError> {
+        let mut effects = Vec::with_capacity(specs.len());
+        for spec in specs {
+            let count = robot.catalogue.build(spec, &robot.tree)?.parameters().len();
+            let known = self.effects.iter().find(|effect| effect.spec == *spec);
+            let parameters = known.map_or_else(|| vec![0.0; count], |effect| effect.parameters.clone());
+            effects.push(KnownEffect { spec: spec.clone(), parameters });
+        }
+        Ok(RobotModel { standard: self.standard.clone(), effects })
     }
 
     /// The paper's bad initial model w¹: every standard parameter and every parameter of an effect uniform between 0 and twice its

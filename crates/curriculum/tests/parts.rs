@@ -135,6 +135,7 @@ fn record(cond: f64, change: f64) -> IterationRecord {
         tracking_error: Vec::new(),
         condition_number: Some(cond),
         torque_change: Some(change),
+        separates: None,
         model,
         standard_deviations: Vec::new(),
     }

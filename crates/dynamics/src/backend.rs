@@ -120,6 +120,14 @@ pub trait DynamicsBackend {
     /// either. Bodies that move are counted; the root link of a fixed base is not, as its inertia is not part of the
     /// robot.
     fn base_wrench(&self) -> [f64; 6];
+
+    /// The part of [`base_wrench`](Self::base_wrench) that the floor gave to one foot of the world in the last [`step`](Self::step), about the
+    /// world's origin as well, as a force plate under that foot would say; `foot` counts [`World::feet`](crate::World::feet). None from a backend
+    /// without contacts, and before a step.
+    fn foot_wrench(&self, foot: usize) -> Option<[f64; 6]> {
+        let _ = foot;
+        None
+    }
 }
 
 /// An error if an element is NaN or infinite.

@@ -26,9 +26,14 @@ pub struct History {
     pub joint_torque: Vec<f64>,
     /// Configuration of a floating base, 7 numbers a row; empty on a fixed base.
     pub base: Vec<f64>,
+    /// Velocity of a floating base in its own frame, linear then angular, 6 numbers a row; empty on a fixed base.
+    pub base_velocity: Vec<f64>,
     /// Wrench at the base at the beginning of the step, 6 numbers a row (see
     /// [`base_wrench`](phiw_dynamics::DynamicsBackend::base_wrench)).
     pub wrench: Vec<f64>,
+    /// The same of each foot (see [`foot_wrench`](phiw_dynamics::DynamicsBackend::foot_wrench)), 6 numbers a foot, one foot after the other in a
+    /// row; empty if the backend does not tell.
+    pub foot_wrenches: Vec<f64>,
 }
 
 impl History {

@@ -186,6 +186,8 @@ impl Motion {
         let before = self.v[first_v..].to_vec();
         backend.step(&self.solver.torque, step_s).map_err(|source| PlantError::Backend { t_s, source })?;
         self.note_step(backend.base_wrench());
+        let feet = (0..world.feet.len()).filter_map(|foot| backend.foot_wrench(foot));
+        self.history.foot_wrenches.extend(feet.flatten());
         backend.state(&mut self.q, &mut self.v).map_err(|source| PlantError::Backend { t_s, source })?;
         self.solver.learn(&before, &self.v[first_v..], step_s);
         for (joint, drive) in drives.iter_mut().enumerate() {
@@ -230,6 +232,7 @@ impl Motion {
         history.drive_speed.extend_from_slice(&self.drive_speed);
         if floating {
             history.base.extend_from_slice(&self.q[..7]);
+            history.base_velocity.extend_from_slice(&self.v[..6]);
         }
     }
 

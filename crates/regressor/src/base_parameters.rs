@@ -71,6 +71,38 @@ impl BaseParameters {
         Self::of_columns(factor.as_mat(), options.tolerance)
     }
 
+    /// The base parameters of a robot that can not move as it likes, from states `[q, v, a]` that it can be in: one whose feet stay on the floor,
+    /// for one. States must be many and all over what is possible, and hold the constraint to many digits.
+    ///
+    /// Bodies in `without` have no parameters, as the links of a chain of virtual joints: their columns are left out.
+    ///
+    /// # Errors
+    /// A state does not fit the robot, or has numbers that are not finite.
+    pub fn of_states<'a>(
+        tree: &Tree,
+        states: impl IntoIterator<Item = [&'a [f64]; 3]>,
+        without: &[usize],
+        options: BaseParametersOptions,
+    ) -> Result<Self, RegressorError> {
+        let regressor = JointTorqueRegressor::new(tree);
+        let columns = regressor.columns();
+        let mut builder = FactorBuilder::new(columns);
+        let mut scratch = regressor.scratch();
+        let mut pairs = vec![0.0; regressor.buffer_size()];
+        let mut phi = vec![0.0; regressor.rows() * columns];
+        for [q, v, a] in states {
+            regressor.compute(tree, q, v, a, &mut scratch, &mut pairs)?;
+            regressor.scatter(&pairs, &mut phi)?;
+            for row in phi.chunks_exact_mut(columns) {
+                for &body in without {
+                    row[body * PARAMETERS_PER_BODY..(body + 1) * PARAMETERS_PER_BODY].fill(0.0);
+                }
+            }
+            builder.push_rows(&phi)?;
+        }
+        Self::of_columns(builder.factor().as_mat(), options.tolerance)
+    }
+
     /// The independent columns of any matrix, and the others in terms of them.
     fn of_columns(matrix: MatRef<'_, f64>, tolerance: f64) -> Result<Self, RegressorError> {
         let standard_size = matrix.ncols();

@@ -1,17 +1,19 @@
 //! The report: one HTML page with everything in it.
 //!
-//! [`IdentificationPage`] is plain data; what is empty or `None` does not appear. All text is escaped. The
+//! [`IdentificationPage`] and [`ExperimentPage`] are plain data; what is empty or `None` does not appear. All text is escaped. The
 //! page loads nothing, reads in light and dark, and prints.
 
 mod conditioning;
 mod effects;
 mod errors;
+mod experiment;
 mod joints;
 mod parameters;
 
 pub use conditioning::Conditioning;
 pub use effects::{CandidateRow, CannotBeTold, EffectParameter, EffectSection, Remaining, Rival};
 pub use errors::{ErrorRow, ErrorTable, PooledError};
+pub use experiment::{ExperimentPage, Section, Table};
 pub use joints::{JointSection, TorqueTrace};
 pub use parameters::{BaseParameter, ParameterRow, Parameters};
 
@@ -92,7 +94,7 @@ impl Picture {
 impl IdentificationPage {
     /// The whole page.
     pub fn render(&self) -> String {
-        let sections: Vec<(&str, &str, Markup)> = [
+        let sections: Vec<(String, &str, Markup)> = [
             ("errors", "Torque error", self.errors.markup(&self.joints)),
             ("effects", "Effects added", effects::markup(&self.effects)),
             ("remaining", "What remains", self.remaining.as_ref().map_or(html! {}, Remaining::markup)),
@@ -105,35 +107,10 @@ impl IdentificationPage {
         ]
         .into_iter()
         .filter(|(_, _, markup)| !markup.0.is_empty())
+        .map(|(id, title, markup)| (id.to_owned(), title, markup))
         .collect();
-        let page = html! {
-            (DOCTYPE)
-            html lang="en" {
-                head {
-                    meta charset="utf-8";
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    meta name="color-scheme" content="light dark";
-                    title { (self.robot) " – identification" }
-                    style { (PreEscaped(plot::palette_css())) (PreEscaped(include_str!("page/style.css"))) }
-                }
-                body {
-                    main {
-                        (self.header())
-                        nav {
-                            @for (id, title, _) in &sections { a href={ "#" (id) } { (title) } }
-                        }
-                        @for (id, title, markup) in &sections {
-                            section id=(id) { h2 { (title) } (markup) }
-                        }
-                        footer {
-                            @if !self.version.is_empty() { p { (self.version) } }
-                            @if !self.command_line.is_empty() { pre { (self.command_line) } }
-                        }
-                    }
-                }
-            }
-        };
-        page.into_string()
+        let title = format!("{} – identification", self.robot);
+        shell(&title, &self.header(), &sections, &self.version, &self.command_line)
     }
 
     fn header(&self) -> Markup {
@@ -163,6 +140,44 @@ impl IdentificationPage {
             }
         }
     }
+}
+
+/// A page around its header and its sections, each with its anchor and title.
+fn shell(
+    title: &str,
+    header: &Markup,
+    sections: &[(String, &str, Markup)],
+    version: &str,
+    command_line: &str,
+) -> String {
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (title) }
+                style { (PreEscaped(plot::palette_css())) (PreEscaped(include_str!("page/style.css"))) }
+            }
+            body {
+                main {
+                    (header)
+                    nav {
+                        @for (id, title, _) in sections { a href={ "#" (id) } { (title) } }
+                    }
+                    @for (id, title, markup) in sections {
+                        section id=(id) { h2 { (title) } (markup) }
+                    }
+                    footer {
+                        @if !version.is_empty() { p { (version) } }
+                        @if !command_line.is_empty() { pre { (command_line) } }
+                    }
+                }
+            }
+        }
+    };
+    page.into_string()
 }
 
 fn badge(verdict: Verdict) -> Markup {

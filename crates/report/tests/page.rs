@@ -136,9 +136,51 @@ fn every_page_is_balanced_escaped_and_self_contained() {
     }
 }
 
+/// The page of an experiment holds to the same.
+fn experiment() -> ExperimentPage {
+    let picture = || {
+        let values = [3.0, 2.0, f64::NAN];
+        let lines = [IterationLine { name: HOSTILE, values: &values }];
+        let plot =
+            Iterations { lines: &lines, x_label: HOSTILE, y_label: HOSTILE, first: 0, logarithmic: true };
+        Picture { caption: HOSTILE.to_owned(), svg: iterations(&plot) }
+    };
+    let word = || HOSTILE.to_owned();
+    let table = Table { head: vec![word(), word()], rows: vec![vec![word(), "1.5 %".to_owned()]] };
+    let section = Section {
+        title: word(),
+        sentences: vec![word()],
+        table,
+        pictures: vec![picture()],
+        small: vec![picture(), picture()],
+        notes: vec![word()],
+    };
+    ExperimentPage {
+        title: word(),
+        date: word(),
+        headline: vec![word(), word()],
+        inputs: vec![[word(), word()]],
+        sections: vec![section.clone(), Section::default(), section],
+        version: word(),
+        command_line: word(),
+    }
+}
+
+#[test]
+fn the_page_of_an_experiment_is_balanced_escaped_and_self_contained() {
+    for page in [experiment(), ExperimentPage::default()] {
+        let html = page.render();
+        check_balanced(&html);
+        check_self_contained(&html);
+    }
+    let html = experiment().render();
+    assert!(html.contains("<td class=\"number\">1.5 %</td>"), "numbers stand at the right");
+    assert!(!ExperimentPage::default().render().contains("<table"), "what is empty does not appear");
+}
+
 #[test]
 fn links_lead_somewhere() {
-    let html = page(1.0, 3, 50).render();
+    let html = page(1.0, 3, 50).render() + &experiment().render();
     let links: Vec<&str> =
         html.split("href=\"#").skip(1).map(|rest| rest.split('"').next().unwrap()).collect();
     assert!(links.contains(&"joint-1") && links.contains(&"effects"));

@@ -53,7 +53,7 @@ fn pictures(x: &[f64], y: &[f64]) -> Vec<(&'static str, Svg)> {
     for logarithmic in [false, true] {
         let input = BoxPlot { groups: &boxes, places: &places, x_label: name, y_label: name, logarithmic };
         all.push(("box plot", box_plot(&input)));
-        let input = Iterations { lines: &lines, x_label: name, y_label: name, logarithmic };
+        let input = Iterations { lines: &lines, x_label: name, y_label: name, first: 1, logarithmic };
         all.push(("iterations", iterations(&input)));
     }
     all

@@ -4,7 +4,7 @@ use crate::MujocoError;
 use crate::base::{self, Motion};
 use crate::error::NAME;
 use crate::inertial::PrincipalInertia;
-use crate::mjcf::mjcf;
+use crate::mjcf::{feet_of_corners, mjcf};
 use crate::simulation::{Simulation, Sizes};
 use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World, check_size};
 use std::cell::RefCell;
@@ -53,6 +53,10 @@ pub struct MujocoBackend {
     /// in it when it is asked for.
     alone: RefCell<Simulation>,
     reaction: Reaction,
+    /// The foot of each shape, and what each foot got in the last step; none before one.
+    feet_of_shapes: Vec<usize>,
+    foot_wrenches: Vec<[f64; 6]>,
+    stepped: bool,
     /// What `Reaction::Needed` is to be computed from, and the start of the present step.
     motion: Motion,
     start: Motion,
@@ -101,6 +105,9 @@ impl MujocoBackend {
                 ..World::default()
             })?),
             reaction: Reaction::Ground([0.0; 6]),
+            feet_of_shapes: feet_of_corners(tree, world),
+            foot_wrenches: vec![[0.0; 6]; world.feet.len()],
+            stepped: false,
             motion: Motion::zero(sizes.positions, sizes.velocities),
             start: Motion::zero(sizes.positions, sizes.velocities),
         };
@@ -169,7 +176,10 @@ impl MujocoBackend {
         applied[first_joint..].copy_from_slice(torque);
         let solved = world.forward();
         start.acceleration.copy_from_slice(world.acceleration());
-        let ground = world.contact_wrench();
+        self.foot_wrenches.fill([0.0; 6]);
+        world.add_contact_wrenches(&self.feet_of_shapes, &mut self.foot_wrenches);
+        let sum = |axis: usize| self.foot_wrenches.iter().map(|wrench| wrench[axis]).sum();
+        let ground = std::array::from_fn(sum);
         if !(solved && world.integrate(self.integrator)) {
             return Err(self.singular());
         }
@@ -179,6 +189,7 @@ impl MujocoBackend {
             return Err(BackendError::Singular);
         }
         self.reaction = if self.floating { Reaction::Ground(ground) } else { Reaction::Needed };
+        self.stepped = true;
         Ok(())
     }
 }
@@ -312,6 +323,10 @@ impl DynamicsBackend for MujocoBackend {
             self.v[..6].copy_from_slice(&own);
         }
         Ok(())
+    }
+
+    fn foot_wrench(&self, foot: usize) -> Option<[f64; 6]> {
+        self.foot_wrenches.get(foot).copied().filter(|_| self.stepped)
     }
 
     fn base_wrench(&self) -> [f64; 6] {

@@ -32,6 +32,7 @@ int main(void) {
   PRINT(mjData, contact)
   PRINT(mjContact, pos)
   PRINT(mjContact, frame)
+  PRINT(mjContact, geom)
   printf("%-10s %-24s %zu\n", "mjContact", "(size)", sizeof(mjContact));
   return 0;
 }

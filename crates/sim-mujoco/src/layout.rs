@@ -45,6 +45,8 @@ pub(crate) mod data {
 pub(crate) mod contact {
     pub const POS: usize = 8;
     pub const FRAME: usize = 32;
+    /// Two numbers of shapes.
+    pub const GEOM: usize = 540;
     /// Of the whole structure.
     pub const SIZE: usize = 584;
 }

@@ -43,6 +43,13 @@ pub(crate) fn mjcf(tree: &Tree, world: &World) -> String {
     text.xml
 }
 
+/// The foot of each sole's corner, in the order in which the text has them: that of the bodies.
+pub(crate) fn feet_of_corners(tree: &Tree, world: &World) -> Vec<usize> {
+    let of_body = |body: usize| world.feet.iter().enumerate().filter(move |(_, foot)| foot.body == body);
+    let feet = (0..tree.bodies().len()).flat_map(of_body);
+    feet.flat_map(|(index, foot)| vec![index; foot.sole.len()]).collect()
+}
+
 struct Mjcf<'a> {
     tree: &'a Tree,
     world: &'a World,

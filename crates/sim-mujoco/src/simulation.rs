@@ -238,9 +238,9 @@ impl Simulation {
         total
     }
 
-    /// The wrench of all contacts of the last [`Self::forward`] on the robot: force and moment about the world's origin.
-    pub fn contact_wrench(&self) -> [f64; 6] {
-        let mut total = [0.0; 6];
+    /// Adds the wrenches of all contacts of the last [`Self::forward`] on the robot to those of its feet: force and moment about the world's
+    /// origin. `feet_of_shapes` says to which foot each shape belongs, the floor (the first shape) left out.
+    pub fn add_contact_wrenches(&self, feet_of_shapes: &[usize], feet: &mut [[f64; 6]]) {
         let data = self.data.as_ptr();
         // SAFETY: fields inside the data; the contacts are an array of `ncon` structures.
         let (count, contacts) = unsafe {
@@ -249,19 +249,22 @@ impl Simulation {
         for index in 0..count {
             let mut force = [0.0; 6];
             // SAFETY: the index is below `ncon`, the result has six elements, and the structure is of this size.
-            let (frame, point) = unsafe {
+            let (frame, point, shapes) = unsafe {
                 (self.functions.mj_contactForce)(self.model.as_ptr(), data, index, force.as_mut_ptr());
                 let this = contacts.add(index as usize * contact::SIZE);
                 (
                     this.add(contact::FRAME).cast::<[[f64; 3]; 3]>().read(),
                     this.add(contact::POS).cast::<[f64; 3]>().read(),
+                    this.add(contact::GEOM).cast::<[i32; 2]>().read(),
                 )
             };
-            // The rows of the frame are its axes; the first points from the floor, a plane and so the first shape, up.
+            // The floor is a plane, and so the first of the two.
+            let sole = usize::try_from(shapes[1] - 1).ok().and_then(|shape| feet_of_shapes.get(shape));
+            let Some(foot) = sole.and_then(|&foot| feet.get_mut(foot)) else { continue };
+            // The rows of the frame are its axes; the first points from the floor up.
             let along = |axis: usize| (0..3).map(|row| frame[row][axis] * force[row]).sum();
-            add_at(&mut total, point, [along(0), along(1), along(2)]);
+            add_at(foot, point, [along(0), along(1), along(2)]);
         }
-        total
     }
 }
 

@@ -1,6 +1,7 @@
 //! The trait over the engine.
 
 use crate::articulation::Articulation;
+use crate::asked_wrench::AskedWrench;
 use crate::floor::Soles;
 use crate::probe::Probe;
 use crate::{NAME, error};
@@ -39,7 +40,10 @@ pub struct RapierBackend {
     articulation: Articulation,
     soles: Soles,
     probe: Probe,
-    base_wrench: [f64; 6],
+    base_wrench: AskedWrench,
+    /// What each foot got in the last step; none before one.
+    foot_wrenches: Vec<[f64; 6]>,
+    stepped: bool,
     scratch: Scratch,
 }
 
@@ -86,7 +90,9 @@ impl RapierBackend {
             articulation,
             soles,
             probe: Probe::new(tree, &world.rotor_inertia)?,
-            base_wrench: [0.0; 6],
+            base_wrench: AskedWrench::new(AnalyticBackend::new(tree.clone())),
+            foot_wrenches: vec![[0.0; 6]; world.feet.len()],
+            stepped: false,
             scratch,
         })
     }
@@ -119,7 +125,9 @@ impl RapierBackend {
         let tree = self.analytic.tree();
         if tree.is_floating() {
             tree.forward_kinematics(q, placements)?;
-            return Ok(self.soles.wrench(&self.articulation, tree.bodies(), placements, dt));
+            let feet = &mut self.foot_wrenches;
+            self.soles.wrenches(&self.articulation, tree.bodies(), placements, dt, feet);
+            return Ok(std::array::from_fn(|axis| feet.iter().map(|wrench| wrench[axis]).sum()));
         }
         for ((a, next), v) in a.iter_mut().zip(next_v).zip(v.iter()) {
             *a = (*next - v) / dt;
@@ -163,10 +171,12 @@ impl DynamicsBackend for RapierBackend {
         a: &[f64],
         force: &mut [f64],
     ) -> Result<(), BackendError> {
-        // Checks the sizes, and finds the wrench.
-        self.analytic.inverse_dynamics(q, v, a, force)?;
+        check_size("the configuration q", q.len(), self.configuration_size())?;
+        check_size("the velocity v", v.len(), self.velocity_size())?;
+        check_size("the acceleration a", a.len(), self.velocity_size())?;
+        check_size("the generalised force", force.len(), self.velocity_size())?;
         self.probe.inverse_dynamics(q, v, a, force)?;
-        self.base_wrench = self.analytic.base_wrench();
+        self.base_wrench.ask(q, v, a);
         Ok(())
     }
 
@@ -208,11 +218,17 @@ impl DynamicsBackend for RapierBackend {
             // The couplings leave a little; it must not add up.
             self.articulation.set_state(next_q, next_v)?;
         }
-        self.base_wrench = self.wrench_of_step(dt)?;
+        let wrench = self.wrench_of_step(dt)?;
+        self.base_wrench.set(wrench);
+        self.stepped = true;
         Ok(())
     }
 
+    fn foot_wrench(&self, foot: usize) -> Option<[f64; 6]> {
+        self.foot_wrenches.get(foot).copied().filter(|_| self.stepped)
+    }
+
     fn base_wrench(&self) -> [f64; 6] {
-        self.base_wrench
+        self.base_wrench.get()
     }
 }

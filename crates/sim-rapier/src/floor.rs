@@ -22,6 +22,7 @@ pub(crate) struct Soles {
 }
 
 struct Corner {
+    foot: usize,
     body: usize,
     collider: ColliderHandle,
 }
@@ -40,7 +41,7 @@ impl Soles {
             .friction(world.floor_friction)
             .collision_groups(between(FLOOR, CORNERS));
         colliders.insert(floor);
-        for foot in &world.feet {
+        for (index, foot) in world.feet.iter().enumerate() {
             let body = &tree.bodies()[foot.body];
             let shift = if foot.body == 0 { center_of_mass(body) } else { Vec3::zero() };
             for &corner in &foot.sole {
@@ -50,25 +51,26 @@ impl Soles {
                     .friction(world.floor_friction)
                     .collision_groups(between(CORNERS, FLOOR));
                 let collider = colliders.insert_with_parent(ball, articulation.bodies[foot.body], bodies);
-                corners.push(Corner { body: foot.body, collider });
+                corners.push(Corner { foot: index, body: foot.body, collider });
             }
         }
         Soles { corners }
     }
 
-    /// Force, then moment about the world's origin, that the contacts gave to the robot on average over the last step of `dt`,
+    /// Force, then moment about the world's origin, that the contacts gave to each foot on average over the last step of `dt`,
     /// which began with the bodies at `placements`.
     ///
     /// The engine gives impulses, added up over its iterations, along the normal and along two tangents that follow from it, and
     /// the lever arms that it used from the body's centre of mass.
-    pub(crate) fn wrench(
+    pub(crate) fn wrenches(
         &self,
         articulation: &Articulation,
         bodies: &[Body],
         placements: &[Placement<f64>],
         dt: f64,
-    ) -> [f64; 6] {
-        let mut wrench = [0.0; 6];
+        wrenches: &mut [[f64; 6]],
+    ) {
+        wrenches.fill([0.0; 6]);
         for corner in &self.corners {
             let center = placements[corner.body].point(center_of_mass(&bodies[corner.body]));
             for pair in articulation.world.narrow_phase.contact_pairs_with(corner.collider) {
@@ -90,6 +92,7 @@ impl Soles {
                         };
                         let point = Vector::from_array(center.0) + arm;
                         let moment = point.cross(force);
+                        let wrench = &mut wrenches[corner.foot];
                         for axis in 0..3 {
                             wrench[axis] += force[axis];
                             wrench[axis + 3] += moment[axis];
@@ -98,6 +101,5 @@ impl Soles {
                 }
             }
         }
-        wrench
     }
 }

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod articulation;
+mod asked_wrench;
 mod backend;
 mod base_frame;
 mod floor;

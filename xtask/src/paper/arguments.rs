@@ -5,6 +5,7 @@ use super::motions::Source;
 use super::shard::Shard;
 use super::subject::SubjectName;
 use crate::plant_experiment::engine::Engine;
+use crate::plant_experiment::secret::SecretKind;
 use std::path::PathBuf;
 
 /// Arguments of `cargo xtask paper`.
@@ -58,12 +59,18 @@ pub struct RunArguments {
     /// A folder of motions of this robot, as `phiw retarget` writes them; what is before the first `_` in a name is its task.
     #[arg(long, value_name = "DIR")]
     pub motions: Option<PathBuf>,
+    /// So many of the embedded motions of each task; all of them without it.
+    #[arg(long, value_name = "COUNT", conflicts_with = "motions")]
+    pub per_task: Option<usize>,
     /// What is compared.
     #[arg(long, value_delimiter = ',', default_value = "curriculum,random,task-a,task-b")]
     pub arm: Vec<Arm>,
     /// How the robot's base is held: bolted down as in the paper, or free to topple.
     #[arg(long, value_delimiter = ',', default_value = "fixed")]
     pub footing: Vec<Footing>,
+    /// Effects that nobody declared, one in the plant of each run; without any, there is none.
+    #[arg(long, value_name = "KIND,…", value_delimiter = ',')]
+    pub secret: Vec<SecretKind>,
     /// How parameters are estimated.
     #[arg(long, default_value = "likelihood")]
     pub estimator: EstimatorName,

@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 pub enum Arm {
     /// The smallest cond under the constraint: (11) and (12).
     Curriculum,
+    /// The same, and after each iteration the residual is traced and what is found enters the model.
+    Closed,
     /// Any motion under the constraint.
     Random,
     /// The smallest cond, whatever the constraint says.
@@ -37,6 +39,7 @@ impl Arm {
     pub fn name(self) -> &'static str {
         match self {
             Arm::Curriculum => "curriculum",
+            Arm::Closed => "closed",
             Arm::Random => "random",
             Arm::Greedy => "greedy",
             Arm::TaskA => "task-a",
@@ -53,7 +56,7 @@ impl Arm {
             Box::new(OfTask { members })
         };
         match self {
-            Arm::Curriculum | Arm::Greedy => Box::new(SmallestCondition),
+            Arm::Curriculum | Arm::Closed | Arm::Greedy => Box::new(SmallestCondition),
             Arm::Random => Box::new(RandomMotion),
             Arm::TaskA => of_task(&tasks[0]),
             Arm::TaskB => of_task(&tasks[1]),
@@ -63,7 +66,7 @@ impl Arm {
     /// What it may choose.
     pub fn constraint(self, zmp: &dyn Constraint) -> &dyn Constraint {
         match self {
-            Arm::Curriculum | Arm::Random => zmp,
+            Arm::Curriculum | Arm::Closed | Arm::Random => zmp,
             Arm::Greedy | Arm::TaskA | Arm::TaskB => &Unconstrained,
         }
     }

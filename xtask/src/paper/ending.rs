@@ -2,7 +2,7 @@
 //!
 //! A criterion only looks back, so what it would have left is the beginning of a run that did not have it.
 
-use super::arm::{Arm, Footing};
+use super::arm::Arm;
 use super::report::{Results, median};
 use super::run_file::RunFile;
 use phiw_curriculum::{Converged, EndCriterion, EndReason};
@@ -15,14 +15,38 @@ pub fn ended_after(run: &RunFile) -> usize {
     (1..=history.len()).find(converged).unwrap_or(history.len())
 }
 
-/// Medians over the curriculum's runs: iterations, RMSE_w then, RMSE_w after all.
-pub fn saved(results: &Results) -> Option<[f64; 3]> {
-    let mut columns = [Vec::new(), Vec::new(), Vec::new()];
-    for run in results.of(Footing::Fixed, Arm::Curriculum) {
+/// What ending by the criterion costs and saves, against the fixed count.
+pub struct Savings {
+    /// Runs.
+    pub runs: usize,
+    /// Runs that would have ended earlier.
+    pub earlier: usize,
+    /// Mean number of iterations that a run would have saved.
+    pub saved: f64,
+    /// Median torque error then, and after all iterations \[N·m\].
+    pub rmse_torque: [f64; 2],
+    /// Median RMSE_w then, and after all iterations.
+    pub rmse_w: [f64; 2],
+}
+
+/// Over the curriculum's runs; none if there are none.
+pub fn savings(results: &Results) -> Option<Savings> {
+    let (mut saved, mut torque, mut w) = (Vec::new(), [Vec::new(), Vec::new()], [Vec::new(), Vec::new()]);
+    for run in results.of(results.home(), Arm::Curriculum) {
         let end = ended_after(run);
-        columns[0].push(end as f64);
-        columns[1].push(run.scores.get(end)?.rmse_w);
-        columns[2].push(run.scores.last()?.rmse_w);
+        let (then, after) = (run.scores.get(end)?, run.scores.last()?);
+        saved.push((run.run.history.len() - end) as f64);
+        for (place, score) in [then, after].into_iter().enumerate() {
+            torque[place].push(score.rmse_torque);
+            w[place].push(score.rmse_w);
+        }
     }
-    if columns[0].is_empty() { None } else { Some(columns.map(|column| median(&column))) }
+    let runs = saved.len();
+    (runs > 0).then(|| Savings {
+        runs,
+        earlier: saved.iter().filter(|saved| **saved > 0.0).count(),
+        saved: saved.iter().sum::<f64>() / runs as f64,
+        rmse_torque: torque.map(|values| median(&values)),
+        rmse_w: w.map(|values| median(&values)),
+    })
 }

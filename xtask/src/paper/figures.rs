@@ -1,12 +1,13 @@
 //! Figures 3 to 8 of the paper, redrawn. Figure 9 is that of `cargo xtask retarget`.
 
-use super::arm::{Arm, Footing};
+use super::arm::Arm;
 use super::page::Page;
 use super::report::{Results, median};
 use super::score::Detail;
+use super::setup::Settings;
 use phiw_report::plot::{
-    BoxGroup, BoxPlot, IterationLine, Iterations, Line, MapRow, MotionMap, SupportMap, box_plot, iterations,
-    motion_map, support_map,
+    BoxGroup, BoxPlot, IterationLine, Iterations, Line, MapRow, MotionMap, SupportMap, Svg, box_plot,
+    iterations, motion_map, support_map,
 };
 
 /// Draws everything that there are runs of.
@@ -15,7 +16,7 @@ pub fn draw(results: &Results, page: &mut Page) {
     let motions = &results.settings.dataset;
     let own: Vec<f64> = motions.iter().map(|motion| motion.condition_number).collect();
     let row = [MapRow { name: "", values: &own, allowed: &[], chosen: None }];
-    let groups = groups(results);
+    let groups = groups(&results.settings);
     let map =
         MotionMap { rows: &row, groups: &groups, y_label: "", value_label: "cond(Φ) of the motion alone" };
     let shortest = motions.iter().map(|motion| motion.duration_s).fold(f64::INFINITY, f64::min);
@@ -26,9 +27,14 @@ pub fn draw(results: &Results, page: &mut Page) {
     );
     if let Some(run) = results.representative() {
         page.heading("Figure 4: a curriculum");
-        choices(&run.details, &groups, page);
+        page.picture(
+            choices(&run.details, &results.settings).as_str(),
+            "Framed: allowed by the constraint. The darker, the smaller cond of all measured rows and the motion's, relative to its row.",
+        );
         page.heading("Figure 5: the ZMP and the reduced support");
-        balance(results, &run.details, page);
+        let pictures: Vec<String> =
+            balance(&run.details, &results.settings).iter().map(Svg::to_string).collect();
+        page.pictures(&pictures, "ZMP of each chosen reference by (8), under the belief of the time.");
     }
     page.heading("Figure 6: error of the parameters");
     parameters(results, page);
@@ -41,9 +47,9 @@ pub fn draw(results: &Results, page: &mut Page) {
 }
 
 /// The tasks, each with its first motion: motions are sorted by name.
-fn groups(results: &Results) -> Vec<(String, usize)> {
+fn groups(settings: &Settings) -> Vec<(String, usize)> {
     let mut groups: Vec<(String, usize)> = Vec::new();
-    for (index, motion) in results.settings.dataset.iter().enumerate() {
+    for (index, motion) in settings.dataset.iter().enumerate() {
         if groups.last().is_none_or(|(task, _)| *task != motion.task) {
             groups.push((motion.task.clone(), index));
         }
@@ -55,7 +61,9 @@ fn iteration_names(count: usize) -> Vec<String> {
     (1..=count).map(|iteration| iteration.to_string()).collect()
 }
 
-fn choices(details: &[Detail], groups: &[(String, usize)], page: &mut Page) {
+/// What each iteration of a run chose from.
+pub fn choices(details: &[Detail], settings: &Settings) -> Svg {
+    let groups = groups(settings);
     let names = iteration_names(details.len());
     let rows: Vec<MapRow<'_>> = details
         .iter()
@@ -67,33 +75,32 @@ fn choices(details: &[Detail], groups: &[(String, usize)], page: &mut Page) {
             chosen: Some(detail.chosen),
         })
         .collect();
-    let map = MotionMap { rows: &rows, groups, y_label: "iteration", value_label: "cond(Φ) of the stack" };
-    page.picture(
-        motion_map(&map).as_str(),
-        "Framed: allowed by the constraint. The darker, the smaller cond of all measured rows and the motion's, relative to its row.",
-    );
+    let map =
+        MotionMap {
+            rows: &rows, groups: &groups, y_label: "iteration", value_label: "cond(Φ) of the stack"
+        };
+    motion_map(&map)
 }
 
-fn balance(results: &Results, details: &[Detail], page: &mut Page) {
+/// ZMP of what each iteration of a run chose, in the support and the reduced support.
+pub fn balance(details: &[Detail], settings: &Settings) -> Vec<Svg> {
     let picture = |(index, detail): (usize, &Detail)| {
         let [x, y] = [0, 1].map(|axis| detail.zmp.iter().map(|zmp| zmp[axis]).collect::<Vec<f64>>());
-        let reduced: Vec<[f64; 2]> = results
-            .settings
-            .support
-            .iter()
-            .map(|corner| corner.map(|value| (1.0 - detail.alpha) * value))
-            .collect();
+        let about = settings.about;
+        let shrunk = |corner: &[f64; 2]| {
+            [0, 1].map(|axis| about[axis] + (1.0 - detail.alpha) * (corner[axis] - about[axis]))
+        };
+        let reduced: Vec<[f64; 2]> = settings.support.iter().map(shrunk).collect();
         let title = format!("{}: α = {:.2}   y [m]", index + 1, detail.alpha);
         let map = SupportMap {
             points: Line { x: &x, y: &y },
-            support: &results.settings.support,
+            support: &settings.support,
             allowed: &reduced,
             title: &title,
         };
-        support_map(&map).to_string()
+        support_map(&map)
     };
-    let pictures: Vec<String> = details.iter().enumerate().map(picture).collect();
-    page.pictures(&pictures, "ZMP of each chosen reference by (8), under the belief of the time.");
+    details.iter().enumerate().map(picture).collect()
 }
 
 fn boxes(page: &mut Page, groups: &[(&str, Vec<Vec<f64>>)], places: &[String], label: &str, caption: &str) {
@@ -113,14 +120,14 @@ fn with_initial(count: usize) -> Vec<String> {
 
 fn parameters(results: &Results, page: &mut Page) {
     let scores = |value: fn(&super::score::Score) -> Option<f64>| {
-        results.scores(Footing::Fixed, Arm::Curriculum, value)
+        results.scores(results.home(), Arm::Curriculum, value)
     };
     let groups = [
         ("curriculum", scores(|score| Some(score.rmse_w))),
         ("same logs, (4)", scores(|score| score.rmse_w_least_squares)),
         ("same logs, weighted", scores(|score| score.rmse_w_weighted)),
     ];
-    let random = results.scores(Footing::Fixed, Arm::Random, |score| Some(score.rmse_w));
+    let random = results.scores(results.home(), Arm::Random, |score| Some(score.rmse_w));
     let groups: Vec<_> = groups.into_iter().chain([("random choice", random)]).collect();
     let last = groups[0].1.last().map_or(f64::NAN, |values| median(values));
     boxes(
@@ -133,7 +140,7 @@ fn parameters(results: &Results, page: &mut Page) {
 }
 
 fn conditions(results: &Results, page: &mut Page) {
-    let cond = |arm| results.records(Footing::Fixed, arm, |record| record.condition_number);
+    let cond = |arm| results.records(results.home(), arm, |record| record.condition_number);
     let groups = [("curriculum", cond(Arm::Curriculum)), ("random", cond(Arm::Random))];
     boxes(
         page,
@@ -145,7 +152,7 @@ fn conditions(results: &Results, page: &mut Page) {
 }
 
 fn torques(results: &Results, page: &mut Page) {
-    let scores = |arm| results.scores(Footing::Fixed, arm, |score| Some(score.rmse_torque));
+    let scores = |arm| results.scores(results.home(), arm, |score| Some(score.rmse_torque));
     let [a, b] = &results.settings.tasks;
     let groups = [
         (a.as_str(), scores(Arm::TaskA)),
@@ -166,9 +173,9 @@ fn relaxation(results: &Results, page: &mut Page) {
     let medians =
         |series: Vec<Vec<f64>>| -> Vec<f64> { series.iter().map(|values| median(values)).collect() };
     let [alpha_curriculum, alpha_random] = [Arm::Curriculum, Arm::Random]
-        .map(|arm| medians(results.records(Footing::Fixed, arm, |record| Some(record.alpha))));
+        .map(|arm| medians(results.records(results.home(), arm, |record| Some(record.alpha))));
     let [share_curriculum, share_random] = [Arm::Curriculum, Arm::Random].map(|arm| {
-        medians(results.records(Footing::Fixed, arm, |record| Some(record.allowed as f64 / motions)))
+        medians(results.records(results.home(), arm, |record| Some(record.allowed as f64 / motions)))
     });
     for (label, curriculum, random) in [
         ("α", &alpha_curriculum, &alpha_random),
@@ -178,7 +185,8 @@ fn relaxation(results: &Results, page: &mut Page) {
             IterationLine { name: "curriculum", values: curriculum },
             IterationLine { name: "random", values: random },
         ];
-        let plot = Iterations { lines: &lines, x_label: "iteration", y_label: label, logarithmic: false };
+        let plot =
+            Iterations { lines: &lines, x_label: "iteration", y_label: label, first: 1, logarithmic: false };
         page.picture(iterations(&plot).as_str(), "Medians over the seeds.");
     }
 }

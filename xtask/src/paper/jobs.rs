@@ -4,8 +4,11 @@ use super::arguments::{Initial, RunArguments};
 use super::arm::{Arm, Footing};
 use super::run_file::RunFile;
 use super::setup::Setup;
+use super::subject::SubjectName;
 use crate::plant_experiment::engine::Engine;
-use phiw_curriculum::{Curriculum, FixedCount, RowsAt, Run, unreliable_model};
+use crate::plant_experiment::secret::SecretKind;
+use phiw_curriculum::{Curriculum, FixedCount, RowsAt, Run, TraceResidual, unreliable_model};
+use phiw_plant::Effect;
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -17,6 +20,8 @@ pub struct Job {
     pub arm: Arm,
     /// How the base is held.
     pub footing: Footing,
+    /// What is in the plant that nobody declared.
+    pub secret: Option<SecretKind>,
     /// The seed.
     pub seed: u64,
     /// Whether it stands for all: more is kept of it.
@@ -37,11 +42,23 @@ pub enum Outcome {
 /// All runs that the arguments ask for, seed by seed, so that an interrupted experiment has some of every arm.
 pub fn all(arguments: &RunArguments) -> Vec<Job> {
     let mut jobs = Vec::new();
+    let secrets: Vec<Option<SecretKind>> = match arguments.secret.as_slice() {
+        [] => vec![None],
+        secrets => secrets.iter().copied().map(Some).collect(),
+    };
+    // A robot with legs stands on them.
+    let footings = match arguments.robot {
+        SubjectName::WholeBody => &[Footing::Standing][..],
+        _ => &arguments.footing,
+    };
     for seed in arguments.first_seed..arguments.first_seed + arguments.seeds {
-        for &footing in &arguments.footing {
-            for &arm in &arguments.arm {
-                let representative = seed == arguments.first_seed && arm == Arm::Curriculum;
-                jobs.push(Job { arm, footing, seed, representative, backend: arguments.backend });
+        for &secret in &secrets {
+            for &footing in footings {
+                for &arm in &arguments.arm {
+                    let representative =
+                        seed == arguments.first_seed && arm == Arm::Curriculum && secret.is_none();
+                    jobs.push(Job { arm, footing, secret, seed, representative, backend: arguments.backend });
+                }
             }
         }
     }
@@ -73,28 +90,35 @@ impl Job {
         left: &AtomicUsize,
         progress: &(dyn Fn(u64) + Sync),
     ) -> anyhow::Result<Outcome> {
-        let path = RunFile::path(out, self.arm, self.footing, self.seed);
+        let path = RunFile::path(out, self);
+        let secret = self.secret.map(|kind| setup.secret(kind, self.seed)).transpose()?;
         let mut file = match RunFile::read(&path)? {
             Some(file) => file,
-            None => self.begin(setup)?,
+            None => self.begin(setup, secret.as_ref())?,
         };
         progress(file.run.history.len() as u64);
         if file.run.ended.is_some() {
             return Ok(Outcome::Done);
         }
-        let experiment =
-            setup.experiment(self.backend, self.footing == Footing::Standing, setup.settings.noise);
+        let standing = self.footing == Footing::Standing;
+        let experiment = setup.trial_ground(self.backend, standing, setup.settings.noise, secret.as_ref());
+        let validation = match &secret {
+            Some(secret) => Some(setup.validation_logs(self.backend, Some(secret))?),
+            None => None,
+        };
         let selection = self.arm.selection(&setup.dataset, &setup.settings.tasks);
         let estimator = setup.estimator();
+        let growth = TraceResidual::default();
         let curriculum = Curriculum {
             robot: &setup.robot,
             dataset: &setup.dataset,
             candidates: &setup.candidates,
-            experiment: &experiment,
+            experiment: experiment.as_ref(),
             selection: selection.as_ref(),
             constraint: self.arm.constraint(&setup.constraint),
             relaxation: &setup.relaxation,
             estimator: estimator.as_ref(),
+            growth: (self.arm == Arm::Closed).then_some(&growth),
             end: &FixedCount(setup.settings.iterations),
             rows_at: RowsAt::Periods,
         };
@@ -106,9 +130,18 @@ impl Job {
                 file.details.extend(setup.detail(&curriculum, &file.run)?);
             }
             curriculum.step(&mut file.run)?;
-            file.scores.push(setup.score(&file.run.model, file.run.evidence.as_ref())?);
+            if file.scores.is_empty() {
+                file.scores.push(setup.score(&file.run.initial, None, validation.as_deref())?);
+            }
+            file.scores.push(setup.score(
+                &file.run.model,
+                file.run.evidence.as_ref(),
+                validation.as_deref(),
+            )?);
             if file.run.ended.is_some() {
                 file.run.evidence = None;
+                file.run.logs.clear();
+                file.run.rivals.clear();
             }
             file.write(&path)?;
             progress(1);
@@ -116,15 +149,20 @@ impl Job {
         Ok(Outcome::Done)
     }
 
-    fn begin(&self, setup: &Setup) -> anyhow::Result<RunFile> {
+    fn begin(&self, setup: &Setup, secret: Option<&Effect>) -> anyhow::Result<RunFile> {
         let initial = match setup.settings.initial {
             Initial::One => unreliable_model(&setup.truth, 0),
             Initial::Each => unreliable_model(&setup.truth, self.seed),
         };
+        let tree = setup.robot.tree();
+        let name = |&joint: &usize| tree.joint_names().nth(joint).unwrap_or_default().to_owned();
+        let joints = secret.map_or_else(Vec::new, |effect| effect.joints(tree));
         Ok(RunFile {
             arm: self.arm,
             footing: self.footing,
-            scores: vec![setup.score(&initial, None)?],
+            secret: self.secret,
+            secret_joints: joints.iter().map(name).collect(),
+            scores: Vec::new(),
             run: Run::new(self.seed, initial),
             details: Vec::new(),
         })

@@ -55,22 +55,25 @@ impl Motions {
             }
         }
         files.sort();
-        let joints: Vec<String> = subject.tree.joint_names().map(str::to_owned).collect();
+        ensure!(files.len() > HELD_OUT, "{} has {} motions, which is too few", folder.display(), files.len());
+        Self::of_files(&files, subject)
+    }
+
+    fn of_files(files: &[PathBuf], subject: &Subject) -> anyhow::Result<Self> {
+        let joints = subject.moved_joints();
         let mut digest = Sha256::new();
         let mut motions = Vec::new();
-        for file in &files {
+        for file in files {
             digest.update(std::fs::read(file)?);
             let recording = Recording::from_csv(file, &joints, TorqueColumns::Absent)?;
-            let name = file.file_stem().unwrap_or_default().to_string_lossy();
-            motions.push(Motion::from_recording(&name, task(&name), &recording)?);
+            let name = name(file);
+            let motion = Motion::from_recording(&name, task(&name), &recording)?;
+            motions.push(match &subject.standing {
+                Some(standing) => standing.with_legs(&motion)?,
+                None => motion,
+            });
         }
         let digest: String = digest.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect();
-        ensure!(
-            motions.len() > HELD_OUT,
-            "{} has {} motions, which is too few",
-            folder.display(),
-            motions.len()
-        );
         Ok(Self::split(motions, digest))
     }
 
@@ -78,12 +81,27 @@ impl Motions {
     ///
     /// # Errors
     /// A recording is not there, or can not be retargeted.
-    pub fn retargeted(source: Source, subject: &Subject, folder: &Path) -> anyhow::Result<Self> {
+    pub fn retargeted(
+        source: Source,
+        per_task: Option<usize>,
+        subject: &Subject,
+        folder: &Path,
+        console: &Console,
+    ) -> anyhow::Result<Self> {
         let temporary = tempfile::tempdir()?;
-        let c3d = match source {
+        let mut c3d = match source {
             Source::Embedded => embedded(SEED, temporary.path())?,
             Source::UeAdl => seated(temporary.path())?,
         };
+        if let Some(most) = per_task {
+            let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+            c3d.retain(|file| {
+                let count = counts.entry(task(&name(file)).to_owned()).or_default();
+                *count += 1;
+                *count <= most
+            });
+        }
+        ensure!(c3d.len() > HELD_OUT, "{} motions are too few", c3d.len());
         println!(
             "retargeting {} motions into {} (those that are there are kept)",
             c3d.len(),
@@ -91,7 +109,7 @@ impl Motions {
         );
         let arguments = RetargetArguments {
             urdf: subject.urdf.clone(),
-            c3d,
+            c3d: c3d.clone(),
             map: None,
             hold: subject.hold.clone(),
             torso_from_reach: source == Source::UeAdl,
@@ -101,11 +119,17 @@ impl Motions {
             out: folder.to_owned(),
             quiet: true,
         };
-        let outcome = phiw::retarget::retarget(&arguments, &Console::silent())?;
+        let outcome = phiw::retarget::retarget(&arguments, console)?;
+        console.finish();
         for failure in &outcome.failures {
             println!("left out: {}", failure.reason);
         }
-        Self::of_folder(folder, subject)
+        // Of these alone: the folder may hold others, of earlier runs.
+        let mut files: Vec<PathBuf> =
+            c3d.iter().map(|file| folder.join(format!("{}.csv", name(file)))).collect();
+        files.retain(|file| file.is_file());
+        files.sort();
+        Self::of_files(&files, subject)
     }
 
     /// One motion of each task is held out, the last, until there are enough; then others, evenly.
@@ -129,6 +153,11 @@ impl Motions {
         }
         Motions { identification, validation, tasks, digest }
     }
+}
+
+/// The name of the motion in a file.
+fn name(file: &Path) -> String {
+    file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// What is before the first `_`; of the seated set's `ADL001DR1` the letter after the subject.

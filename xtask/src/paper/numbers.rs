@@ -6,7 +6,7 @@ use super::report::{Results, median};
 use super::run_file::RunFile;
 
 use Arm::{Curriculum, Greedy, Random, TaskA, TaskB};
-use Footing::{Fixed, Standing};
+use Footing::Standing;
 
 /// Share of a log in which a base stands still that does not rock.
 const STEADY: f64 = 0.95;
@@ -17,12 +17,12 @@ pub fn rows(results: &Results) -> Vec<[String; 4]> {
     let mut row = |what: &str, paper: &str, here: String, why: &str| {
         rows.push([what.to_owned(), paper.to_owned(), here, why.to_owned()]);
     };
-    let last = results.settings.iterations;
+    let (last, home) = (results.settings.iterations, results.home());
     row("D, base parameters with viscous friction", "132", results.settings.parameters.len().to_string(), "");
     let medians = |series: &[Vec<f64>], digits: usize| {
         series.iter().map(|values| format!("{:.digits$}", median(values))).collect::<Vec<_>>().join(", ")
     };
-    let rmse = results.scores(Fixed, Curriculum, |score| Some(score.rmse_w));
+    let rmse = results.scores(home, Curriculum, |score| Some(score.rmse_w));
     row(
         "RMSE_w (17), median: initial, then each iteration",
         "…, 0.243",
@@ -32,7 +32,7 @@ pub fn rows(results: &Results) -> Vec<[String; 4]> {
     for (name, value) in
         [("the same logs, least squares (4)", 0), ("the same logs, weighted least squares", 1)]
     {
-        let series = results.scores(Fixed, Curriculum, |score| match value {
+        let series = results.scores(home, Curriculum, |score| match value {
             0 => score.rmse_w_least_squares,
             _ => score.rmse_w_weighted,
         });
@@ -44,7 +44,7 @@ pub fn rows(results: &Results) -> Vec<[String; 4]> {
         );
     }
     let count = |iteration: usize| {
-        let all = reliability::of_arm(results, Fixed, Curriculum, iteration);
+        let all = reliability::of_arm(results, home, Curriculum, iteration);
         let [well, with_bias] = [reliability::Reliability::well, reliability::Reliability::well_with_bias]
             .map(|test| all.iter().filter(|parameter| test(parameter)).count());
         format!("{well} ({with_bias} with bias counted)")
@@ -56,10 +56,10 @@ pub fn rows(results: &Results) -> Vec<[String; 4]> {
         "how many parameters are small depends on the robot",
     );
     row("well estimated by (18): last iteration", "100", count(last), "");
-    let cond = |arm: Arm| results.records(Fixed, arm, |record| record.condition_number);
+    let cond = |arm: Arm| results.records(home, arm, |record| record.condition_number);
     row("cond(Φ), median by iteration: curriculum", "falls, see figure 7", medians(&cond(Curriculum), 0), "");
     row("cond(Φ), median by iteration: random", "above it", medians(&cond(Random), 0), "");
-    let alpha = results.records(Fixed, Curriculum, |record| Some(record.alpha));
+    let alpha = results.records(home, Curriculum, |record| Some(record.alpha));
     row(
         "α, median by iteration",
         "0.74, …, 0.3",
@@ -67,7 +67,7 @@ pub fn rows(results: &Results) -> Vec<[String; 4]> {
         "α_max by the share of motions; a such that the second α is 0.8 α_max, as cond has another scale here",
     );
     let motions = results.settings.dataset.len() as f64;
-    let share = results.records(Fixed, Curriculum, |record| Some(100.0 * record.allowed as f64 / motions));
+    let share = results.records(home, Curriculum, |record| Some(100.0 * record.allowed as f64 / motions));
     row("motions allowed, median by iteration [%]", "5, …", medians(&share, 0), "");
     for (arm, paper) in [(Curriculum, "lowest, figure 8"), (TaskA, "higher"), (TaskB, "higher")] {
         let name = match arm {
@@ -75,8 +75,8 @@ pub fn rows(results: &Results) -> Vec<[String; 4]> {
             TaskB => format!("only “{}”", results.settings.tasks[1]),
             _ => "curriculum".to_owned(),
         };
-        let series = results.scores(Fixed, arm, |score| Some(score.rmse_torque));
-        if results.has(Fixed, arm) {
+        let series = results.scores(home, arm, |score| Some(score.rmse_torque));
+        if results.has(home, arm) {
             row(
                 &format!(
                     "torque error (19) on held-out motions [N·m], median: initial, each iteration: {name}"
@@ -113,21 +113,37 @@ pub fn rows(results: &Results) -> Vec<[String; 4]> {
             row(&format!("standing freely, {}: RMSE_w, median", arm.name()), "", medians(&rmse, 3), "");
         }
     }
-    if let Some([iterations, then, five]) = super::ending::saved(results) {
+    if let Some(savings) = super::ending::savings(results) {
+        let [then, after] = savings.rmse_torque;
+        let [then_w, after_w] = savings.rmse_w;
         row(
-            "end criterion: iterations, RMSE_w then and after all (medians)",
+            &format!(
+                "end criterion instead of {last} iterations: iterations saved, mean; error with fewer and with all"
+            ),
             "left for the future",
-            format!("{iterations:.0}, {then:.3}, {five:.3}"),
-            "",
+            format!(
+                "{:.2} of {last} ({} of {} runs end earlier); torque error {then:.2} N·m, {after:.2} with all; RMSE_w {then_w:.3}, {after_w:.3} with all",
+                savings.saved, savings.earlier, savings.runs
+            ),
+            "the model's torques settle within 2 % before the parameters do",
         );
     }
     rows
 }
 
-/// The rows as text.
+/// The rows as text, and what closing the loop is worth.
 pub fn plain(results: &Results) -> String {
-    rows(results)
+    let secrets = super::secrets::rows(results);
+    let tables: Vec<String> = secrets
         .iter()
-        .map(|[what, paper, here, _]| format!("{what}\n    paper: {paper}    here: {here}\n"))
-        .collect()
+        .map(|row| {
+            let pairs = super::secrets::HEAD.iter().zip(row).map(|(head, cell)| format!("{head}: {cell}"));
+            pairs.collect::<Vec<_>>().join(", ") + "\n"
+        })
+        .collect();
+    if !results.compared() {
+        return tables.concat();
+    }
+    let line = |[what, paper, here, _]: &[String; 4]| format!("{what}\n    paper: {paper}    here: {here}\n");
+    rows(results).iter().map(line).chain(tables).collect()
 }

@@ -1,7 +1,9 @@
 //! One file for each run: where it is, and how it is written so that it is whole at any moment.
 
 use super::arm::{Arm, Footing};
+use super::jobs::Job;
 use super::score::{Detail, Score};
+use crate::plant_experiment::secret::SecretKind;
 use anyhow::Context;
 use phiw_curriculum::Run;
 use serde::{Deserialize, Serialize};
@@ -14,6 +16,12 @@ pub struct RunFile {
     pub arm: Arm,
     /// How the base was held.
     pub footing: Footing,
+    /// What was in the plant that nobody declared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub secret: Option<SecretKind>,
+    /// The joints that it is on.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub secret_joints: Vec<String>,
     /// All that is needed to go on.
     pub run: Run,
     /// Scores of the initial model, then after each iteration.
@@ -24,8 +32,10 @@ pub struct RunFile {
 
 impl RunFile {
     /// Where a run is in a folder.
-    pub fn path(out: &Path, arm: Arm, footing: Footing, seed: u64) -> PathBuf {
-        out.join("runs").join(format!("{}-{}", footing.name(), arm.name())).join(format!("{seed:06}.json"))
+    pub fn path(out: &Path, job: &Job) -> PathBuf {
+        let secret = job.secret.map_or_else(String::new, |secret| format!("-{}", secret.name()));
+        let folder = format!("{}-{}{secret}", job.footing.name(), job.arm.name());
+        out.join("runs").join(folder).join(format!("{:06}.json", job.seed))
     }
 
     /// The run in a file; none if there is none.

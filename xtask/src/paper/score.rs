@@ -2,7 +2,10 @@
 
 use super::setup::Setup;
 use phiw_curriculum::selection::Question;
-use phiw_curriculum::{Curriculum, Estimator, Evidence, LeastSquares, RobotModel, Run, WeightedLeastSquares};
+use phiw_curriculum::{
+    Curriculum, Estimator, Evidence, LeastSquares, Measured, RobotModel, RowsAt, Run, WeightedLeastSquares,
+};
+use phiw_identification::{TorqueError, torque_error};
 use phiw_zmp::{ZmpModel, ZmpWorkspace, standing_parameters};
 use serde::{Deserialize, Serialize};
 
@@ -36,24 +39,48 @@ pub struct Detail {
     pub zmp: Vec<[f64; 2]>,
 }
 
-/// sqrt(1/D · ‖a − b‖²), equation (17).
+/// sqrt(1/D · ‖a − b‖²), equation (17), over the declared parameters, which come first.
 pub fn rmse_w(estimate: &[f64], truth: &[f64]) -> f64 {
     let sum: f64 = estimate.iter().zip(truth).map(|(estimate, truth)| (estimate - truth).powi(2)).sum();
     (sum / truth.len().max(1) as f64).sqrt()
 }
 
 impl Setup {
-    /// Scores a belief, and what simpler estimators would make of the same logs.
+    /// Error of each torque on logs of held-out motions.
     ///
     /// # Errors
     /// The belief is not of this robot.
-    pub fn score(&self, model: &RobotModel, evidence: Option<&Evidence>) -> anyhow::Result<Score> {
+    pub fn torque_error(&self, model: &RobotModel, logs: &[Measured]) -> anyhow::Result<TorqueError> {
+        let design = self.robot.design_of(model)?;
+        let mut evidence = Evidence::none(&design, RowsAt::Periods)?;
+        for log in logs {
+            evidence.add(&design, log)?;
+        }
+        Ok(torque_error(std::slice::from_ref(evidence.factor()), &model.parameters(&self.robot)?)?)
+    }
+
+    /// Scores a belief, and what simpler estimators would make of the same logs. `validation` are the held-out motions of a plant with a secret.
+    ///
+    /// # Errors
+    /// The belief is not of this robot.
+    pub fn score(
+        &self,
+        model: &RobotModel,
+        evidence: Option<&Evidence>,
+        validation: Option<&[Measured]>,
+    ) -> anyhow::Result<Score> {
         let parameters = model.parameters(&self.robot)?;
         let truth = self.settings.truth();
-        let (factor, samples) = &self.validation;
-        let design = self.robot.design(self.robot.declared())?;
+        let (factor, samples) = match validation {
+            Some(logs) => &self.validation_of(model, logs)?,
+            None => &self.validation,
+        };
+        let declared = model.effects.len() == self.robot.declared().len();
+        let design = self.robot.design_of(model)?;
         let bystander = |estimator: &dyn Estimator| -> anyhow::Result<Option<f64>> {
-            let Some(evidence) = evidence.filter(|evidence| !evidence.is_empty()) else { return Ok(None) };
+            let Some(evidence) = evidence.filter(|evidence| declared && !evidence.is_empty()) else {
+                return Ok(None);
+            };
             let estimate = estimator.estimate(&design, evidence, model, &parameters)?;
             Ok(Some(rmse_w(&estimate.parameters, &truth)))
         };
@@ -72,12 +99,13 @@ impl Setup {
     /// The run is not of this robot.
     pub fn detail(&self, curriculum: &Curriculum<'_>, run: &Run) -> anyhow::Result<Option<Detail>> {
         let Some(plan) = curriculum.plan(run)? else { return Ok(None) };
+        let candidates = curriculum.candidates_of(&run.model)?;
         let measured = match run.evidence.as_ref().filter(|evidence| !evidence.is_empty()) {
-            Some(evidence) => Some(self.candidates.measured(evidence.factor())?),
+            Some(evidence) => Some(candidates.measured(evidence.factor())?),
             None => None,
         };
         let question =
-            Question { candidates: &self.candidates, allowed: &plan.allowed, measured: measured.as_ref() };
+            Question { candidates: &candidates, allowed: &plan.allowed, measured: measured.as_ref() };
         let condition_numbers =
             (0..self.dataset.len()).map(|motion| question.stack(motion).condition_number()).collect();
         let motion = &self.dataset.motions()[plan.choice.motion];

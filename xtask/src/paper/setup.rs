@@ -4,18 +4,21 @@ use super::arguments::{EstimatorName, Initial, RunArguments};
 use super::motions::{Motions, Source};
 use super::run_file;
 use super::subject::{Subject, SubjectName};
+use super::whole_body::Standing;
+use crate::plant_experiment::case;
 use crate::plant_experiment::engine::Engine;
+use crate::plant_experiment::secret::SecretKind;
 use anyhow::{Context, ensure};
+use phiw::console::Console;
 use phiw_curriculum::{
-    Candidates, ConditionRelaxation, Estimator, Evidence, Experiment, FeedForward, LeastSquares,
-    MotionDataset, MotionLikelihood, Robot, RobotModel, RowsAt, SimulatedRobot, WeightedLeastSquares,
+    Candidates, ConditionRelaxation, Estimator, Evidence, Experiment, FeedForward, LeastSquares, Measured,
+    Motion, MotionDataset, MotionLikelihood, Robot, RobotModel, RowsAt, SimulatedRobot, WeightedLeastSquares,
     ZmpConstraint,
 };
-use phiw_dynamics::{PARAMETERS_PER_BODY, World};
+use phiw_dynamics::{PARAMETERS_PER_BODY, Workspace, World};
 use phiw_identification::{parameter_name, standard_unit};
-use phiw_plant::Timing;
+use phiw_plant::{Effect, Timing};
 use phiw_regressor::factor::Factor;
-use phiw_regressor::least_squares::GroupedFactor;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -40,6 +43,8 @@ pub struct Setup {
     pub constraint: ZmpConstraint,
     /// Equation (20).
     pub relaxation: ConditionRelaxation,
+    /// Motions to validate on.
+    pub held_out: Vec<Motion>,
     /// R of [Φ f] of the validation motions, and their number of samples T.
     pub validation: (Factor, f64),
 }
@@ -73,6 +78,9 @@ pub struct Settings {
     pub parameters: Vec<ParameterFacts>,
     /// Corners of the support \[m\].
     pub support: Vec<[f64; 2]>,
+    /// The point that the support shrinks to \[m\].
+    #[serde(default)]
+    pub about: [f64; 2],
 }
 
 /// A motion.
@@ -103,30 +111,46 @@ pub struct ParameterFacts {
 const FILE: &str = "setup.json";
 /// The stream of the validation, apart from all runs'.
 const VALIDATION_SEED: u64 = u64::MAX;
+/// The stream of the secrets of a seed.
+const SECRET_STREAM: u64 = 1;
+/// What stands for rounding where there is no noise, over the torque limit.
+const SILENT: f64 = 1e-3;
 
 impl Setup {
-    /// Reads robot and motions, retargets what is not there, and measures the validation motions.
+    /// Reads robot and motions, retargets what is not there, and measures the validation motions. `console` shows how far that is.
     ///
     /// # Errors
     /// Something is not there or does not read.
-    pub fn new(arguments: &RunArguments, out: &Path) -> anyhow::Result<Self> {
+    pub fn new(arguments: &RunArguments, out: &Path, console: &Console) -> anyhow::Result<Self> {
         let timing = timing(arguments.backend);
         let subject = Subject::read(arguments.robot, timing.control_period_s)?;
-        arguments.backend.check(&subject.tree)?;
+        match subject.standing {
+            Some(_) => ensure!(
+                arguments.secret.is_empty(),
+                "effects that nobody declared are not for a robot on its feet"
+            ),
+            None => arguments.backend.check(&subject.tree)?,
+        }
         let robot = subject.robot()?;
         let truth = subject.truth(&robot)?;
         let motions = match &arguments.motions {
             Some(folder) => Motions::of_folder(folder, &subject)?,
-            None => Motions::retargeted(arguments.dataset, &subject, &out.join("motions"))?,
+            None => {
+                let (source, folder) = (arguments.dataset, out.join("motions"));
+                Motions::retargeted(source, arguments.per_task, &subject, &folder, console)?
+            }
         };
         let dataset = MotionDataset::new(subject.tree.joint_count(), motions.identification)?;
-        let weights = vec![1.0; subject.tree.joint_count()];
+        let weights = subject.row_weights(if arguments.noise > 0.0 { arguments.noise } else { SILENT });
         let candidates = Candidates::new(&robot, robot.declared(), &dataset, &weights)?;
         let settings = Settings {
             backend: format!("{:?}", arguments.backend).to_lowercase(),
             robot: arguments.robot,
             motions: match (&arguments.motions, arguments.dataset) {
                 (Some(_), _) => "of a folder".to_owned(),
+                (None, Source::Embedded) if subject.standing.is_some() => {
+                    "embedded (synthetic), on synthetic legs that sway, squat and twist with both feet on the floor".to_owned()
+                }
                 (None, Source::Embedded) => "embedded (synthetic)".to_owned(),
                 (None, Source::UeAdl) => "ue_adl (measured on people)".to_owned(),
             },
@@ -150,11 +174,13 @@ impl Setup {
             initial: arguments.initial,
             parameters: parameter_facts(&robot, &truth)?,
             support: subject.stance.support().corners().to_vec(),
+            about: subject.stance.about(),
         };
         let mut setup = Setup {
             constraint: ZmpConstraint::new(subject.stance.clone()),
             relaxation: ConditionRelaxation::default(),
             validation: (Factor::empty(0), 0.0),
+            held_out: motions.validation,
             settings,
             subject,
             robot,
@@ -162,8 +188,25 @@ impl Setup {
             dataset,
             candidates,
         };
-        setup.validation = setup.validate(arguments.backend, &motions.validation)?;
+        let logs = setup.validation_logs(arguments.backend, None)?;
+        setup.validation = setup.validation_of(&setup.truth, &logs)?;
         Ok(setup)
+    }
+
+    /// Where motions are tried: the robot in an engine with noise, and with what is in it that nobody declared. One with legs always stands.
+    pub fn trial_ground(
+        &self,
+        backend: Engine,
+        standing: bool,
+        noise: f64,
+        secret: Option<&Effect>,
+    ) -> Box<dyn Experiment> {
+        let mut experiment = self.experiment(backend, standing, noise);
+        experiment.effects.extend(secret.cloned());
+        match &self.subject.standing {
+            Some(legs) => Box::new(self.subject.on_feet(legs, backend, noise, experiment.effects)),
+            None => Box::new(experiment),
+        }
     }
 
     /// The robot in an engine, bolted down or standing, with noise.
@@ -190,35 +233,71 @@ impl Setup {
             EstimatorName::LeastSquares => Box::new(LeastSquares),
             EstimatorName::Weighted => Box::new(WeightedLeastSquares),
             EstimatorName::Likelihood => {
-                // Without noise there is no likelihood: a thousandth of the limit stands for rounding.
-                let share = if self.settings.noise > 0.0 { self.settings.noise } else { 1e-3 };
-                Box::new(MotionLikelihood::new(self.subject.torque_noise(share)))
+                // Without noise there is no likelihood.
+                let share = if self.settings.noise > 0.0 { self.settings.noise } else { SILENT };
+                let likelihood = MotionLikelihood::new(self.subject.torque_noise(share));
+                let standing_on = self.subject.standing.as_ref().map(Standing::foot_bodies);
+                Box::new(likelihood.standing_on(standing_on.unwrap_or_default()))
             }
         }
     }
 
     /// The held-out motions, run with the true model and without noise (section 5.1, equation 19): what is left of the error is the model's.
-    fn validate(
-        &self,
-        backend: Engine,
-        motions: &[phiw_curriculum::Motion],
-    ) -> anyhow::Result<(Factor, f64)> {
-        let experiment = self.experiment(backend, false, 0.0);
-        let measure = |(index, motion): (usize, &phiw_curriculum::Motion)| -> anyhow::Result<GroupedFactor> {
-            let design = self.robot.design(self.robot.declared())?;
-            let mut evidence = Evidence::none(&design, RowsAt::Periods)?;
+    ///
+    /// # Errors
+    /// The robot can not be run.
+    pub fn validation_logs(&self, backend: Engine, secret: Option<&Effect>) -> anyhow::Result<Vec<Measured>> {
+        let experiment = self.trial_ground(backend, false, 0.0, secret);
+        let measure = |(index, motion): (usize, &Motion)| -> anyhow::Result<Measured> {
             let mut random = ChaCha8Rng::seed_from_u64(VALIDATION_SEED);
             random.set_stream(index as u64);
-            let trial = experiment.perform(&self.robot, &self.truth, motion, &mut random)?;
-            evidence.add(&design, &trial.measured)?;
-            Ok(evidence.factor().clone())
+            Ok(experiment.perform(&self.robot, &self.truth, motion, &mut random)?.measured)
         };
-        let factors: anyhow::Result<Vec<GroupedFactor>> =
-            motions.par_iter().enumerate().map(measure).collect();
-        let all = phiw_identification::merge(&factors?)?;
-        let groups = all.groups();
+        self.held_out.par_iter().enumerate().map(measure).collect()
+    }
+
+    /// R of [Φ f] of logs under a belief's columns, and their number of samples T.
+    ///
+    /// # Errors
+    /// The belief is not of this robot.
+    pub fn validation_of(&self, model: &RobotModel, logs: &[Measured]) -> anyhow::Result<(Factor, f64)> {
+        let design = self.robot.design_of(model)?;
+        let mut evidence = Evidence::none(&design, RowsAt::Periods)?;
+        for log in logs {
+            evidence.add(&design, log)?;
+        }
+        let groups = evidence.factor().groups();
         let samples = groups.first().map_or(0, |group| group.factor.rows()) as f64;
-        Ok((all.combine(&vec![1.0; groups.len()])?, samples))
+        Ok((evidence.factor().combine(&self.subject.judged_rows())?, samples))
+    }
+
+    /// The effect that a seed hides in its plant.
+    ///
+    /// # Errors
+    /// None that a robot that was read can cause.
+    pub fn secret(&self, kind: SecretKind, seed: u64) -> anyhow::Result<Effect> {
+        let tree = &self.subject.tree;
+        let joints = tree.joint_count();
+        let world = World { rotor_inertia: vec![0.0; joints], ..World::default() };
+        let robot = case::Robot { urdf: "", tree: tree.clone(), world, sign_width: 0.01 };
+        let mut workspace = Workspace::new(tree);
+        let mut samples = Vec::new();
+        for motion in self.dataset.motions().iter().step_by(7) {
+            for index in (0..motion.samples()).step_by(10) {
+                let [q, v, a] = motion.sample(index).map(<[f64]>::to_vec);
+                let mut torque = vec![0.0; joints];
+                tree.inverse_dynamics(&q, &v, &a, &mut workspace, &mut torque)?;
+                torque
+                    .iter_mut()
+                    .zip(&v)
+                    .zip(&self.subject.viscous)
+                    .for_each(|((torque, v), viscous)| *torque += viscous * v);
+                samples.push(case::Sample { t_s: index as f64 * motion.period_s(), q, v, a, torque });
+            }
+        }
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(SECRET_STREAM);
+        Ok(kind.draw(&robot, &samples, &mut random))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The robot under test: what is true of it, and what is declared.
 
+use super::whole_body::{self, Standing};
 use crate::environment;
 use anyhow::Context;
 use phiw_curriculum::{Robot, RobotModel};
@@ -10,7 +11,7 @@ use phiw_zmp::{Stance, SupportPolygon};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Robots of 18 joints and 132 base parameters.
+/// Robots of 18 joints and 132 base parameters, and one with legs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum SubjectName {
@@ -19,14 +20,16 @@ pub enum SubjectName {
     /// The Torobo of the shared data, as in the paper. Its file knows neither the weight of its base nor what it stands on: 25 kg on a square of
     /// 0.4 m are taken.
     Torobo,
+    /// models/humanoid30.urdf on its own feet, with a base that floats.
+    WholeBody,
 }
 
 /// Joints of the 20-joint Torobo that the paper's robot has not.
 const HELD: [&str; 2] = ["torso/joint_3", "head/joint_1"];
 /// Viscous friction: share of the torque limit that it takes at the speed limit. A real drive has some percent.
-const VISCOUS_SHARE: f64 = 0.02;
+pub const VISCOUS_SHARE: f64 = 0.02;
 /// The fastest that a joint is taken to be [rad/s]; the Torobo's file has placeholders.
-const FASTEST: f64 = 4.0;
+pub const FASTEST: f64 = 4.0;
 /// Position gain over the torque limit [1/rad]: half of all it has for a radian. Small for a robot, whose own weight pulls a third of that.
 const STIFFNESS: f64 = 0.5;
 /// What commands that are held for a period T leave room for: K_p at most these multiples of inertia/T² and friction/T.
@@ -55,6 +58,8 @@ pub struct Subject {
     pub viscous: Vec<f64>,
     /// K_p and K_d.
     pub gains: Gains,
+    /// Its legs on the floor, for a robot with legs. `tree` then has virtual joints for the base; `viscous` and `gains` are of the motors.
+    pub standing: Option<Standing>,
 }
 
 impl Subject {
@@ -65,6 +70,7 @@ impl Subject {
     pub fn read(name: SubjectName, control_period_s: f64) -> anyhow::Result<Self> {
         let root = environment::workspace_root()?;
         let (urdf, hold) = match name {
+            SubjectName::WholeBody => return whole_body::subject(),
             SubjectName::UpperBody18 => (root.join("models/upper_body18.urdf"), Vec::new()),
             SubjectName::Torobo => (
                 root.join("../shared/data/robots/torobo20/torobo20.urdf"),
@@ -82,7 +88,7 @@ impl Subject {
                 let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
                 feet_from_toml(&text, &floating)?
             }
-            SubjectName::Torobo => {
+            _ => {
                 let [mass, half, height] = BASE;
                 let moment = mass * (half * half / 3.0 + height * height);
                 let base =
@@ -104,20 +110,9 @@ impl Subject {
         let viscous: Vec<f64> = (0..joints)
             .map(|joint| VISCOUS_SHARE * limits(joint).effort / limits(joint).velocity.min(FASTEST))
             .collect();
-        let inertia = apparent_inertia(&tree, &[], &tree.neutral_configuration())?;
-        let position: Vec<f64> = (0..joints)
-            .map(|joint| {
-                let most = HELD_INERTIA * inertia[joint] / control_period_s.powi(2)
-                    + HELD_FRICTION * viscous[joint] / control_period_s;
-                (STIFFNESS * limits(joint).effort).min(most)
-            })
-            .collect();
-        // Critically damped, what friction damps counted.
-        let damping =
-            |joint: usize| (2.0 * (position[joint] * inertia[joint]).sqrt() - viscous[joint]).max(0.0);
-        let gains = Gains { velocity: (0..joints).map(damping).collect(), position };
+        let gains = arm_gains(&tree, &viscous, control_period_s)?;
         let base_link = floating.bodies()[0].inertial;
-        Ok(Subject { urdf, hold, tree, floating, feet, stance, base_link, viscous, gains })
+        Ok(Subject { urdf, hold, tree, floating, feet, stance, base_link, viscous, gains, standing: None })
     }
 
     /// What is declared.
@@ -125,7 +120,10 @@ impl Subject {
     /// # Errors
     /// None that a robot that was read can cause.
     pub fn robot(&self) -> anyhow::Result<Robot> {
-        Ok(Robot::with_viscous_friction(self.tree.clone(), self.base_link)?)
+        match &self.standing {
+            Some(standing) => standing.robot(),
+            None => Ok(Robot::with_viscous_friction(self.tree.clone(), self.base_link)?),
+        }
     }
 
     /// What is true.
@@ -150,8 +148,57 @@ impl Subject {
         World { feet: self.feet.clone(), ..World::default() }
     }
 
-    /// Standard deviation of the torques' noise \[N·m\], as a share of the limits.
+    /// Standard deviation of the torques' noise \[N·m\], as a share of the limits; of virtual joints that of the sensors under the feet.
     pub fn torque_noise(&self, share: f64) -> Vec<f64> {
-        (0..self.tree.joint_count()).map(|joint| share * self.tree.joint(joint).limits.effort).collect()
+        let base = self.standing.as_ref().map(Standing::base_noise);
+        let noise = |joint: usize| match base.as_ref().and_then(|base| base.get(joint)) {
+            Some(&noise) => noise,
+            None => share * self.tree.joint(joint).limits.effort,
+        };
+        (0..self.tree.joint_count()).map(noise).collect()
     }
+
+    /// What the rows of each torque are multiplied with before motions are compared: 1 as in the paper. On feet the rows of the base are of other
+    /// units and a hundred times sharper, so there each is counted in its own noise.
+    pub fn row_weights(&self, share: f64) -> Vec<f64> {
+        match self.standing {
+            Some(_) => self.torque_noise(share).iter().map(|noise| 1.0 / noise).collect(),
+            None => vec![1.0; self.tree.joint_count()],
+        }
+    }
+
+    /// The rows whose error is the torque error (19): motors, not virtual joints.
+    pub fn judged_rows(&self) -> Vec<f64> {
+        let motors = self.viscous.len();
+        (0..self.tree.joint_count())
+            .map(|joint| f64::from(u8::from(joint + motors >= self.tree.joint_count())))
+            .collect()
+    }
+
+    /// The joints that motions of people move.
+    pub fn moved_joints(&self) -> Vec<String> {
+        match &self.standing {
+            Some(standing) => standing.upper_joints(),
+            None => self.tree.joint_names().map(str::to_owned).collect(),
+        }
+    }
+}
+
+/// Small gains, critically damped, that stay stable when commands are held for `control_period_s`.
+///
+/// # Errors
+/// A list does not fit the robot.
+pub fn arm_gains(tree: &Tree, viscous: &[f64], control_period_s: f64) -> anyhow::Result<Gains> {
+    let joints = tree.joint_count();
+    let inertia = apparent_inertia(tree, &[], &tree.neutral_configuration())?;
+    let position: Vec<f64> = (0..joints)
+        .map(|joint| {
+            let most = HELD_INERTIA * inertia[joint] / control_period_s.powi(2)
+                + HELD_FRICTION * viscous[joint] / control_period_s;
+            (STIFFNESS * tree.joint(joint).limits.effort).min(most)
+        })
+        .collect();
+    // Critically damped, what friction damps counted.
+    let damping = |joint: usize| (2.0 * (position[joint] * inertia[joint]).sqrt() - viscous[joint]).max(0.0);
+    Ok(Gains { velocity: (0..joints).map(damping).collect(), position })
 }

@@ -3,7 +3,8 @@
 use super::ending::ended_after;
 use super::report::Results;
 use super::run_file::replace;
-use super::{numbers, reliability};
+use super::{numbers, reliability, secrets};
+use crate::plant_experiment::secret::SecretKind;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
@@ -27,7 +28,7 @@ pub fn write(results: &Results, out: &Path) -> anyhow::Result<()> {
 /// One row for each run and iteration; iteration 0 is the initial model.
 fn iterations(results: &Results) -> String {
     let mut text = String::from(
-        "footing,arm,seed,iteration,motion,alpha,allowed,forced,margin_m,predicted_cond,cond,torque_change,fell_at_s,still_share,tracking_rms_rad,rmse_w,\
+        "footing,arm,secret,found,seed,iteration,motion,alpha,allowed,forced,margin_m,predicted_cond,cond,torque_change,fell_at_s,still_share,tracking_rms_rad,rmse_w,\
          rmse_w_least_squares,rmse_w_weighted,rmse_torque_nm,would_have_ended\n",
     );
     for run in &results.runs {
@@ -35,7 +36,10 @@ fn iterations(results: &Results) -> String {
         for (iteration, score) in run.scores.iter().enumerate() {
             let record = iteration.checked_sub(1).and_then(|index| run.run.history.get(index));
             // Writing to a string does not fail.
-            let _ = write!(text, "{},{},{},{iteration},", run.footing.name(), run.arm.name(), run.run.seed);
+            let secret = run.secret.map_or_else(String::new, SecretKind::name);
+            let found = secrets::names(run).join(" ");
+            let (footing, arm, seed) = (run.footing.name(), run.arm.name(), run.run.seed);
+            let _ = write!(text, "{footing},{arm},{secret},{found},{seed},{iteration},");
             match record {
                 None => text.push_str(",,,,,,,,,,,"),
                 Some(record) => {
@@ -78,7 +82,8 @@ fn parameters(results: &Results) -> String {
     let mut text = String::from(
         "footing,arm,iteration,parameter,unit,true,mean,error_std,error_rms,relative_std_percent,well_estimated,well_with_bias\n",
     );
-    let arms: BTreeSet<_> = results.runs.iter().map(|run| (run.footing, run.arm)).collect();
+    let plain = results.runs.iter().filter(|run| run.secret.is_none());
+    let arms: BTreeSet<_> = plain.map(|run| (run.footing, run.arm)).collect();
     for (footing, arm) in arms {
         for iteration in 0..=results.settings.iterations {
             let all = reliability::of_arm(results, footing, arm, iteration);

@@ -6,11 +6,11 @@ use phiw_dynamics::{Placement, Vec3};
 use phiw_plant::{Coupling, Effect, Friction, Mechanism, Presliding};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// A kind of secret, named as in `report.json`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "snake_case")]
 #[value(rename_all = "snake_case")]
 #[allow(missing_docs, reason = "the names are those of the fixed formats")]

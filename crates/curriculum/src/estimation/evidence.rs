@@ -90,7 +90,7 @@ impl Evidence {
     pub fn add(&mut self, design: &Design, measured: &Measured) -> Result<(), CurriculumError> {
         let block = match self.rows_at {
             RowsAt::Stamps => measured.at_stamps()?,
-            RowsAt::Periods => measured.over_periods()?,
+            RowsAt::Periods => measured.over_periods(),
         };
         self.instants.extend(instants(&block, measured.period_s));
         self.factor = self.factor.merge(&grouped_factor(design, block)?)?;

@@ -34,6 +34,10 @@ use phiw_regressor::least_squares::GroupedFactor;
 pub struct MotionLikelihood {
     /// σ: standard deviation of each torque's noise \[N·m, N\].
     pub torque_noise: Vec<f64>,
+    /// Bodies that do not move, such as the feet of a robot that stands: the noise moves it only as they allow, and the log-determinant is that of
+    /// J over the directions that are left, Nᵀ·J·N. (What the floor gives is measured and on the right-hand side; its share of |∂δ/∂(q̈, f)| does not
+    /// depend on w.)
+    pub standing_on: Vec<usize>,
     /// Newton steps at most.
     pub most_steps: usize,
     /// The last step's length in standard deviations of the parameters (all together) at which the minimum counts as found.
@@ -43,7 +47,12 @@ pub struct MotionLikelihood {
 impl MotionLikelihood {
     /// For torques with this noise \[N·m, N\].
     pub fn new(torque_noise: Vec<f64>) -> Self {
-        MotionLikelihood { torque_noise, most_steps: 40, settled: 0.05 }
+        MotionLikelihood { torque_noise, standing_on: Vec::new(), most_steps: 40, settled: 0.05 }
+    }
+
+    /// The same for a robot on which these bodies do not move.
+    pub fn standing_on(self, bodies: Vec<usize>) -> Self {
+        MotionLikelihood { standing_on: bodies, ..self }
     }
 }
 
@@ -72,8 +81,11 @@ impl Estimator for MotionLikelihood {
             });
         }
         let precision: Vec<f64> = self.torque_noise.iter().map(|noise| noise.powi(-2)).collect();
-        let sensitivities: Result<Vec<Sensitivity>, CurriculumError> =
-            evidence.instants().iter().map(|instant| Sensitivity::of(design, instant)).collect();
+        let sensitivities: Result<Vec<Sensitivity>, CurriculumError> = evidence
+            .instants()
+            .iter()
+            .map(|instant| Sensitivity::of(design, instant, &self.standing_on))
+            .collect();
         let problem = Problem::new(evidence.factor(), sensitivities?, precision);
         let mut w = column(present_parameters);
         if problem.log_determinants(&w).is_none() {
@@ -109,6 +121,26 @@ impl Estimator for MotionLikelihood {
         };
         Ok(Estimate { parameters: (0..w.nrows()).map(|k| w[(k, 0)]).collect(), standard_deviations })
     }
+
+    fn misfit(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        parameters: &[f64],
+    ) -> Result<Option<f64>, CurriculumError> {
+        check_size(
+            "standard deviations of the torques' noise",
+            self.torque_noise.len(),
+            design.rows().len(),
+        )?;
+        let precision: Vec<f64> = self.torque_noise.iter().map(|noise| noise.powi(-2)).collect();
+        let sensitivities: Result<Vec<Sensitivity>, CurriculumError> = evidence
+            .instants()
+            .iter()
+            .map(|instant| Sensitivity::of(design, instant, &self.standing_on))
+            .collect();
+        Ok(Some(Problem::new(evidence.factor(), sensitivities?, precision).cost(&column(parameters))))
+    }
 }
 
 fn column(values: &[f64]) -> Mat<f64> {
@@ -121,6 +153,8 @@ struct Problem<'a> {
     /// RᵀR of each torque over all parameters: for steps only, so half the digits are enough.
     grams: Vec<Mat<f64>>,
     sensitivities: Vec<Sensitivity>,
+    /// Directions in which the noise moves the robot.
+    directions: usize,
     /// 1/σ² of each torque.
     precision: Vec<f64>,
 }
@@ -132,7 +166,14 @@ impl<'a> Problem<'a> {
             let r = group.factor.as_mat().get(..size, ..size);
             r.transpose() * r
         };
-        Problem { grams: factor.groups().iter().map(gram).collect(), factor, sensitivities, precision }
+        let directions = sensitivities.first().map_or(0, |sensitivity| sensitivity.directions);
+        Problem {
+            grams: factor.groups().iter().map(gram).collect(),
+            factor,
+            sensitivities,
+            directions,
+            precision,
+        }
     }
 
     /// R_j·w − z_j of a torque.
@@ -150,14 +191,14 @@ impl<'a> Problem<'a> {
         for sensitivity in &self.sensitivities {
             let lower = self.cholesky(sensitivity, w)?;
             sum += sensitivity.weight
-                * (0..self.precision.len()).map(|row| 2.0 * lower[place(row, row)].ln()).sum::<f64>();
+                * (0..self.directions).map(|row| 2.0 * lower[place(row, row)].ln()).sum::<f64>();
         }
         Some(sum)
     }
 
     fn cholesky(&self, sensitivity: &Sensitivity, w: &Mat<f64>) -> Option<Vec<f64>> {
         let j = &sensitivity.packed * w;
-        cholesky(self.precision.len(), j.col_as_slice(0))
+        cholesky(self.directions, j.col_as_slice(0))
     }
 
     fn cost(&self, w: &Mat<f64>) -> f64 {
@@ -182,7 +223,7 @@ impl<'a> Problem<'a> {
         for sensitivity in &self.sensitivities {
             let lower = self.cholesky(sensitivity, w).unwrap_or_default();
             if !lower.is_empty() {
-                let inverse = packed_inverse(self.precision.len(), &lower);
+                let inverse = packed_inverse(self.directions, &lower);
                 gradient -= sensitivity.packed.transpose() * inverse * faer::Scale(sensitivity.weight);
             }
             factors.push(lower);
@@ -202,7 +243,7 @@ impl<'a> Problem<'a> {
         for (sensitivity, lower) in chosen().filter(|(_, lower)| !lower.is_empty()) {
             let mut reduced = sensitivity.packed.clone();
             for parameter in 0..parameters {
-                reduce(self.precision.len(), lower, reduced.col_as_slice_mut(parameter));
+                reduce(self.directions, lower, reduced.col_as_slice_mut(parameter));
             }
             let weight = sensitivity.weight * all / part;
             faer::linalg::matmul::matmul(

@@ -40,4 +40,18 @@ pub trait Estimator: Send + Sync {
         present: &RobotModel,
         present_parameters: &[f64],
     ) -> Result<Estimate, CurriculumError>;
+
+    /// −log L of parameters, but for a constant that is the same for all models of the same logs; none from an estimator that knows no
+    /// likelihood. The smaller, the better the model: effects that were found are confirmed by it.
+    ///
+    /// # Errors
+    /// The evidence is not of this design.
+    fn misfit(
+        &self,
+        _design: &Design,
+        _evidence: &Evidence,
+        _parameters: &[f64],
+    ) -> Result<Option<f64>, CurriculumError> {
+        Ok(None)
+    }
 }

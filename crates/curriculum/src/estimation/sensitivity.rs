@@ -2,19 +2,25 @@
 
 use super::Instant;
 use crate::CurriculumError;
+use crate::standing::free_directions;
 use faer::Mat;
 use phiw_identification::Design;
 use phiw_telemetry::Block;
 
-/// Step of the speed for a central difference \[rad/s, m/s\].
-const SPEED_STEP: f64 = 1e-3;
+/// Change of speed for a central difference \[rad/s, m/s\]. Any is exact for Coriolis' terms, which are quadratic, and for viscous friction. Of a friction that
+/// turns with the sign it takes the mean slope over speeds that noise reaches within a period: an instant stands for the rows around it.
+const SPEED_STEP: f64 = 0.1;
 
 /// The matrices J_k of an instant: J = Σ w_k·J_k = ∂τ/∂q̈ + ½T·∂τ/∂q̇ is what a change of the mean acceleration over a period asks of the
 /// torque, its share in the mean velocity counted. Only the symmetric part is kept: what Coriolis' term adds beside it is a
 /// thousandth.
+///
+/// Where bodies stand still, J is that of the directions N that are left: Nᵀ·J·N.
 pub(super) struct Sensitivity {
     /// Rows that it stands for.
     pub weight: f64,
+    /// Number n of directions: all joints, or those that the standing bodies leave.
+    pub directions: usize,
     /// `packed(n)` × parameters: the lower triangle of each J_k, elements beside the diagonal times √2, so that products of columns are
     /// traces of products.
     pub packed: Mat<f64>,
@@ -31,15 +37,22 @@ pub(super) fn place(row: usize, column: usize) -> usize {
 }
 
 impl Sensitivity {
-    /// By evaluating the design's columns around the instant: exact in the acceleration, in which they are linear.
-    pub fn of(design: &Design, instant: &Instant) -> Result<Self, CurriculumError> {
-        let n = instant.state[0].len();
-        let block = around(n, instant);
+    /// By evaluating the design's columns around the instant: exact in the acceleration, in which they are linear. `standing` bodies do not move.
+    pub fn of(design: &Design, instant: &Instant, standing: &[usize]) -> Result<Self, CurriculumError> {
+        let directions = match standing {
+            [] => Mat::identity(instant.state[0].len(), instant.state[0].len()),
+            bodies => free_directions(design.tree(), bodies, &instant.state[0])?,
+        };
+        let (joints, n) = (directions.nrows(), directions.ncols());
+        let states = around(&directions, instant);
         let mut scratch = design.scratch();
-        scratch.begin(&block)?;
-        let mut rows = vec![vec![0.0; design.evaluation_width()]; block.len()];
-        for (sample, row) in rows.iter_mut().enumerate() {
-            scratch.evaluate(&block, sample, row)?;
+        let mut rows = vec![vec![0.0; design.evaluation_width()]; states.len()];
+        for (state, row) in states.into_iter().zip(&mut rows) {
+            // Each by itself: they do not follow each other in time.
+            let mut block = Block::unfiltered(joints, vec![0.0], state, Vec::new());
+            design.correct(&mut block);
+            scratch.begin(&block)?;
+            scratch.evaluate(&block, 0, row)?;
         }
         let mut packed_columns = Mat::zeros(packed(n), design.parameter_count());
         let half_period = 0.5 * instant.period_s;
@@ -51,28 +64,33 @@ impl Sensitivity {
                     let by_velocity =
                         (rows[1 + n + moved][at] - rows[1 + 2 * n + moved][at]) / (2.0 * SPEED_STEP);
                     let value = by_acceleration + half_period * by_velocity;
-                    // Half of J + Jᵀ; √2 for what stands for two elements.
-                    let scale = if torque == moved { 1.0 } else { 0.5 * std::f64::consts::SQRT_2 };
-                    packed_columns[(place(torque.max(moved), torque.min(moved)), parameter)] += scale * value;
+                    for along in (0..n).filter(|&along| directions[(torque, along)] != 0.0) {
+                        // Half of J + Jᵀ; √2 for what stands for two elements.
+                        let scale = if along == moved { 1.0 } else { 0.5 * std::f64::consts::SQRT_2 };
+                        packed_columns[(place(along.max(moved), along.min(moved)), parameter)] +=
+                            scale * directions[(torque, along)] * value;
+                    }
                 }
             }
         }
-        Ok(Sensitivity { weight: instant.weight, packed: packed_columns })
+        Ok(Sensitivity { weight: instant.weight, directions: n, packed: packed_columns })
     }
 }
 
-/// The instant, then each acceleration one up, then each velocity a step up, then each a step down.
-fn around(n: usize, instant: &Instant) -> Block {
-    let [q, v, a] = &instant.state;
-    let samples = 1 + 3 * n;
-    let mut signals = [q, v, a].map(|signal| signal.repeat(samples));
-    for moved in 0..n {
-        signals[2][(1 + moved) * n + moved] += 1.0;
-        signals[1][(1 + n + moved) * n + moved] += SPEED_STEP;
-        signals[1][(1 + 2 * n + moved) * n + moved] -= SPEED_STEP;
-    }
-    let t = (0..samples).map(|sample| sample as f64 * instant.period_s).collect();
-    Block::unfiltered(n, t, signals, Vec::new())
+/// The instant, then the acceleration one up along each direction, then the velocity a step up, then a step down.
+fn around(directions: &Mat<f64>, instant: &Instant) -> Vec<[Vec<f64>; 3]> {
+    let with = |signal: usize, direction: usize, change: f64| {
+        let mut state = instant.state.clone();
+        let along = directions.col_as_slice(direction);
+        state[signal].iter_mut().zip(along).for_each(|(value, share)| *value += change * share);
+        state
+    };
+    let moved = [(2, 1.0), (1, SPEED_STEP), (1, -SPEED_STEP)];
+    let changed = moved.iter().flat_map(|&(signal, change)| {
+        (0..directions.ncols()).map(move |direction| (signal, direction, change))
+    });
+    let changed = changed.map(|(signal, direction, change)| with(signal, direction, change));
+    std::iter::once(instant.state.clone()).chain(changed).collect()
 }
 
 /// Cholesky's factor of a symmetric matrix in a packed column, elements beside the diagonal times √2: lower, row by row. None if it is not

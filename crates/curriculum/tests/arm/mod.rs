@@ -98,6 +98,7 @@ impl Arm {
             constraint: &Unconstrained,
             relaxation: &RELAXATION,
             estimator,
+            growth: None,
             end,
             rows_at: RowsAt::Periods,
         }

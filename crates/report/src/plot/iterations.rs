@@ -12,7 +12,7 @@ use super::panel::{Legend, Mark, dots, line, panel, stroke};
 pub struct IterationLine<'a> {
     /// The variant's name for the legend.
     pub name: &'a str,
-    /// Its value at iteration 1, 2, …; NaN where there is none.
+    /// Its values, one for each iteration; NaN where there is none.
     pub values: &'a [f64],
 }
 
@@ -25,6 +25,8 @@ pub struct Iterations<'a> {
     pub x_label: &'a str,
     /// The quantity, with its unit.
     pub y_label: &'a str,
+    /// Number of the first: 1, or 0 where it is what was before.
+    pub first: usize,
     /// Whether the ordinate is logarithmic; values that are not positive are then left out.
     pub logarithmic: bool,
 }
@@ -41,7 +43,7 @@ pub fn iterations(input: &Iterations<'_>) -> Svg {
     } else {
         Axis::linear(input.y_label, values, true, 6)
     };
-    let names: Vec<String> = (1..=count).map(|iteration| iteration.to_string()).collect();
+    let names: Vec<String> = (0..count).map(|iteration| (input.first + iteration).to_string()).collect();
     let x = Axis::categories(input.x_label, &names, 20);
     let legend: Vec<_> = input
         .lines

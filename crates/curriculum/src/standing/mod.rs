@@ -1,0 +1,12 @@
+//! A robot on its feet: its base is six more joints that nothing drives, and what the floor gives to its feet is measured.
+
+mod controller;
+mod experiment;
+mod feet;
+mod virtual_base;
+
+pub use controller::StandingFeedForward;
+pub use experiment::{StandingRobot, WrenchNoise};
+pub(crate) use feet::free_directions;
+pub use feet::{Feet, StandingFoot};
+pub use virtual_base::{VIRTUAL_JOINTS, base_coordinates, with_virtual_base};

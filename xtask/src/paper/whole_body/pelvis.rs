@@ -1,0 +1,122 @@
+//! Motion of a pelvis over feet that stay: synthetic, from a name.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use sha2::{Digest, Sha256};
+use std::f64::consts::TAU;
+
+/// How far it goes along and about each axis: forwards, sideways, down \[m\]; yaw, pitch, roll \[rad\].
+const REACH: [f64; 6] = [0.035, 0.04, 0.10, 0.25, 0.12, 0.08];
+/// The liveliest does all of it, the calmest this share.
+const CALMEST: f64 = 0.25;
+/// Sines of each axis, and their highest frequency \[Hz\].
+const SINES: usize = 4;
+const HIGHEST_HZ: f64 = 1.0;
+/// Time in which it fades in and out \[s\].
+const FADE_S: f64 = 1.5;
+/// The axis that only goes down: above the stance the knees would be straight.
+const DOWN: usize = 2;
+
+/// Sums of sines that begin and end at rest in the stance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PelvisMotion {
+    duration_s: f64,
+    /// Amplitude, angular frequency \[rad/s\] and phase \[rad\] of each sine of each axis.
+    terms: [[[f64; 3]; SINES]; 6],
+    /// What is added to the sines of each axis.
+    shift: [f64; 6],
+}
+
+impl PelvisMotion {
+    /// The motion that goes with a name: always the same.
+    pub fn of_name(name: &str, duration_s: f64) -> Self {
+        let digest = Sha256::digest(name.as_bytes());
+        let mut random = ChaCha8Rng::from_seed(digest.into());
+        let vigour = random.random_range(CALMEST..1.0);
+        let mut motion = PelvisMotion { duration_s, terms: [[[0.0; 3]; SINES]; 6], shift: [0.0; 6] };
+        for (axis, terms) in motion.terms.iter_mut().enumerate() {
+            for (number, term) in terms.iter_mut().enumerate() {
+                let share = (number as f64 + random.random_range(0.6..1.4)) / SINES as f64;
+                let amplitude = random.random_range(0.4..1.0) / (number as f64 + 1.0);
+                *term = [amplitude, TAU * HIGHEST_HZ * share, random.random_range(0.0..TAU)];
+            }
+            // No sum is larger than that of its amplitudes.
+            let largest: f64 = terms.iter().map(|term| term[0]).sum();
+            let reach = if axis == DOWN { 0.5 * REACH[axis] } else { REACH[axis] };
+            terms.iter_mut().for_each(|term| term[0] *= vigour * reach / largest);
+            motion.shift[axis] = if axis == DOWN { -vigour * reach } else { 0.0 };
+        }
+        motion
+    }
+
+    /// The same, larger or smaller.
+    pub fn times(mut self, share: f64) -> Self {
+        self.terms.iter_mut().flatten().for_each(|term| term[0] *= share);
+        self.shift.iter_mut().for_each(|shift| *shift *= share);
+        self
+    }
+
+    /// Place, velocity and acceleration against the stance along all axes.
+    pub fn at(&self, t_s: f64) -> [[f64; 6]; 3] {
+        let [w, dw, ddw] = window(t_s, self.duration_s);
+        let mut moved = [[0.0; 6]; 3];
+        for (axis, terms) in self.terms.iter().enumerate() {
+            let [mut s, mut ds, mut dds] = [self.shift[axis], 0.0, 0.0];
+            for [amplitude, frequency, phase] in terms {
+                let (sine, cosine) = (frequency * t_s + phase).sin_cos();
+                s += amplitude * sine;
+                ds += amplitude * frequency * cosine;
+                dds -= amplitude * frequency * frequency * sine;
+            }
+            moved[0][axis] = w * s;
+            moved[1][axis] = dw * s + w * ds;
+            moved[2][axis] = ddw * s + 2.0 * dw * ds + w * dds;
+        }
+        moved
+    }
+}
+
+/// Rises from 0 to 1 and falls at the end, with two derivatives.
+fn window(t_s: f64, duration_s: f64) -> [f64; 3] {
+    let fade = FADE_S.min(0.5 * duration_s);
+    let rise = |t: f64| {
+        let x = (t / fade).clamp(0.0, 1.0);
+        let value = x.powi(4) * (35.0 + x * (-84.0 + x * (70.0 - 20.0 * x)));
+        let slope = 140.0 * (x * (1.0 - x)).powi(3);
+        let curvature = 420.0 * (x * (1.0 - x)).powi(2) * (1.0 - 2.0 * x);
+        [value, slope / fade, curvature / (fade * fade)]
+    };
+    if t_s <= 0.5 * duration_s {
+        rise(t_s)
+    } else {
+        let [w, dw, ddw] = rise(duration_s - t_s);
+        [w, -dw, ddw]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn derivatives_are_derivatives_and_it_begins_and_ends_at_rest() {
+        let motion = PelvisMotion::of_name("stir_01", 4.0);
+        assert_eq!(motion, PelvisMotion::of_name("stir_01", 4.0));
+        assert_ne!(motion, PelvisMotion::of_name("stir_02", 4.0));
+        for end in [0.0, 4.0] {
+            assert!(motion.at(end).iter().flatten().all(|value| value.abs() < 1e-9));
+        }
+        let step = 1e-5;
+        for t in [0.3, 1.4, 2.0, 3.1] {
+            let [before, now, after] = [-step, 0.0, step].map(|shift| motion.at(t + shift));
+            for axis in 0..6 {
+                for order in 0..2 {
+                    let slope = (after[order][axis] - before[order][axis]) / (2.0 * step);
+                    assert!((slope - now[order + 1][axis]).abs() < 1e-6, "{axis} at {t} s");
+                }
+                assert!(now[0][axis].abs() <= REACH[axis]);
+            }
+            assert!(now[0][DOWN] <= 0.0);
+        }
+    }
+}
