@@ -26,6 +26,9 @@ pub struct TraceOptions {
     /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which it is structure: the noise of a robot's sensors is of one
     /// colour, and raises all residuals over their floors alike.
     pub structured_ratio: f64,
+    /// RMS residual over the RMS of its torque from which it is structure: of the declared model, and of one to which effects were added, where only what follows
+    /// the joint's motion counts below the first. Filters and encoders leave as much of a right model.
+    pub structured_share: [f64; 2],
     /// Torques whose residual is to be explained: what acts on none of them is no candidate. `None`: all.
     pub torques: Option<Vec<usize>>,
     /// Effects (kind and joints) that are no candidates, because they are known not to be there.
@@ -43,6 +46,7 @@ impl Default for TraceOptions {
             floor_margin: 1.15,
             structured_correlation: [0.3, 0.2],
             structured_ratio: 8.0,
+            structured_share: [0.01, 0.004],
             torques: None,
             excluded: Vec::new(),
         }

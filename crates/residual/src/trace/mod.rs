@@ -14,6 +14,7 @@ mod residuals;
 mod revision;
 mod screening;
 mod search;
+mod signal_shapes;
 mod stability;
 mod stage;
 mod tracing;

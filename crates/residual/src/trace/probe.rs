@@ -1,11 +1,15 @@
-//! What a residual follows, without a name: smooth functions of each signal, fitted on the training folds, judged on those held out.
+//! What a residual follows, without a name: shapes over each signal, fitted on some folds, judged on the others.
 
 use super::candidate::{Candidate, Candidates};
-use super::evidence::Refit;
-use super::stage::Fixed;
-use crate::catalogue::{Constants, OwnTorque, ParameterKind, SignalRanges, smooth_sign};
-use phiw_identification::{Effect, EffectSpec, IdentificationError, ReferenceModel, Sample};
-use std::f64::consts::PI;
+use super::evidence::paired_t;
+use super::signal_shapes::{Shape, other_shapes, own_shapes};
+use super::stage::{Fixed, Stage};
+use crate::catalogue::SignalRanges;
+use phiw_identification::{EffectSpec, IdentificationError};
+use phiw_regressor::RegressorError;
+use phiw_regressor::factor::{Factor, FactorBuilder};
+use phiw_regressor::least_squares::GroupedFactor;
+use rayon::prelude::*;
 
 /// A residual that follows a signal.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,171 +18,182 @@ pub struct Dependence {
     pub joint: String,
     /// The signal, as in `report.json`: `q`, `qd`, `qdd`, `tau`, `t`, or another joint's `q.<joint>`, `qd.<joint>`.
     pub signal: String,
-    /// Share of the held-out residual variance that smooth functions of the signal predict.
+    /// Share of the residual variance that shapes over the signal predict on folds that they were not fitted on.
     pub share: f64,
 }
 
-/// A share below this is not worth a word.
-const LEAST_SHARE: f64 = 0.03;
+/// A residual follows a signal that foretells this share of its variance on other folds, this many standard deviations (over the folds) from nothing. Shapes over
+/// noise foretell less than nothing: they were fitted on other noise.
+const LEAST_SHARE: f64 = 0.05;
+const LEAST_SIGNIFICANCE: f64 = 2.2;
+/// Parts that take turns in being left out.
+const PARTS: usize = 5;
+/// A shape's height is drawn to nothing as if this share of all rows had said so: where few rows are, it does not swing out.
+const DRAWN: f64 = 0.01;
+/// The same for the model's parameters: enough for those that the rows do not determine.
+const DRAWN_MODEL: f64 = 1e-6;
+
+/// A fitted model whose residual is looked at.
+#[derive(Clone, Copy)]
+pub(super) struct Fit<'a> {
+    pub fixed: &'a Fixed<'a>,
+    pub specs: &'a [EffectSpec],
+    pub parameters: &'a [f64],
+    pub ranges: &'a SignalRanges,
+}
 
 /// Which signals the residuals of the torques `rows` follow, strongest first.
-pub(super) fn probe(
-    fixed: &Fixed<'_>,
-    specs: &[EffectSpec],
-    reference: ReferenceModel,
-    parameters: &[f64],
-    ranges: &SignalRanges,
+pub(super) fn probe(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<Dependence>, IdentificationError> {
+    let shapes = |row| {
+        let mut shapes = own_shapes(fit.fixed, row, fit.ranges);
+        shapes.extend(other_shapes(fit.fixed, row, fit.ranges));
+        shapes
+    };
+    let joint = |row: usize| fit.fixed.tree.joint(row).joint.clone();
+    let of_probe =
+        |probe: Probe| Dependence { joint: joint(probe.row), signal: probe.signal, share: probe.share };
+    let mut found: Vec<Dependence> = probes(fit, rows, shapes)?.into_iter().map(of_probe).collect();
+    found.sort_by(|a, b| b.share.total_cmp(&a.share));
+    Ok(found)
+}
+
+/// Those of the torques `rows` whose residual follows the joint's own motion. Noise that does not know the motion foretells nothing, whatever its colour.
+pub(super) fn following(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<usize>, IdentificationError> {
+    let probes = probes(fit, rows, |row| own_shapes(fit.fixed, row, fit.ranges))?;
+    let mut rows: Vec<usize> = probes.iter().map(|probe| probe.row).collect();
+    rows.dedup();
+    Ok(rows)
+}
+
+/// Shapes over one signal that foretell a residual.
+struct Probe {
+    row: usize,
+    signal: String,
+    share: f64,
+}
+
+/// The shapes that foretell something, torque by torque.
+fn probes(
+    fit: Fit<'_>,
     rows: &[usize],
-) -> Result<Vec<Dependence>, IdentificationError> {
+    shapes: impl Fn(usize) -> Vec<Shape>,
+) -> Result<Vec<Probe>, IdentificationError> {
     if rows.is_empty() {
         return Ok(Vec::new());
     }
     let mut candidates = Candidates::none();
-    let mut meaning = Vec::new();
+    let mut signals = Vec::new();
     for &row in rows {
-        for (signal, effect) in probes(fixed, row, ranges) {
+        for (signal, effect) in shapes(row) {
             let first = candidates.effects.len();
             candidates.list.push(Candidate {
-                specs: vec![EffectSpec::new("probe", &[])],
+                specs: vec![EffectSpec::new("shape", &[])],
                 rank: 0,
                 effects: first..first + 1,
                 constants: 0,
             });
             candidates.effects.push(effect);
-            meaning.push((row, signal));
+            signals.push((row, signal));
         }
     }
-    let stage = fixed.pass(specs, candidates, reference)?;
-    let (train, held_out) = (&stage.train, &stage.held_out);
-    let mut full = parameters.to_vec();
-    full.resize(train.parameter_count(), 0.0);
-    let before = held_out.residual_sums_of_squares(&full)?;
-    let mut found = Vec::new();
-    for (candidate, (row, signal)) in meaning.into_iter().enumerate() {
-        let added = stage.parameters(candidate);
-        let Some(refit) = fit_residual(train, &full, &added, row)? else { continue };
-        let after = held_out.residual_sums_of_squares(&refit.parameters)?[row];
-        let share = 1.0 - after / before[row].max(f64::MIN_POSITIVE);
-        if share >= LEAST_SHARE {
-            let joint = fixed.tree.joint(row).joint.clone();
-            found.push(Dependence { joint, signal, share });
+    let Fit { fixed, specs, parameters, .. } = fit;
+    let stage = fixed.pass(specs, candidates, fixed.reference(specs, parameters)?)?;
+    // A held model's parameters do not give way.
+    let free = if fixed.prior.is_some() { 0 } else { stage.model_size() };
+    let mut parameters = parameters.to_vec();
+    parameters.resize(stage.train.parameter_count(), 0.0);
+    let of_row = |&row: &usize| {
+        let own = signals.iter().enumerate().filter(|(_, (of, _))| *of == row);
+        let own: Vec<(usize, &String)> = own.map(|(candidate, (_, signal))| (candidate, signal)).collect();
+        let residual = Residual::new(&stage, &parameters, free, row);
+        let alone = residual.left_over(&[])?;
+        let mut found = Vec::new();
+        for (candidate, signal) in own {
+            let after = residual.left_over(&stage.parameters(candidate))?;
+            let share = 1.0 - after.iter().sum::<f64>() / alone.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+            let logarithms = |squares: &[f64]| -> Vec<f64> {
+                squares.iter().map(|square| square.max(f64::MIN_POSITIVE).ln()).collect()
+            };
+            let t = paired_t(&logarithms(&alone), &logarithms(&after));
+            if share >= LEAST_SHARE && t >= LEAST_SIGNIFICANCE {
+                found.push(Probe { row, signal: signal.clone(), share });
+            }
         }
-    }
-    found.sort_by(|a, b| b.share.total_cmp(&a.share));
-    Ok(found)
-}
-
-/// Least squares of one torque's residual on the added columns alone.
-fn fit_residual(
-    factors: &phiw_regressor::least_squares::GroupedFactor,
-    parameters: &[f64],
-    added: &[usize],
-    row: usize,
-) -> Result<Option<Refit>, IdentificationError> {
-    let group = &factors.groups()[row];
-    let columns: Vec<usize> = group
-        .parameters
-        .iter()
-        .enumerate()
-        .filter(|(_, p)| added.contains(p))
-        .map(|(column, _)| column)
-        .collect();
-    let right = group.factor.parameters();
-    // [added columns, f − Φw] as linear combinations of the group's columns.
-    let map = faer::Mat::from_fn(right + 1, columns.len() + 1, |column, target| {
-        if target < columns.len() {
-            f64::from(u8::from(columns[target] == column))
-        } else if column == right {
-            1.0
-        } else {
-            -parameters[group.parameters[column]]
-        }
-    });
-    let reduced = group.factor.combine(map.as_ref())?;
-    let Ok(solution) = reduced.solve() else { return Ok(None) };
-    let mut fitted = parameters.to_vec();
-    columns
-        .iter()
-        .zip(&solution.parameters)
-        .for_each(|(&column, value)| fitted[group.parameters[column]] += value);
-    Ok(Some(Refit { parameters: fitted, train: Vec::new(), held_out: Vec::new() }))
-}
-
-/// Writes the columns of one sample.
-type ProbeColumns = Box<dyn Fn(&Sample<'_>, &mut [f64]) + Send + Sync>;
-
-/// Smooth functions of each signal, for one torque.
-fn probes(fixed: &Fixed<'_>, row: usize, ranges: &SignalRanges) -> Vec<(String, Box<dyn Effect>)> {
-    let tree = fixed.tree;
-    let mut probes: Vec<(String, Box<dyn Effect>)> = Vec::new();
-    let mut add = |signal: String, count: usize, formula: ProbeColumns| {
-        let parameters = vec![("coefficient", ParameterKind::Torque, f64::NEG_INFINITY); count];
-        let columns = move |sample: &Sample<'_>, out: &mut [f64]| formula(sample, out);
-        let effect = OwnTorque::new("probe", tree, row, &Constants::new(), &parameters, columns);
-        let needs = phiw_identification::Needs { torque: signal == "tau", ..Default::default() };
-        probes.push((signal, Box::new(effect.needing(needs))));
+        Ok(found)
     };
-    let joints = ranges.joints.len();
-    for other in 0..joints {
-        let own = other == row;
-        let name = |signal: &str| {
-            if own { signal.to_owned() } else { format!("{signal}.{}", tree.joint(other).joint) }
-        };
-        let (lower, upper) = ranges.joints[other].position;
-        let scale = PI / (upper - lower).max(1e-9);
-        let waves = if own { 4 } else { 2 };
-        add(
-            name("q"),
-            2 * waves,
-            Box::new(move |sample, out| {
-                let angle = scale * (sample.q()[other] - lower);
-                for wave in 0..waves {
-                    (out[2 * wave], out[2 * wave + 1]) = ((wave + 1) as f64 * angle).sin_cos();
-                }
-            }),
-        );
-        let speed = ranges.joints[other].velocity_rms.max(1e-9);
-        add(
-            name("qd"),
-            5,
-            Box::new(move |sample, out| {
-                let velocity = sample.qd()[other] / speed;
-                let bend = velocity.clamp(-4.0, 4.0);
-                out.copy_from_slice(&[
-                    velocity,
-                    bend * bend.abs(),
-                    smooth_sign(velocity, 0.05),
-                    smooth_sign(velocity, 0.05) * (-velocity.abs() / 0.2).exp(),
-                    velocity.abs(),
-                ]);
-            }),
-        );
+    let found: Result<Vec<Vec<Probe>>, RegressorError> = rows.par_iter().map(of_row).collect();
+    Ok(found?.into_iter().flatten().collect())
+}
+
+/// What a model leaves of one torque, fold by fold.
+struct Residual<'a> {
+    folds: Vec<&'a GroupedFactor>,
+    parameters: &'a [f64],
+    row: usize,
+    /// The model's parameters from the first up to this one may give way to a shape.
+    free: usize,
+}
+
+impl<'a> Residual<'a> {
+    fn new(stage: &'a Stage, parameters: &'a [f64], free: usize, row: usize) -> Self {
+        Residual { folds: stage.folds.iter().collect(), parameters, row, free }
     }
-    add(
-        "qdd".to_owned(),
-        2,
-        Box::new(move |sample, out| {
-            let acceleration = sample.qdd()[row];
-            out.copy_from_slice(&[acceleration, acceleration.abs()]);
-        }),
-    );
-    let own_speed = 0.05 * ranges.joints[row].velocity_rms.max(1e-9);
-    add(
-        "tau".to_owned(),
-        2,
-        Box::new(move |sample, out| {
-            let torque = sample.reference_torque().get(row).copied().unwrap_or_default();
-            out.copy_from_slice(&[torque, torque.abs() * smooth_sign(sample.qd()[row], own_speed)]);
-        }),
-    );
-    let (start, end) = ranges.session;
-    add(
-        "t".to_owned(),
-        3,
-        Box::new(move |sample, out| {
-            let x = (sample.time() - start) / (end - start).max(1e-9);
-            out.copy_from_slice(&[1.0, x, x * x]);
-        }),
-    );
-    probes
+
+    /// The sum of squares left of each fold after a fit of the free parameters and `added` to the other parts of the folds.
+    fn left_over(&self, added: &[usize]) -> Result<Vec<f64>, RegressorError> {
+        let folds: Result<Vec<Factor>, RegressorError> =
+            self.folds.iter().map(|fold| self.reduced(fold, added)).collect();
+        let folds = folds?;
+        let mut left = vec![0.0; folds.len()];
+        for part in 0..PARTS {
+            let others = folds.iter().enumerate().filter(|(place, _)| place % PARTS != part);
+            let fitted = drawn_to_nothing(&Factor::merge_all(others.map(|(_, fold)| fold))?, added.len())?;
+            for (place, fold) in folds.iter().enumerate().filter(|(place, _)| place % PARTS == part) {
+                left[place] = fold.residual_sum_of_squares(&fitted)?;
+            }
+        }
+        Ok(left)
+    }
+
+    /// The free columns, the added ones and what the model leaves of the torque.
+    fn reduced(&self, factors: &GroupedFactor, added: &[usize]) -> Result<Factor, RegressorError> {
+        let group = &factors.groups()[self.row];
+        let of = |parameter: &usize| *parameter < self.free || added.contains(parameter);
+        let columns: Vec<usize> =
+            (0..group.parameters.len()).filter(|&column| of(&group.parameters[column])).collect();
+        let right = group.factor.parameters();
+        let map = faer::Mat::from_fn(right + 1, columns.len() + 1, |column, target| {
+            if target < columns.len() {
+                f64::from(u8::from(columns[target] == column))
+            } else if column == right {
+                1.0
+            } else {
+                -self.parameters[group.parameters[column]]
+            }
+        });
+        group.factor.combine(map.as_ref())
+    }
+}
+
+/// Least squares with every column drawn to nothing, the last `added` more than those before.
+fn drawn_to_nothing(factor: &Factor, added: usize) -> Result<Vec<f64>, RegressorError> {
+    let count = factor.parameters();
+    if count == 0 {
+        return Ok(Vec::new());
+    }
+    let mut builder = FactorBuilder::new(count + 1);
+    let every: Vec<usize> = (0..=count).collect();
+    builder.push_factor(factor, &every, 1.0)?;
+    let norms: Vec<f64> = (0..count).map(|column| factor.column_norm(column)).collect();
+    let largest = norms[count - added..].iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    for column in 0..count {
+        let weight = match column < count - added {
+            true => DRAWN_MODEL.sqrt() * norms[column].max(f64::MIN_POSITIVE.sqrt()),
+            false => DRAWN.sqrt() * largest,
+        };
+        let mut row = vec![0.0; count + 1];
+        row[column] = weight;
+        builder.push_row(&row)?;
+    }
+    Ok(builder.factor().solve()?.parameters)
 }

@@ -1,8 +1,9 @@
 //! The end of a search: the final fit, what each effect explained, what remains.
 
-use super::probe;
+use super::probe::{self, Fit};
 use super::residuals::ResidualShape;
 use super::search::{Fitted, Search, relative};
+use super::stage::Stage;
 use super::tracing::{Ranked, Remaining, Tracing, Verdict};
 use phiw_identification::{EffectSpec, IdentificationError, Identified, TorqueError, fit, torque_error};
 use phiw_regressor::RegressorError;
@@ -82,7 +83,7 @@ impl Search<'_> {
             torque_error(&held_out_folds, &final_fit.parameters)?,
         );
         let remaining =
-            Remaining { silent, ..self.remaining(&final_fit.parameters, &after.1, ranking, shape)? };
+            Remaining { silent, ..self.remaining(&stage, &final_fit.parameters, &after.1, ranking, shape)? };
         let design = design.with_reference(self.fixed.reference(&self.specs, &final_fit.parameters)?);
         let verdict = match (self.found.is_empty(), remaining.joints.is_empty()) {
             (true, true) => Verdict::Sufficient,
@@ -108,6 +109,7 @@ impl Search<'_> {
     /// Which residuals have structure, and what they follow.
     fn remaining(
         &self,
+        stage: &Stage,
         parameters: &[f64],
         held_out: &TorqueError,
         ranking: Vec<Ranked>,
@@ -116,16 +118,28 @@ impl Search<'_> {
         let least = self.options.structured_correlation[usize::from(!self.found.is_empty())];
         let over = |row: usize| held_out.rmse[row] / self.input.noise_floor[row];
         let nearest = (0..held_out.rmse.len()).map(over).fold(f64::INFINITY, f64::min).max(1.0);
-        let structured: Vec<usize> = (0..held_out.rmse.len())
+        let torque_rms = |row: usize| {
+            let torque = &stage.held_out.groups()[row].factor;
+            (torque.right_hand_side_sum_of_squares() / torque.rows().max(1) as f64).sqrt()
+        };
+        let share = |row: usize| held_out.rmse[row] / torque_rms(row);
+        let loud = |row: &usize| {
+            over(*row) > self.options.floor_margin
+                && share(*row) > self.options.structured_share[usize::from(!self.found.is_empty())]
+        };
+        let loud: Vec<usize> = (0..held_out.rmse.len()).filter(loud).collect();
+        let fit = Fit { fixed: self.fixed, specs: &self.specs, parameters, ranges: &self.input.ranges };
+        let following = probe::following(fit, &loud)?;
+        let structured: Vec<usize> = loud
+            .into_iter()
             .filter(|&row| {
                 let stands_out = over(row) > self.options.structured_ratio * nearest;
                 let correlated = shape.autocorrelation[row].abs() > least;
-                over(row) > self.options.floor_margin && (stands_out || correlated)
+                let large = share(row) > self.options.structured_share[0];
+                large && (stands_out || correlated) || following.contains(&row)
             })
             .collect();
-        let reference = self.fixed.reference(&self.specs, parameters)?;
-        let probed =
-            probe::probe(self.fixed, &self.specs, reference, parameters, &self.input.ranges, &structured)?;
+        let probed = probe::probe(fit, &structured)?;
         let names: Vec<String> = self.fixed.tree.joint_names().map(str::to_owned).collect();
         let joints = structured.iter().map(|&row| names[row].clone()).collect();
         Ok(Remaining { joints, depends_on: probed, ranking, silent: Vec::new() })
