@@ -26,8 +26,8 @@ pub struct TraceOptions {
     /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which it is structure: the noise of a robot's sensors is of one
     /// colour, and raises all residuals over their floors alike.
     pub structured_ratio: f64,
-    /// RMS residual over the RMS of its torque from which it is structure: of the declared model, and of one to which effects were added, where only what follows
-    /// the joint's motion counts below the first. Filters and encoders leave as much of a right model.
+    /// RMS residual over the RMS of its torque from which it may be structure: filters and encoders leave as much of a right model. The second one is for torques on which
+    /// effects act that were found, and those of the joints next to them, and for what follows the motion only: to say of a torque that it is explained asks for more.
     pub structured_share: [f64; 2],
     /// Torques whose residual is to be explained: what acts on none of them is no candidate. `None`: all.
     pub torques: Option<Vec<usize>>,
@@ -46,7 +46,7 @@ impl Default for TraceOptions {
             floor_margin: 1.15,
             structured_correlation: [0.3, 0.2],
             structured_ratio: 8.0,
-            structured_share: [0.01, 0.004],
+            structured_share: [0.01, 0.002],
             torques: None,
             excluded: Vec::new(),
         }

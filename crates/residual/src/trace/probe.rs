@@ -2,7 +2,7 @@
 
 use super::candidate::{Candidate, Candidates};
 use super::evidence::paired_t;
-use super::signal_shapes::{Shape, other_shapes, own_shapes};
+use super::signal_shapes::{Shape, neighbours, other_shapes, own_shapes};
 use super::stage::{Fixed, Stage};
 use crate::catalogue::SignalRanges;
 use phiw_identification::{EffectSpec, IdentificationError};
@@ -46,7 +46,8 @@ pub(super) struct Fit<'a> {
 pub(super) fn probe(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<Dependence>, IdentificationError> {
     let shapes = |row| {
         let mut shapes = own_shapes(fit.fixed, row, fit.ranges);
-        shapes.extend(other_shapes(fit.fixed, row, fit.ranges));
+        let others = (0..fit.fixed.tree.joint_count()).filter(|&other| other != row);
+        shapes.extend(other_shapes(fit.fixed, row, others, fit.ranges));
         shapes
     };
     let joint = |row: usize| fit.fixed.tree.joint(row).joint.clone();
@@ -57,9 +58,15 @@ pub(super) fn probe(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<Dependence>, Ide
     Ok(found)
 }
 
-/// Those of the torques `rows` whose residual follows the joint's own motion. Noise that does not know the motion foretells nothing, whatever its colour.
+/// Those of the torques `rows` whose residual follows the motion of the joint or of its neighbours. Noise that does not know the motion foretells nothing, whatever
+/// its colour.
 pub(super) fn following(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<usize>, IdentificationError> {
-    let probes = probes(fit, rows, |row| own_shapes(fit.fixed, row, fit.ranges))?;
+    let shapes = |row| {
+        let mut shapes = own_shapes(fit.fixed, row, fit.ranges);
+        shapes.extend(other_shapes(fit.fixed, row, neighbours(fit.fixed.tree, row), fit.ranges));
+        shapes
+    };
+    let probes = probes(fit, rows, shapes)?;
     let mut rows: Vec<usize> = probes.iter().map(|probe| probe.row).collect();
     rows.dedup();
     Ok(rows)

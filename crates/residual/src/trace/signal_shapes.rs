@@ -2,6 +2,7 @@
 
 use super::stage::Fixed;
 use crate::catalogue::{Constants, OwnTorque, ParameterKind, SignalRanges, smooth_sign};
+use phiw_dynamics::Tree;
 use phiw_identification::{Effect, Needs, Sample};
 
 /// A signal, as in `report.json`, and broken lines over it in one joint's torque.
@@ -61,9 +62,22 @@ pub(super) fn own_shapes(fixed: &Fixed<'_>, row: usize, ranges: &SignalRanges) -
     ]
 }
 
-/// Shapes over the positions and speeds of the other joints, in the torque of the joint `row`.
-pub(super) fn other_shapes(fixed: &Fixed<'_>, row: usize, ranges: &SignalRanges) -> Vec<Shape> {
-    let others = (0..ranges.joints.len()).filter(|&other| other != row);
+/// Joints right before and right behind the joint `row` in the tree.
+pub(super) fn neighbours(tree: &Tree, row: usize) -> Vec<usize> {
+    let before = |joint: usize, other: usize| {
+        let parent = tree.joint(joint).parent.map(|parent| &tree.bodies()[parent]);
+        parent.is_some_and(|parent| parent.joint == tree.joint(other).joint)
+    };
+    (0..tree.joint_count()).filter(|&other| before(row, other) || before(other, row)).collect()
+}
+
+/// Shapes over the positions and speeds of the joints `others`, in the torque of the joint `row`.
+pub(super) fn other_shapes(
+    fixed: &Fixed<'_>,
+    row: usize,
+    others: impl IntoIterator<Item = usize>,
+    ranges: &SignalRanges,
+) -> Vec<Shape> {
     let of_joint = |other: usize| {
         let range = &ranges.joints[other];
         let name = &fixed.tree.joint(other).joint;
@@ -75,7 +89,7 @@ pub(super) fn other_shapes(fixed: &Fixed<'_>, row: usize, ranges: &SignalRanges)
             (format!("qd.{name}"), shape(Box::new(move |sample, out| speed.write(sample.qd()[other], out)))),
         ]
     };
-    others.flat_map(of_joint).collect()
+    others.into_iter().flat_map(of_joint).collect()
 }
 
 /// Writes the columns of one sample.

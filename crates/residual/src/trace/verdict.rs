@@ -3,6 +3,7 @@
 use super::probe::{self, Fit};
 use super::residuals::ResidualShape;
 use super::search::{Fitted, Search, relative};
+use super::signal_shapes::neighbours;
 use super::stage::Stage;
 use super::tracing::{Ranked, Remaining, Tracing, Verdict};
 use phiw_identification::{EffectSpec, IdentificationError, Identified, TorqueError, fit, torque_error};
@@ -106,6 +107,19 @@ impl Search<'_> {
         Ok(Tracing { verdict, specs: self.specs, model, before, effects: found, remaining })
     }
 
+    /// Torques on which effects that were found act, and those of the joints next to them.
+    fn touched(&self) -> Result<Vec<usize>, IdentificationError> {
+        let tree = self.fixed.tree;
+        let mut touched = Vec::new();
+        for effect in self.fixed.build(&self.specs[self.input.declared.len()..])? {
+            for row in effect.entries().iter().map(|entry| entry.row) {
+                touched.push(row);
+                touched.extend(neighbours(tree, row));
+            }
+        }
+        Ok(touched)
+    }
+
     /// Which residuals have structure, and what they follow.
     fn remaining(
         &self,
@@ -123,10 +137,12 @@ impl Search<'_> {
             (torque.right_hand_side_sum_of_squares() / torque.rows().max(1) as f64).sqrt()
         };
         let share = |row: usize| held_out.rmse[row] / torque_rms(row);
-        let loud = |row: &usize| {
-            over(*row) > self.options.floor_margin
-                && share(*row) > self.options.structured_share[usize::from(!self.found.is_empty())]
+        let touched = self.touched()?;
+        let large = |row: usize| {
+            over(row) > self.options.floor_margin && share(row) > self.options.structured_share[0]
         };
+        let claimed = |row: usize| touched.contains(&row) && share(row) > self.options.structured_share[1];
+        let loud = |row: &usize| large(*row) || claimed(*row);
         let loud: Vec<usize> = (0..held_out.rmse.len()).filter(loud).collect();
         let fit = Fit { fixed: self.fixed, specs: &self.specs, parameters, ranges: &self.input.ranges };
         let following = probe::following(fit, &loud)?;
@@ -135,8 +151,7 @@ impl Search<'_> {
             .filter(|&row| {
                 let stands_out = over(row) > self.options.structured_ratio * nearest;
                 let correlated = shape.autocorrelation[row].abs() > least;
-                let large = share(row) > self.options.structured_share[0];
-                large && (stands_out || correlated) || following.contains(&row)
+                large(row) && (stands_out || correlated) || following.contains(&row)
             })
             .collect();
         let probed = probe::probe(fit, &structured)?;
