@@ -12,8 +12,10 @@ use phiw_dynamics::check_size;
 pub struct FactorBuilder {
     columns: usize,
     rows: u64,
-    /// R in the first `columns` rows, then the rows that wait.
+    /// R in the first `columns` rows, then the rows that wait; as long as there is no R, the rows that wait come first.
     work: Mat<f64>,
+    /// Rows of `work` that R takes: `columns`, or none before the first QR.
+    triangle: usize,
     waiting: usize,
     householder: Mat<f64>,
     stack: MemBuffer,
@@ -31,6 +33,7 @@ impl FactorBuilder {
             columns,
             rows: 0,
             work: Mat::zeros(size, columns),
+            triangle: 0,
             waiting: 0,
             householder: Mat::zeros(block, columns),
             stack: MemBuffer::new(qr_in_place_scratch::<f64>(
@@ -65,10 +68,10 @@ impl FactorBuilder {
         if !(weight.is_finite() && row.iter().all(|value| value.is_finite())) {
             return Err(RegressorError::NotFinite { row: 0 });
         }
-        if self.columns + self.waiting == self.work.nrows() {
+        if self.triangle + self.waiting == self.work.nrows() {
             self.fold();
         }
-        let target = self.columns + self.waiting;
+        let target = self.triangle + self.waiting;
         for (column, value) in row.iter().enumerate() {
             self.work[(target, column)] = value * weight;
         }
@@ -110,12 +113,17 @@ impl FactorBuilder {
         let mut row = vec![0.0; self.columns];
         for index in 0..factor.columns() {
             row.fill(0.0);
+            let mut says_something = false;
             for column in index..factor.columns() {
                 let target = columns[column];
                 check_size("column index", target.max(self.columns - 1) + 1, self.columns)?;
                 row[target] = factor.entry(index, column);
+                says_something |= row[target] != 0.0;
             }
-            self.push_scaled_row(&row, weight)?;
+            // The factor of fewer rows than columns has empty ones.
+            if says_something {
+                self.push_scaled_row(&row, weight)?;
+            }
         }
         self.rows = rows;
         Ok(())
@@ -130,6 +138,7 @@ impl FactorBuilder {
     /// Starts again with no rows.
     pub fn clear(&mut self) {
         self.work.fill(0.0);
+        self.triangle = 0;
         self.waiting = 0;
         self.rows = 0;
     }
@@ -138,10 +147,11 @@ impl FactorBuilder {
         if self.waiting == 0 || self.columns == 0 {
             return;
         }
-        let rows = self.columns + self.waiting;
+        // A first block of few rows costs little: what is not there yet is not factored.
+        let rows = self.triangle + self.waiting;
         qr_in_place(
             self.work.as_mut().subrows_mut(0, rows),
-            self.householder.as_mut(),
+            self.householder.as_mut().subcols_mut(0, rows.min(self.columns)),
             Par::Seq,
             MemStack::new(&mut self.stack),
             Default::default(),
@@ -159,6 +169,7 @@ impl FactorBuilder {
                 }
             },
         );
+        self.triangle = self.columns;
         self.waiting = 0;
     }
 }
