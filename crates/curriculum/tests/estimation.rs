@@ -124,6 +124,48 @@ fn what_rows_do_not_determine_keeps_its_present_value() {
     }
 }
 
+/// Without a log the estimate is the prior; with one, what it does not tell is the prior's, and many logs overrule it.
+#[test]
+fn a_prior_decides_what_logs_do_not() {
+    let arm = Arm::new(0.05);
+    let design = arm.robot.design(arm.robot.declared()).unwrap();
+    let truth = arm.truth.parameters(&arm.robot).unwrap();
+    for seed in 20..25 {
+        let initial = unreliable_model(&arm.truth, seed);
+        let first = initial.parameters(&arm.robot).unwrap();
+        let believing = arm.estimator().believing(Prior::unreliable(initial.clone()));
+        let nothing = Evidence::none(&design, RowsAt::Periods).unwrap();
+        let present = unreliable_model(&arm.truth, seed + 100);
+        let w = present.parameters(&arm.robot).unwrap();
+        let found = believing.estimate(&design, &nothing, &present, &w).unwrap();
+        for k in 0..first.len() {
+            let distance = (found.parameters[k] - first[k]).abs() / found.standard_deviations[k];
+            assert!(distance < 1e-3, "parameter {k} is {distance} standard deviations from the prior");
+        }
+        let before = rms(&first, &truth);
+        let error = |estimator: &MotionLikelihood, motions: usize| {
+            let (design, evidence) = measure(&arm, RowsAt::Periods, motions);
+            let w = initial.parameters(&arm.robot).unwrap();
+            rms(&estimator.estimate(&design, &evidence, &initial, &w).unwrap().parameters, &truth)
+        };
+        // The slowest motion leaves much to the noise.
+        let (with, without) = (error(&believing, 1), error(&arm.estimator(), 1));
+        assert!(with < before && with < without, "{with} with the prior, {without} without, {before} before");
+        let (with, without) = (error(&believing, 6), error(&arm.estimator(), 6));
+        assert!(with < 1.1 * without, "{with} with the prior, {without} without");
+    }
+}
+
+#[test]
+fn a_prior_that_is_never_wrong_is_an_error_that_says_so() {
+    let arm = Arm::new(0.05);
+    let (design, evidence) = measure(&arm, RowsAt::Periods, 1);
+    let w = arm.truth.parameters(&arm.robot).unwrap();
+    let certain = arm.estimator().believing(Prior { model: arm.truth.clone(), share: 0.0 });
+    let error = certain.estimate(&design, &evidence, &arm.truth, &w).unwrap_err().to_string();
+    assert!(error.contains("a prior may be wrong is 0: it must be finite and > 0"), "{error}");
+}
+
 #[test]
 fn evidence_comes_back_from_text_to_the_last_bit() {
     let arm = Arm::new(0.05);

@@ -103,18 +103,18 @@ impl Humanoid {
     fn experiment(&self, build: Box<BuildBackend>) -> StandingRobot {
         let controller =
             StandingFeedForward { gains: self.gains(), feet: self.feet.clone(), stance: self.stance.clone() };
-        StandingRobot {
+        let plant = SimulatedRobot {
             tree: self.floating.clone(),
             world: self.world.clone(),
-            feet: self.feet.clone(),
             effects: Vec::new(),
             controller: Box::new(controller),
             actuator_noise: 0.0,
-            wrench_noise: WrenchNoise { force_n: 0.0, moment_nm: 0.0 },
             timing: Timing { control_period_s: 1e-3, longest_step_s: 5e-4, settle_s: 1.0 },
             fall_tilt_rad: 0.3,
             build,
-        }
+        };
+        let wrench_noise = WrenchNoise { force_n: 0.0, moment_nm: 0.0 };
+        StandingRobot { plant, feet: self.feet.clone(), wrench_noise }
     }
 }
 
