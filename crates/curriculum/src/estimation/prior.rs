@@ -28,6 +28,9 @@ const UNIFORM_SHARE: f64 = 0.577_350_269_189_625_8;
 
 impl Prior {
     /// For the paper's bad initial model, each of whose parameters is drawn uniformly between zero and twice the truth.
+    ///
+    /// The magnitudes are those of the draw, as nobody knows the true ones. A friction that was drawn much too small is therefore believed too firmly: single
+    /// frictions are let go by more logs only. A larger `share` lets go earlier, and guards less against the noise of few logs.
     pub fn unreliable(model: RobotModel) -> Self {
         Prior { model, share: UNIFORM_SHARE }
     }
