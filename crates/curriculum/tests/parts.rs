@@ -112,7 +112,12 @@ fn a_motion_done_again_does_not_tighten_the_constraint() {
 proptest! {
     #[test]
     fn alpha_never_exceeds_its_first_value(first in 0.0..1.0_f64, before in 1.0..1e9_f64, cond in 1.0..1e9_f64) {
-        let learnt = Learnt { first_alpha: first, first_condition_number: before, condition_number: cond, torque_uncertainty: None };
+        let learnt = Learnt {
+            first_alpha: first,
+            first_condition_number: before,
+            condition_number: cond,
+            torque_uncertainty: None,
+        };
         let alpha = ConditionRelaxation::default().next(&learnt);
         prop_assert!((0.0..=first).contains(&alpha), "{alpha}");
     }

@@ -75,7 +75,7 @@ fn of_motors(motion: &Motion) -> Result<Motion, CurriculumError> {
 ///
 /// A step is Δq = h·(v₁ − λ·(v₁ − v₀)). A semi-implicit one has λ = 0: read as what it is, a leapfrog, its velocities belong to the middles between its
 /// positions. Taken for those of one instant they do harm where noise moves the robot: the mean velocity over a period then follows the noise of the period by
-/// more than half of what the noise does to the velocity, and the estimate takes the difference for negative friction (−2.9 N·m·s/rad in a waist that has 1.3,
+/// more than half of what the noise does to the velocity, and the estimate takes the difference for negative friction (−1.6 N·m·s/rad in a waist that has 1.3,
 /// from 4 N·m of noise and periods of two steps). The history tells λ.
 fn position_lead_s(history: &History) -> f64 {
     let (mut along, mut square) = (0.0, 0.0);
