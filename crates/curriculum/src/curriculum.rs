@@ -94,7 +94,7 @@ impl Curriculum<'_> {
         let trial = self.experiment.perform(self.robot, &run.model, motion, &mut noise)?;
         let mut next = run.clone();
         next.first_alpha = Some(plan.first_alpha);
-        let mut deviations = Vec::new();
+        let mut estimate = None;
         // A base that tilts is not the fixed base of the columns: the log of a fall is of another robot.
         if trial.fell_at_s.is_some() {
             next.excluded.push(plan.choice.motion);
@@ -102,7 +102,7 @@ impl Curriculum<'_> {
             let learning = self.learn(&mut next, &trial.measured)?;
             next.model = learning.model;
             next.evidence = Some(learning.evidence);
-            deviations = learning.estimate.standard_deviations;
+            estimate = Some(learning.estimate);
         }
         let candidates = self.candidates_of(&next.model)?;
         let condition_number = match next.evidence.as_ref().filter(|evidence| !evidence.is_empty()) {
@@ -122,10 +122,15 @@ impl Curriculum<'_> {
             tracking_error: trial.tracking_error,
             condition_number: condition_number.filter(|cond| cond.is_finite()),
             torque_change: if grown { None } else { candidates.torque_change(&before, &after) },
+            torque_uncertainty: match &estimate {
+                Some(estimate) => estimate.uncertainty_along(candidates.everything(), self.dataset.rows()),
+                None => run.history.last().and_then(|record| record.torque_uncertainty),
+            },
             separates: plan.separates,
             model: next.model.clone(),
-            standard_deviations: deviations
+            standard_deviations: estimate
                 .iter()
+                .flat_map(|estimate| &estimate.standard_deviations)
                 .map(|std| Some(*std).filter(|std| std.is_finite()))
                 .collect(),
             choice: plan.choice,
@@ -262,7 +267,19 @@ impl Curriculum<'_> {
         let first = run.history.iter().find_map(|record| record.condition_number);
         let alpha = match (first, run.history.last().and_then(|record| record.condition_number)) {
             (Some(first_condition_number), Some(condition_number)) => {
-                self.relaxation.next(&Learnt { first_alpha, first_condition_number, condition_number })
+                let uncertainty = |record: &IterationRecord| record.torque_uncertainty;
+                let torque_uncertainty = run
+                    .history
+                    .iter()
+                    .find_map(uncertainty)
+                    .zip(run.history.last().and_then(uncertainty))
+                    .map(|(first, last)| [first, last]);
+                self.relaxation.next(&Learnt {
+                    first_alpha,
+                    first_condition_number,
+                    condition_number,
+                    torque_uncertainty,
+                })
             }
             _ => first_alpha,
         };

@@ -2,7 +2,7 @@
 
 use crate::{Controller, CurriculumError, Measured, Motion, Robot, RobotModel};
 use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World};
-use phiw_plant::{Effect, History, Plant, PlantSetup, Reaction, Sensors, Timing};
+use phiw_plant::{Effect, History, Plant, PlantSetup, Reaction, Run as PlantRun, Sensors, Timing};
 use rand_chacha::ChaCha8Rng;
 
 /// What happened when a motion was tried.
@@ -65,6 +65,32 @@ const STILL_RAD_PER_S: f64 = 0.01;
 const SETTLES_S: f64 = 0.1;
 
 impl SimulatedRobot {
+    /// Lets a plant of its own follow a motion of its motors.
+    pub(crate) fn run(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        motion: &Motion,
+        random: &mut ChaCha8Rng,
+    ) -> Result<PlantRun, CurriculumError> {
+        let setup = PlantSetup {
+            effects: self.effects.clone(),
+            actuator_noise: self.actuator_noise,
+            // The command itself: a mean around the stamp would mix two of them.
+            sensors: Sensors {
+                period_s: self.timing.control_period_s,
+                torque_window_s: 0.0,
+                derivatives: true,
+                ..Sensors::default()
+            },
+            timing: self.timing,
+            fall_tilt_rad: self.fall_tilt_rad,
+            ..PlantSetup::new(self.controller.controller(robot, model)?)
+        };
+        let mut plant = Plant::new(&self.tree, &self.world, setup, |tree, world| (self.build)(tree, world))?;
+        Ok(plant.run(motion, motion.duration_s(), random)?)
+    }
+
     /// For each row of the log, whether the base stood still until the next, as a gyroscope in it would tell; empty on a fixed base.
     fn still(&self, history: &History) -> Vec<bool> {
         let period_s = self.timing.control_period_s;
@@ -95,22 +121,7 @@ impl Experiment for SimulatedRobot {
         motion: &Motion,
         random: &mut ChaCha8Rng,
     ) -> Result<Trial, CurriculumError> {
-        let setup = PlantSetup {
-            effects: self.effects.clone(),
-            actuator_noise: self.actuator_noise,
-            // The command itself: a mean around the stamp would mix two of them.
-            sensors: Sensors {
-                period_s: self.timing.control_period_s,
-                torque_window_s: 0.0,
-                derivatives: true,
-                ..Sensors::default()
-            },
-            timing: self.timing,
-            fall_tilt_rad: self.fall_tilt_rad,
-            ..PlantSetup::new(self.controller.controller(robot, model)?)
-        };
-        let mut plant = Plant::new(&self.tree, &self.world, setup, |tree, world| (self.build)(tree, world))?;
-        let run = plant.run(motion, motion.duration_s(), random)?;
+        let run = self.run(robot, model, motion, random)?;
         // A robot that falls at once has no log.
         let measured = match run.recording.len() {
             0 | 1 => Measured {

@@ -28,14 +28,15 @@ pub use curriculum::{Curriculum, Plan, unreliable_model};
 pub use end::{Converged, EndCriterion, EndReason, FixedCount};
 pub use error::CurriculumError;
 pub use estimation::{
-    Estimate, Estimator, Evidence, Instant, LeastSquares, MotionLikelihood, RowsAt, WeightedLeastSquares,
+    Estimate, Estimator, Evidence, Instant, LeastSquares, MotionLikelihood, Prior, RowsAt,
+    WeightedLeastSquares,
 };
 pub use experiment::{BuildBackend, Experiment, SimulatedRobot, Trial};
 pub use growth::{Found, Growth, TraceResidual};
 pub use measured::Measured;
 pub use motion::{Motion, MotionDataset};
 pub use record::{IterationRecord, Run};
-pub use relaxation::{ConditionRelaxation, Learnt, Maximum, Relaxation, Scale};
+pub use relaxation::{ConditionRelaxation, Learnt, Maximum, Relaxation, Scale, UncertaintyRelaxation};
 pub use rivalry::Rivalry;
 pub use robot::{KnownEffect, Robot, RobotModel};
 pub use selection::Selection;

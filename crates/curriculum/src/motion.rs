@@ -168,6 +168,11 @@ impl MotionDataset {
         self.motions.is_empty()
     }
 
+    /// Rows of Φ of all motions: samples times joints.
+    pub(crate) fn rows(&self) -> usize {
+        self.motions.iter().map(|motion| motion.samples() * motion.joints()).sum()
+    }
+
     /// A motion by its name.
     pub fn position(&self, name: &str) -> Option<usize> {
         self.motions.iter().position(|motion| motion.name == name)

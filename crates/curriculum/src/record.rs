@@ -27,6 +27,10 @@ pub struct IterationRecord {
     pub tracking_error: Vec<f64>,
     /// cond(Φ) of all that has been measured so far, this motion included; none before anything has been.
     pub condition_number: Option<f64>,
+    /// How uncertain the torques of the dataset's motions are under this belief, as the estimator sees it: RMS of their standard deviations, weighted like
+    /// the candidates; none where it does not know.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torque_uncertainty: Option<f64>,
     /// RMS over all motions of the dataset of how far the model's torques have moved in this iteration, over their RMS; none where the model
     /// has grown.
     pub torque_change: Option<f64>,

@@ -20,6 +20,9 @@ pub struct Learnt {
     pub first_condition_number: f64,
     /// cond(Φ) of all that has been measured.
     pub condition_number: f64,
+    /// How sure the estimator was of the torques of all motions after the first measurement, and how sure it is now: see
+    /// [`crate::IterationRecord::torque_uncertainty`]. None where it does not know.
+    pub torque_uncertainty: Option<[f64; 2]>,
 }
 
 /// How α_max is chosen.
@@ -29,6 +32,23 @@ pub enum Maximum {
     Fixed(f64),
     /// Such that this share of the motions is allowed at first (rounded up): how the paper's 0.74 came about, with 0.05.
     Share(f64),
+}
+
+impl Maximum {
+    /// α_max for these motions.
+    fn of(self, motions: &[Safety]) -> f64 {
+        match self {
+            Maximum::Fixed(alpha) => alpha,
+            Maximum::Share(share) => {
+                let mut reductions: Vec<f64> =
+                    motions.iter().map(|safety| safety.largest_reduction).collect();
+                reductions.sort_by(|a, b| b.total_cmp(a));
+                let wanted = (share * reductions.len() as f64).ceil().max(1.0) as usize;
+                // The region can only shrink, and not beyond a point.
+                reductions.get(wanted - 1).copied().unwrap_or(0.0).clamp(0.0, 1.0)
+            }
+        }
+    }
 }
 
 /// How a is chosen.
@@ -61,17 +81,7 @@ impl Default for ConditionRelaxation {
 
 impl Relaxation for ConditionRelaxation {
     fn first(&self, motions: &[Safety]) -> f64 {
-        match self.maximum {
-            Maximum::Fixed(alpha) => alpha,
-            Maximum::Share(share) => {
-                let mut reductions: Vec<f64> =
-                    motions.iter().map(|safety| safety.largest_reduction).collect();
-                reductions.sort_by(|a, b| b.total_cmp(a));
-                let wanted = (share * reductions.len() as f64).ceil().max(1.0) as usize;
-                // The region can only shrink, and not beyond a point.
-                reductions.get(wanted - 1).copied().unwrap_or(0.0).clamp(0.0, 1.0)
-            }
-        }
+        self.maximum.of(motions)
     }
 
     fn next(&self, learnt: &Learnt) -> f64 {
@@ -81,6 +91,42 @@ impl Relaxation for ConditionRelaxation {
         };
         let alpha = scale * (learnt.condition_number - self.bias);
         // Without a finite cond nothing has been learnt.
+        if alpha.is_nan() { learnt.first_alpha } else { alpha.clamp(0.0, learnt.first_alpha.max(0.0)) }
+    }
+}
+
+/// Equation (20) with what the reduced support is a margin for in the place of cond(Φ): α = a·u, at most α_max, where u is how uncertain the torques of
+/// the dataset's motions are ([`crate::IterationRecord::torque_uncertainty`]).
+///
+/// A support is reduced because the ZMP of a motion is predicted by a model that may be wrong. cond(Φ) is a poor measure of that: its σ_min is the one
+/// direction of w that is known least, which may be one that no motion feels, and the ZMP neither. Of a robot with many such directions cond falls late or
+/// never, and α stays at its second value however well the model predicts. The uncertainty of Φ·w over all motions, floor wrenches included where the base floats,
+/// counts each direction as much as the motions feel it.
+///
+/// It needs an estimator that knows its covariance ([`crate::MotionLikelihood`]); with others α stays at α_max.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UncertaintyRelaxation {
+    /// α_max.
+    pub maximum: Maximum,
+    /// α of the second iteration over α_max: a by [`Scale::Share`].
+    pub share: f64,
+}
+
+impl Default for UncertaintyRelaxation {
+    /// 5 % of the motions at first, and 0.8 of that α after the first measurement, as [`ConditionRelaxation`].
+    fn default() -> Self {
+        UncertaintyRelaxation { maximum: Maximum::Share(0.05), share: 0.8 }
+    }
+}
+
+impl Relaxation for UncertaintyRelaxation {
+    fn first(&self, motions: &[Safety]) -> f64 {
+        self.maximum.of(motions)
+    }
+
+    fn next(&self, learnt: &Learnt) -> f64 {
+        let Some([first, now]) = learnt.torque_uncertainty else { return learnt.first_alpha };
+        let alpha = self.share * learnt.first_alpha * now / first;
         if alpha.is_nan() { learnt.first_alpha } else { alpha.clamp(0.0, learnt.first_alpha.max(0.0)) }
     }
 }

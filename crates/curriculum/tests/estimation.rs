@@ -124,6 +124,51 @@ fn what_rows_do_not_determine_keeps_its_present_value() {
     }
 }
 
+/// Without a log the estimate is the prior; what one log does not tell is the prior's, and logs that tell much overrule it.
+#[test]
+fn a_prior_decides_what_logs_do_not() {
+    let noisy = Arm::new(0.05);
+    // The slowest motion alone leaves much to the noise.
+    let (design, evidence) = measure(&noisy, RowsAt::Periods, 1);
+    let quiet = Arm::new(0.002);
+    let (_, plenty) = measure(&quiet, RowsAt::Periods, 6);
+    let truth = noisy.truth.parameters(&noisy.robot).unwrap();
+    let mut ratios = Vec::new();
+    for seed in 20..25 {
+        let initial = unreliable_model(&noisy.truth, seed);
+        let first = initial.parameters(&noisy.robot).unwrap();
+        let believing = |arm: &Arm| arm.estimator().believing(Prior::unreliable(initial.clone()));
+        let nothing = Evidence::none(&design, RowsAt::Periods).unwrap();
+        let present = unreliable_model(&noisy.truth, seed + 100);
+        let w = present.parameters(&noisy.robot).unwrap();
+        let found = believing(&noisy).estimate(&design, &nothing, &present, &w).unwrap();
+        for k in 0..first.len() {
+            let distance = (found.parameters[k] - first[k]).abs() / found.standard_deviations[k];
+            assert!(distance < 1e-3, "parameter {k} is {distance} standard deviations from the prior");
+        }
+        let of = |estimator: &MotionLikelihood, evidence: &Evidence| {
+            estimator.estimate(&design, evidence, &initial, &first).unwrap().parameters
+        };
+        let error = |estimator: &MotionLikelihood| rms(&of(estimator, &evidence), &truth);
+        ratios.push(error(&believing(&noisy)) / error(&noisy.estimator()));
+        let (with, without) = (of(&believing(&quiet), &plenty), of(&quiet.estimator(), &plenty));
+        let moved = rms(&with, &without) / rms(&first, &truth);
+        assert!(moved < 0.02, "the prior moves what is known by {moved} of the first error");
+    }
+    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    assert!(mean < 0.5, "{ratios:?} of the error without the prior");
+}
+
+#[test]
+fn a_prior_that_is_never_wrong_is_an_error_that_says_so() {
+    let arm = Arm::new(0.05);
+    let (design, evidence) = measure(&arm, RowsAt::Periods, 1);
+    let w = arm.truth.parameters(&arm.robot).unwrap();
+    let certain = arm.estimator().believing(Prior { model: arm.truth.clone(), share: 0.0 });
+    let error = certain.estimate(&design, &evidence, &arm.truth, &w).unwrap_err().to_string();
+    assert!(error.contains("a prior may be wrong is 0: it must be finite and > 0"), "{error}");
+}
+
 #[test]
 fn evidence_comes_back_from_text_to_the_last_bit() {
     let arm = Arm::new(0.05);

@@ -78,15 +78,46 @@ fn five_percent_of_the_motions_pass_at_first() {
 fn the_paper_s_numbers_relax_as_in_the_paper() {
     let paper = ConditionRelaxation { maximum: Maximum::Fixed(0.74), scale: Scale::Fixed(2.5e-4), bias: 1.0 };
     for (cond, expected) in [(1e6, 0.74), (2961.0, 0.74), (1201.0, 0.3), (1.0, 0.0)] {
-        let learnt = Learnt { first_alpha: 0.74, first_condition_number: 3000.0, condition_number: cond };
+        let learnt = Learnt {
+            first_alpha: 0.74,
+            first_condition_number: 3000.0,
+            condition_number: cond,
+            torque_uncertainty: None,
+        };
         assert!((paper.next(&learnt) - expected).abs() < 1e-12, "{cond}");
     }
+}
+
+/// A motion that is done again makes σ_max of Φ larger and σ_min hardly: cond rises, and α went back to its maximum, at which nothing was allowed but the
+/// safest motion, which was then done again. What was learnt of the torques is never lost.
+#[test]
+fn a_motion_done_again_does_not_tighten_the_constraint() {
+    let learnt = |cond: f64, now: Option<f64>| Learnt {
+        first_alpha: 0.66,
+        first_condition_number: 1.5e5,
+        condition_number: cond,
+        torque_uncertainty: now.map(|now| [0.02, now]),
+    };
+    let relaxation = UncertaintyRelaxation::default();
+    let alphas = [(1.5e5, 0.02), (1.9e5, 0.01), (2.2e5, 0.008), (2.5e5, 0.007)].map(|(cond, now)| {
+        (relaxation.next(&learnt(cond, Some(now))), ConditionRelaxation::default().next(&learnt(cond, None)))
+    });
+    assert!((alphas[0].0 - 0.8 * 0.66).abs() < 1e-12);
+    assert!(alphas.windows(2).all(|pair| pair[1].0 < pair[0].0), "{alphas:?}");
+    assert_eq!(alphas[3].1, 0.66);
+    // Who does not know how sure he is relaxes nothing.
+    assert_eq!(relaxation.next(&learnt(1.5e5, None)), 0.66);
 }
 
 proptest! {
     #[test]
     fn alpha_never_exceeds_its_first_value(first in 0.0..1.0_f64, before in 1.0..1e9_f64, cond in 1.0..1e9_f64) {
-        let learnt = Learnt { first_alpha: first, first_condition_number: before, condition_number: cond };
+        let learnt = Learnt {
+            first_alpha: first,
+            first_condition_number: before,
+            condition_number: cond,
+            torque_uncertainty: None,
+        };
         let alpha = ConditionRelaxation::default().next(&learnt);
         prop_assert!((0.0..=first).contains(&alpha), "{alpha}");
     }
@@ -134,6 +165,7 @@ fn record(cond: f64, change: f64) -> IterationRecord {
         still_share: 1.0,
         tracking_error: Vec::new(),
         condition_number: Some(cond),
+        torque_uncertainty: None,
         torque_change: Some(change),
         separates: None,
         model,

@@ -29,6 +29,11 @@ fn a_bad_model_becomes_a_good_one() {
     assert_eq!((run.history.len(), run.ended), (4, Some(EndReason::Count)));
     assert!(error(&run.model) < 0.3 * before, "{} from {before}", error(&run.model));
     assert!(run.history.iter().all(|record| record.condition_number.is_some_and(f64::is_finite)));
+    let uncertainties: Vec<f64> = run.history.iter().filter_map(|record| record.torque_uncertainty).collect();
+    assert!(
+        uncertainties.len() == 4 && uncertainties.windows(2).all(|pair| pair[1] < pair[0]),
+        "{uncertainties:?}"
+    );
     // Nothing more happens to a run that has ended.
     let ended = text(&run);
     curriculum.step(&mut run).unwrap();

@@ -29,7 +29,7 @@ pub use history::History;
 pub use mechanism::Mechanism;
 pub use plant::{Plant, PlantSetup, Timing};
 pub use presliding::Presliding;
-pub use reference::{MultiSine, Reference};
+pub use reference::{FadedSines, MultiSine, Reference};
 pub use run::{Reaction, Run};
 pub use sensors::{Clock, Sensors};
 pub use support::{SupportError, feet_from_toml};

@@ -29,14 +29,18 @@ const SINES: usize = 7;
 #[derive(Clone, Debug, PartialEq)]
 pub struct MultiSine {
     duration_s: f64,
-    joints: Vec<Sines>,
+    joints: Vec<FadedSines>,
 }
 
+/// A sum of sines that begins and ends at rest.
 #[derive(Clone, Debug, PartialEq)]
-struct Sines {
-    center: f64,
-    /// Amplitude, angular frequency \[rad/s\], phase \[rad\].
-    terms: [[f64; 3]; SINES],
+pub struct FadedSines {
+    /// Where it begins and ends.
+    pub center: f64,
+    /// What the sines are about once they have faded in, against the centre.
+    pub shift: f64,
+    /// Amplitude, angular frequency \[rad/s\] and phase \[rad\] of each.
+    pub terms: Vec<[f64; 3]>,
 }
 
 impl MultiSine {
@@ -54,7 +58,7 @@ impl MultiSine {
             let bounded = limits.lower.is_finite() && limits.upper.is_finite();
             let [lower, upper] =
                 if bounded { [limits.lower, limits.upper] } else { [-UNLIMITED_REACH, UNLIMITED_REACH] };
-            let mut sines = Sines { center: 0.0, terms: [[0.0; 3]; SINES] };
+            let mut sines = FadedSines { center: 0.0, shift: 0.0, terms: vec![[0.0; 3]; SINES] };
             for (number, term) in sines.terms.iter_mut().enumerate() {
                 let frequency =
                     highest_hz * (number as f64 + 1.0 + random.random_range(-0.4..0.4)) / SINES as f64;
@@ -92,10 +96,11 @@ impl Reference for MultiSine {
     }
 }
 
-impl Sines {
-    fn at(&self, t_s: f64, duration_s: f64) -> [f64; 3] {
-        let mut sum = [0.0; 3];
-        for [amplitude, frequency, phase] in self.terms {
+impl FadedSines {
+    /// Position, velocity and acceleration `t_s` after the start of a motion of `duration_s`.
+    pub fn at(&self, t_s: f64, duration_s: f64) -> [f64; 3] {
+        let mut sum = [self.shift, 0.0, 0.0];
+        for [amplitude, frequency, phase] in &self.terms {
             let (sine, cosine) = (frequency * t_s + phase).sin_cos();
             sum[0] += amplitude * sine;
             sum[1] += amplitude * frequency * cosine;

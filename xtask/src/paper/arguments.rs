@@ -74,6 +74,13 @@ pub struct RunArguments {
     /// How parameters are estimated.
     #[arg(long, default_value = "likelihood")]
     pub estimator: EstimatorName,
+    /// What the estimate falls back on where the logs tell little. Without it: the initial model for the robot on its feet, nothing for the others, as in the
+    /// paper. For the likelihood only.
+    #[arg(long)]
+    pub prior: Option<PriorName>,
+    /// What α follows. Without it: the torques' uncertainty for the robot on its feet, cond(Φ) for the others, as in the paper.
+    #[arg(long)]
+    pub relaxation: Option<RelaxationName>,
     /// Standard deviation of the torque noise over the torque limit.
     #[arg(long, default_value_t = 0.05)]
     pub noise: f64,
@@ -107,6 +114,32 @@ pub enum EstimatorName {
     Weighted,
     /// Maximum likelihood of the motion under the torque noise.
     Likelihood,
+}
+
+/// What the estimate falls back on.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum PriorName {
+    /// Nothing.
+    #[default]
+    None,
+    /// The run's first belief, with the spread that it is drawn with.
+    Initial,
+}
+
+/// What the reduction coefficient α follows.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum RelaxationName {
+    /// cond(Φ): equation (20).
+    #[default]
+    Condition,
+    /// How uncertain the torques of all motions are.
+    Uncertainty,
 }
 
 /// How many initial models there are.

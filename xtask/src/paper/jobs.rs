@@ -107,7 +107,7 @@ impl Job {
             None => None,
         };
         let selection = self.arm.selection(&setup.dataset, &setup.settings.tasks);
-        let estimator = setup.estimator();
+        let estimator = setup.estimator(&file.run.initial);
         let growth = TraceResidual::default();
         let curriculum = Curriculum {
             robot: &setup.robot,
@@ -116,7 +116,7 @@ impl Job {
             experiment: experiment.as_ref(),
             selection: selection.as_ref(),
             constraint: self.arm.constraint(&setup.constraint),
-            relaxation: &setup.relaxation,
+            relaxation: setup.relaxation.as_ref(),
             estimator: estimator.as_ref(),
             growth: (self.arm == Arm::Closed).then_some(&growth),
             end: &FixedCount(setup.settings.iterations),

@@ -1,5 +1,6 @@
 //! The paper's numbers, and ours beside them.
 
+use super::arguments::RelaxationName;
 use super::arm::{Arm, Footing};
 use super::reliability;
 use super::report::{Results, median};
@@ -43,8 +44,8 @@ pub fn rows(results: &Results) -> Vec<[String; 4]> {
             "the noise moves the robot, and is not in the log: the columns of Φ are correlated with it, which (4) takes for physics; more logs do not help",
         );
     }
-    let count = |iteration: usize| {
-        let all = reliability::of_arm(results, home, Curriculum, iteration);
+    let count = |arm: Arm, iteration: usize| {
+        let all = reliability::of_arm(results, home, arm, iteration);
         let [well, with_bias] = [reliability::Reliability::well, reliability::Reliability::well_with_bias]
             .map(|test| all.iter().filter(|parameter| test(parameter)).count());
         format!("{well} ({with_bias} with bias counted)")
@@ -52,28 +53,43 @@ pub fn rows(results: &Results) -> Vec<[String; 4]> {
     row(
         "well estimated by (18): initial model",
         "76",
-        count(0),
+        count(Curriculum, 0),
         "how many parameters are small depends on the robot",
     );
-    row("well estimated by (18): last iteration", "100", count(last), "");
+    row("well estimated by (18): last iteration", "100", count(Curriculum, last), "");
+    let others = || [Random, Greedy].into_iter().filter(|&arm| results.has(home, arm));
+    for arm in others() {
+        row(&format!("well estimated by (18): last iteration, {}", arm.name()), "", count(arm, last), "");
+    }
     let cond = |arm: Arm| results.records(home, arm, |record| record.condition_number);
     row("cond(Φ), median by iteration: curriculum", "falls, see figure 7", medians(&cond(Curriculum), 0), "");
     row("cond(Φ), median by iteration: random", "above it", medians(&cond(Random), 0), "");
+    if results.has(home, Greedy) {
+        row("cond(Φ), median by iteration: greedy", "", medians(&cond(Greedy), 0), "");
+    }
     let alpha = results.records(home, Curriculum, |record| Some(record.alpha));
     row(
         "α, median by iteration",
         "0.74, …, 0.3",
         medians(&alpha, 2),
-        "α_max by the share of motions; a such that the second α is 0.8 α_max, as cond has another scale here",
+        match results.settings.relaxation {
+            RelaxationName::Condition => {
+                "α_max by the share of motions; a such that the second α is 0.8 α_max, as cond has another scale here"
+            }
+            RelaxationName::Uncertainty => {
+                "α_max by the share of motions; then in proportion to how uncertain the torques of all motions are, the second α 0.8 α_max"
+            }
+        },
     );
     let motions = results.settings.dataset.len() as f64;
     let share = results.records(home, Curriculum, |record| Some(100.0 * record.allowed as f64 / motions));
     row("motions allowed, median by iteration [%]", "5, …", medians(&share, 0), "");
-    for (arm, paper) in [(Curriculum, "lowest, figure 8"), (TaskA, "higher"), (TaskB, "higher")] {
+    let torque = [(Curriculum, "lowest, figure 8"), (TaskA, "higher"), (TaskB, "higher")];
+    for (arm, paper) in torque.into_iter().chain(others().map(|arm| (arm, ""))) {
         let name = match arm {
             TaskA => format!("only “{}”", results.settings.tasks[0]),
             TaskB => format!("only “{}”", results.settings.tasks[1]),
-            _ => "curriculum".to_owned(),
+            _ => arm.name().to_owned(),
         };
         let series = results.scores(home, arm, |score| Some(score.rmse_torque));
         if results.has(home, arm) {

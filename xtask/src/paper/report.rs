@@ -110,7 +110,7 @@ pub fn page(results: &Results) -> String {
     let seeds = results.of(results.home(), Arm::Curriculum).count();
     page.say(&format!(
         "{} parameters, {} motions to choose from and {} held out ({}), {} on {}, noise of {} % of the torque limits, {} iterations, \
-         {seeds} seeds, initial model: {:?}; estimated by {:?}.",
+         {seeds} seeds, initial model: {:?}; estimated by {:?}, prior {:?}; α follows {:?}.",
         settings.parameters.len(),
         settings.dataset.len(),
         settings.held_out.len(),
@@ -121,6 +121,8 @@ pub fn page(results: &Results) -> String {
         settings.iterations,
         settings.initial,
         settings.estimator,
+        settings.prior,
+        settings.relaxation,
     ));
     if results.unfinished > 0 {
         page.say(&format!("{} runs are not done and left out.", results.unfinished));

@@ -1,6 +1,6 @@
 //! Everything that all runs share, and what of it decides their results.
 
-use super::arguments::{EstimatorName, Initial, RunArguments};
+use super::arguments::{EstimatorName, Initial, PriorName, RelaxationName, RunArguments};
 use super::motions::{Motions, Source};
 use super::run_file;
 use super::subject::{Subject, SubjectName};
@@ -12,8 +12,8 @@ use anyhow::{Context, ensure};
 use phiw::console::Console;
 use phiw_curriculum::{
     Candidates, ConditionRelaxation, Estimator, Evidence, Experiment, FeedForward, LeastSquares, Measured,
-    Motion, MotionDataset, MotionLikelihood, Robot, RobotModel, RowsAt, SimulatedRobot, WeightedLeastSquares,
-    ZmpConstraint,
+    Motion, MotionDataset, MotionLikelihood, Prior, Relaxation, Robot, RobotModel, RowsAt, SimulatedRobot,
+    UncertaintyRelaxation, WeightedLeastSquares, ZmpConstraint,
 };
 use phiw_dynamics::{PARAMETERS_PER_BODY, Workspace, World};
 use phiw_identification::{parameter_name, standard_unit};
@@ -41,8 +41,8 @@ pub struct Setup {
     pub candidates: Candidates,
     /// The constraint (12).
     pub constraint: ZmpConstraint,
-    /// Equation (20).
-    pub relaxation: ConditionRelaxation,
+    /// Equation (20), or what stands for it.
+    pub relaxation: Box<dyn Relaxation>,
     /// Motions to validate on.
     pub held_out: Vec<Motion>,
     /// R of [Φ f] of the validation motions, and their number of samples T.
@@ -68,6 +68,12 @@ pub struct Settings {
     pub tasks: [String; 2],
     /// How parameters are estimated.
     pub estimator: EstimatorName,
+    /// What the estimate falls back on.
+    #[serde(default)]
+    pub prior: PriorName,
+    /// What α follows.
+    #[serde(default)]
+    pub relaxation: RelaxationName,
     /// Torque noise over the torque limit.
     pub noise: f64,
     /// Iterations.
@@ -143,6 +149,13 @@ impl Setup {
         let dataset = MotionDataset::new(subject.tree.joint_count(), motions.identification)?;
         let weights = subject.row_weights(if arguments.noise > 0.0 { arguments.noise } else { SILENT });
         let candidates = Candidates::new(&robot, robot.declared(), &dataset, &weights)?;
+        // The paper's robot is excited well, and its method is the paper's.
+        let (prior, relaxation) = match subject.standing {
+            Some(_) => (PriorName::Initial, RelaxationName::Uncertainty),
+            None => (PriorName::None, RelaxationName::Condition),
+        };
+        let prior = arguments.prior.unwrap_or(prior);
+        let relaxation = arguments.relaxation.unwrap_or(relaxation);
         let settings = Settings {
             backend: format!("{:?}", arguments.backend).to_lowercase(),
             robot: arguments.robot,
@@ -169,6 +182,8 @@ impl Setup {
             held_out: motions.validation.iter().map(|motion| motion.name.clone()).collect(),
             tasks: motions.tasks,
             estimator: arguments.estimator,
+            prior,
+            relaxation,
             noise: arguments.noise,
             iterations: arguments.iterations,
             initial: arguments.initial,
@@ -178,7 +193,10 @@ impl Setup {
         };
         let mut setup = Setup {
             constraint: ZmpConstraint::new(subject.stance.clone()),
-            relaxation: ConditionRelaxation::default(),
+            relaxation: match relaxation {
+                RelaxationName::Condition => Box::new(ConditionRelaxation::default()),
+                RelaxationName::Uncertainty => Box::new(UncertaintyRelaxation::default()),
+            },
             validation: (Factor::empty(0), 0.0),
             held_out: motions.validation,
             settings,
@@ -227,8 +245,8 @@ impl Setup {
         }
     }
 
-    /// Who estimates.
-    pub fn estimator(&self) -> Box<dyn Estimator> {
+    /// Who estimates, in a run that begins with `initial`.
+    pub fn estimator(&self, initial: &RobotModel) -> Box<dyn Estimator> {
         match self.settings.estimator {
             EstimatorName::LeastSquares => Box::new(LeastSquares),
             EstimatorName::Weighted => Box::new(WeightedLeastSquares),
@@ -237,7 +255,11 @@ impl Setup {
                 let share = if self.settings.noise > 0.0 { self.settings.noise } else { SILENT };
                 let likelihood = MotionLikelihood::new(self.subject.torque_noise(share));
                 let standing_on = self.subject.standing.as_ref().map(Standing::foot_bodies);
-                Box::new(likelihood.standing_on(standing_on.unwrap_or_default()))
+                let likelihood = likelihood.standing_on(standing_on.unwrap_or_default());
+                Box::new(match self.settings.prior {
+                    PriorName::None => likelihood,
+                    PriorName::Initial => likelihood.believing(Prior::unreliable(initial.clone())),
+                })
             }
         }
     }

@@ -28,7 +28,7 @@ pub fn write(results: &Results, out: &Path) -> anyhow::Result<()> {
 /// One row for each run and iteration; iteration 0 is the initial model.
 fn iterations(results: &Results) -> String {
     let mut text = String::from(
-        "footing,arm,secret,found,seed,iteration,motion,alpha,allowed,forced,margin_m,predicted_cond,cond,torque_change,fell_at_s,still_share,tracking_rms_rad,rmse_w,\
+        "footing,arm,secret,found,seed,iteration,motion,alpha,allowed,forced,margin_m,predicted_cond,cond,torque_uncertainty,torque_change,fell_at_s,still_share,tracking_rms_rad,rmse_w,\
          rmse_w_least_squares,rmse_w_weighted,rmse_torque_nm,would_have_ended\n",
     );
     for run in &results.runs {
@@ -41,14 +41,14 @@ fn iterations(results: &Results) -> String {
             let (footing, arm, seed) = (run.footing.name(), run.arm.name(), run.run.seed);
             let _ = write!(text, "{footing},{arm},{secret},{found},{seed},{iteration},");
             match record {
-                None => text.push_str(",,,,,,,,,,,"),
+                None => text.push_str(",,,,,,,,,,,,"),
                 Some(record) => {
                     let tracking = &record.tracking_error;
                     let mean = tracking.iter().map(|error| error * error).sum::<f64>()
                         / tracking.len().max(1) as f64;
                     let _ = write!(
                         text,
-                        "{},{},{},{},{},{},{},{},{},{},{},",
+                        "{},{},{},{},{},{},{},{},{},{},{},{},",
                         record.motion,
                         record.alpha,
                         record.allowed,
@@ -56,6 +56,7 @@ fn iterations(results: &Results) -> String {
                         cell(record.margin_m),
                         cell(record.choice.merit),
                         cell(record.condition_number),
+                        cell(record.torque_uncertainty),
                         cell(record.torque_change),
                         cell(record.fell_at_s),
                         record.still_share,

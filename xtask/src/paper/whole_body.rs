@@ -13,7 +13,7 @@ use pelvis::PelvisMotion;
 use phiw_curriculum::standing::{
     Feet, StandingFeedForward, StandingRobot, VIRTUAL_JOINTS, WrenchNoise, with_virtual_base,
 };
-use phiw_curriculum::{Motion, Robot};
+use phiw_curriculum::{Motion, Robot, SimulatedRobot};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{BackendError, DynamicsBackend, Foot, PARAMETERS_PER_BODY, Tree, World};
 use phiw_identification::EffectSpec;
@@ -232,10 +232,9 @@ impl Subject {
         effects: Vec<Effect>,
     ) -> StandingRobot {
         let silent = WrenchNoise { force_n: 0.0, moment_nm: 0.0 };
-        StandingRobot {
+        let plant = SimulatedRobot {
             tree: self.floating.clone(),
             world: self.floor(),
-            feet: standing.feet.clone(),
             effects,
             controller: Box::new(StandingFeedForward {
                 gains: self.gains.clone(),
@@ -243,7 +242,6 @@ impl Subject {
                 stance: standing.stance.clone(),
             }),
             actuator_noise: noise,
-            wrench_noise: if noise > 0.0 { WRENCH_NOISE } else { silent },
             timing: Timing {
                 control_period_s: CONTROL_PERIOD_S,
                 longest_step_s: LONGEST_STEP_S,
@@ -251,7 +249,9 @@ impl Subject {
             },
             fall_tilt_rad: 0.3,
             build: Box::new(move |tree, world| build(backend, tree, world)),
-        }
+        };
+        let wrench_noise = if noise > 0.0 { WRENCH_NOISE } else { silent };
+        StandingRobot { plant, feet: standing.feet.clone(), wrench_noise }
     }
 }
 

@@ -104,6 +104,8 @@ fn arguments(backend: Engine, out: &Path) -> RunArguments {
         footing: vec![Footing::Fixed],
         secret: vec![SECRET],
         estimator: EstimatorName::Likelihood,
+        prior: None,
+        relaxation: None,
         noise: NOISE,
         iterations: ITERATIONS,
         initial: Initial::Each,

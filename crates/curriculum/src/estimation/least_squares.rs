@@ -99,8 +99,11 @@ impl Determined {
 
 /// Values of the kept parameters among the present ones.
 fn spread(kept: &[usize], present: &[f64], parameters: &[f64], deviations: &[f64]) -> Estimate {
-    let mut estimate =
-        Estimate { parameters: present.to_vec(), standard_deviations: vec![f64::NAN; present.len()] };
+    let mut estimate = Estimate {
+        parameters: present.to_vec(),
+        standard_deviations: vec![f64::NAN; present.len()],
+        covariance: None,
+    };
     for ((&parameter, value), deviation) in kept.iter().zip(parameters).zip(deviations) {
         estimate.parameters[parameter] = *value;
         estimate.standard_deviations[parameter] = *deviation;

@@ -1,5 +1,6 @@
 //! Maximum likelihood where the noise moves the robot.
 
+use super::prior::{Prior, with_prior};
 use super::sensitivity::{Sensitivity, cholesky, packed, place};
 use super::{Estimate, Estimator, Evidence};
 use crate::robot::spheres;
@@ -38,6 +39,9 @@ pub struct MotionLikelihood {
     /// J over the directions that are left, Nᵀ·J·N. (What the floor gives is measured and on the right-hand side; its share of |∂δ/∂(q̈, f)| does not
     /// depend on w.)
     pub standing_on: Vec<usize>,
+    /// What was believed before anything was measured; −log L then has its square too. None in the paper: right where all parameters are well
+    /// excited.
+    pub prior: Option<Prior>,
     /// Newton steps at most.
     pub most_steps: usize,
     /// The last step's length in standard deviations of the parameters (all together) at which the minimum counts as found.
@@ -47,12 +51,46 @@ pub struct MotionLikelihood {
 impl MotionLikelihood {
     /// For torques with this noise \[N·m, N\].
     pub fn new(torque_noise: Vec<f64>) -> Self {
-        MotionLikelihood { torque_noise, standing_on: Vec::new(), most_steps: 40, settled: 0.05 }
+        MotionLikelihood { torque_noise, standing_on: Vec::new(), prior: None, most_steps: 40, settled: 0.05 }
     }
 
     /// The same for a robot on which these bodies do not move.
     pub fn standing_on(self, bodies: Vec<usize>) -> Self {
         MotionLikelihood { standing_on: bodies, ..self }
+    }
+
+    /// The same with a belief from before anything was measured.
+    pub fn believing(self, prior: Prior) -> Self {
+        MotionLikelihood { prior: Some(prior), ..self }
+    }
+
+    fn problem(&self, design: &Design, evidence: &Evidence) -> Result<Problem, CurriculumError> {
+        check_size(
+            "standard deviations of the torques' noise",
+            self.torque_noise.len(),
+            design.rows().len(),
+        )?;
+        if let Some(&value) = self.torque_noise.iter().find(|noise| !(noise.is_finite() && **noise > 0.0)) {
+            return Err(CurriculumError::Value {
+                what: "the noise of a torque",
+                value,
+                must_be: "finite and > 0",
+            });
+        }
+        let mut precision: Vec<f64> = self.torque_noise.iter().map(|noise| noise.powi(-2)).collect();
+        let sensitivities: Result<Vec<Sensitivity>, CurriculumError> = evidence
+            .instants()
+            .iter()
+            .map(|instant| Sensitivity::of(design, instant, &self.standing_on))
+            .collect();
+        let factor = match &self.prior {
+            Some(prior) => {
+                precision.push(1.0);
+                with_prior(evidence.factor(), prior.group(design)?)?
+            }
+            None => evidence.factor().clone(),
+        };
+        Ok(Problem::new(factor, sensitivities?, precision))
     }
 }
 
@@ -68,25 +106,7 @@ impl Estimator for MotionLikelihood {
         present: &RobotModel,
         present_parameters: &[f64],
     ) -> Result<Estimate, CurriculumError> {
-        check_size(
-            "standard deviations of the torques' noise",
-            self.torque_noise.len(),
-            design.rows().len(),
-        )?;
-        if let Some(&value) = self.torque_noise.iter().find(|noise| !(noise.is_finite() && **noise > 0.0)) {
-            return Err(CurriculumError::Value {
-                what: "the noise of a torque",
-                value,
-                must_be: "finite and > 0",
-            });
-        }
-        let precision: Vec<f64> = self.torque_noise.iter().map(|noise| noise.powi(-2)).collect();
-        let sensitivities: Result<Vec<Sensitivity>, CurriculumError> = evidence
-            .instants()
-            .iter()
-            .map(|instant| Sensitivity::of(design, instant, &self.standing_on))
-            .collect();
-        let problem = Problem::new(evidence.factor(), sensitivities?, precision);
+        let problem = self.problem(design, evidence)?;
         let mut w = column(present_parameters);
         if problem.log_determinants(&w).is_none() {
             // Random parameters are no bodies; spheres of the same mass at the same place are.
@@ -112,14 +132,18 @@ impl Estimator for MotionLikelihood {
                 break;
             }
         }
-        let standard_deviations = match problem.hessian(&curvature).llt(Side::Lower) {
-            Ok(factor) => {
-                let covariance = factor.solve(Mat::<f64>::identity(w.nrows(), w.nrows()));
-                (0..w.nrows()).map(|k| covariance[(k, k)].max(0.0).sqrt()).collect()
-            }
-            Err(_) => vec![f64::NAN; w.nrows()],
-        };
-        Ok(Estimate { parameters: (0..w.nrows()).map(|k| w[(k, 0)]).collect(), standard_deviations })
+        let covariance = problem
+            .hessian(&curvature)
+            .llt(Side::Lower)
+            .ok()
+            .map(|factor| factor.solve(Mat::<f64>::identity(w.nrows(), w.nrows())));
+        let deviation =
+            |k: usize| covariance.as_ref().map_or(f64::NAN, |covariance| covariance[(k, k)].max(0.0).sqrt());
+        Ok(Estimate {
+            parameters: (0..w.nrows()).map(|k| w[(k, 0)]).collect(),
+            standard_deviations: (0..w.nrows()).map(deviation).collect(),
+            covariance,
+        })
     }
 
     fn misfit(
@@ -128,18 +152,7 @@ impl Estimator for MotionLikelihood {
         evidence: &Evidence,
         parameters: &[f64],
     ) -> Result<Option<f64>, CurriculumError> {
-        check_size(
-            "standard deviations of the torques' noise",
-            self.torque_noise.len(),
-            design.rows().len(),
-        )?;
-        let precision: Vec<f64> = self.torque_noise.iter().map(|noise| noise.powi(-2)).collect();
-        let sensitivities: Result<Vec<Sensitivity>, CurriculumError> = evidence
-            .instants()
-            .iter()
-            .map(|instant| Sensitivity::of(design, instant, &self.standing_on))
-            .collect();
-        Ok(Some(Problem::new(evidence.factor(), sensitivities?, precision).cost(&column(parameters))))
+        Ok(Some(self.problem(design, evidence)?.cost(&column(parameters))))
     }
 }
 
@@ -148,8 +161,8 @@ fn column(values: &[f64]) -> Mat<f64> {
 }
 
 /// −log L and its derivatives.
-struct Problem<'a> {
-    factor: &'a GroupedFactor,
+struct Problem {
+    factor: GroupedFactor,
     /// RᵀR of each torque over all parameters: for steps only, so half the digits are enough.
     grams: Vec<Mat<f64>>,
     sensitivities: Vec<Sensitivity>,
@@ -159,8 +172,8 @@ struct Problem<'a> {
     precision: Vec<f64>,
 }
 
-impl<'a> Problem<'a> {
-    fn new(factor: &'a GroupedFactor, sensitivities: Vec<Sensitivity>, precision: Vec<f64>) -> Self {
+impl Problem {
+    fn new(factor: GroupedFactor, sensitivities: Vec<Sensitivity>, precision: Vec<f64>) -> Self {
         let gram = |group: &phiw_regressor::least_squares::Group| {
             let size = group.factor.parameters();
             let r = group.factor.as_mat().get(..size, ..size);

@@ -3,14 +3,18 @@
 mod evidence;
 mod least_squares;
 mod likelihood;
+mod prior;
 mod sensitivity;
 mod stored;
 
 pub use evidence::{Evidence, Instant, RowsAt};
 pub use least_squares::{LeastSquares, WeightedLeastSquares};
 pub use likelihood::MotionLikelihood;
+pub use prior::Prior;
 
+use crate::triangle::Triangle;
 use crate::{CurriculumError, RobotModel};
+use faer::Mat;
 use phiw_identification::Design;
 
 /// Estimated parameters.
@@ -20,6 +24,24 @@ pub struct Estimate {
     pub parameters: Vec<f64>,
     /// Standard deviation of each, as the estimator sees it; NaN where it does not know.
     pub standard_deviations: Vec<f64>,
+    /// Their covariance; none from an estimator that does not know it.
+    pub covariance: Option<Mat<f64>>,
+}
+
+impl Estimate {
+    /// √(tr(R·C·Rᵀ)/rows): RMS of the standard deviation of Φ·w over the `rows` rows that the triangle R stands for. Directions of w that these rows do
+    /// not feel do not count, however little is known of them.
+    pub(crate) fn uncertainty_along(&self, triangle: &Triangle, rows: usize) -> Option<f64> {
+        let covariance =
+            self.covariance.as_ref().filter(|covariance| covariance.nrows() == triangle.size())?;
+        let size = triangle.size();
+        let r =
+            Mat::from_fn(size, size, |row, column| triangle.column(column).get(row).copied().unwrap_or(0.0));
+        let spread = &r * covariance;
+        let trace: f64 =
+            (0..size).map(|row| (row..size).map(|k| spread[(row, k)] * r[(row, k)]).sum::<f64>()).sum();
+        Some((trace.max(0.0) / rows.max(1) as f64).sqrt()).filter(|uncertainty| uncertainty.is_finite())
+    }
 }
 
 /// Estimates parameters from all that has been measured.

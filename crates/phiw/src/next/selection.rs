@@ -64,6 +64,7 @@ pub fn choose(
                     first_alpha,
                     first_condition_number: stack(&measured.first)?.condition_number(),
                     condition_number,
+                    torque_uncertainty: None,
                 }),
                 _ => first_alpha,
             })

@@ -1,5 +1,6 @@
 //! Motion of a pelvis over feet that stay: synthetic, from a name.
 
+use phiw_plant::FadedSines;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sha2::{Digest, Sha256};
@@ -12,8 +13,6 @@ const CALMEST: f64 = 0.25;
 /// Sines of each axis, and their highest frequency \[Hz\].
 const SINES: usize = 4;
 const HIGHEST_HZ: f64 = 1.0;
-/// Time in which it fades in and out \[s\].
-const FADE_S: f64 = 1.5;
 /// The axis that only goes down: above the stance the knees would be straight.
 const DOWN: usize = 2;
 
@@ -21,10 +20,8 @@ const DOWN: usize = 2;
 #[derive(Clone, Debug, PartialEq)]
 pub struct PelvisMotion {
     duration_s: f64,
-    /// Amplitude, angular frequency \[rad/s\] and phase \[rad\] of each sine of each axis.
-    terms: [[[f64; 3]; SINES]; 6],
-    /// What is added to the sines of each axis.
-    shift: [f64; 6],
+    /// Against the stance, along and about each axis.
+    axes: [FadedSines; 6],
 }
 
 impl PelvisMotion {
@@ -33,64 +30,41 @@ impl PelvisMotion {
         let digest = Sha256::digest(name.as_bytes());
         let mut random = ChaCha8Rng::from_seed(digest.into());
         let vigour = random.random_range(CALMEST..1.0);
-        let mut motion = PelvisMotion { duration_s, terms: [[[0.0; 3]; SINES]; 6], shift: [0.0; 6] };
-        for (axis, terms) in motion.terms.iter_mut().enumerate() {
-            for (number, term) in terms.iter_mut().enumerate() {
-                let share = (number as f64 + random.random_range(0.6..1.4)) / SINES as f64;
-                let amplitude = random.random_range(0.4..1.0) / (number as f64 + 1.0);
-                *term = [amplitude, TAU * HIGHEST_HZ * share, random.random_range(0.0..TAU)];
-            }
+        let axes = std::array::from_fn(|axis| {
+            let mut terms: Vec<[f64; 3]> = (0..SINES)
+                .map(|number| {
+                    let share = (number as f64 + random.random_range(0.6..1.4)) / SINES as f64;
+                    let amplitude = random.random_range(0.4..1.0) / (number as f64 + 1.0);
+                    [amplitude, TAU * HIGHEST_HZ * share, random.random_range(0.0..TAU)]
+                })
+                .collect();
             // No sum is larger than that of its amplitudes.
             let largest: f64 = terms.iter().map(|term| term[0]).sum();
             let reach = if axis == DOWN { 0.5 * REACH[axis] } else { REACH[axis] };
             terms.iter_mut().for_each(|term| term[0] *= vigour * reach / largest);
-            motion.shift[axis] = if axis == DOWN { -vigour * reach } else { 0.0 };
-        }
-        motion
+            let shift = if axis == DOWN { -vigour * reach } else { 0.0 };
+            FadedSines { center: 0.0, shift, terms }
+        });
+        PelvisMotion { duration_s, axes }
     }
 
     /// The same, larger or smaller.
     pub fn times(mut self, share: f64) -> Self {
-        self.terms.iter_mut().flatten().for_each(|term| term[0] *= share);
-        self.shift.iter_mut().for_each(|shift| *shift *= share);
+        for axis in &mut self.axes {
+            axis.terms.iter_mut().for_each(|term| term[0] *= share);
+            axis.shift *= share;
+        }
         self
     }
 
     /// Place, velocity and acceleration against the stance along all axes.
     pub fn at(&self, t_s: f64) -> [[f64; 6]; 3] {
-        let [w, dw, ddw] = window(t_s, self.duration_s);
         let mut moved = [[0.0; 6]; 3];
-        for (axis, terms) in self.terms.iter().enumerate() {
-            let [mut s, mut ds, mut dds] = [self.shift[axis], 0.0, 0.0];
-            for [amplitude, frequency, phase] in terms {
-                let (sine, cosine) = (frequency * t_s + phase).sin_cos();
-                s += amplitude * sine;
-                ds += amplitude * frequency * cosine;
-                dds -= amplitude * frequency * frequency * sine;
-            }
-            moved[0][axis] = w * s;
-            moved[1][axis] = dw * s + w * ds;
-            moved[2][axis] = ddw * s + 2.0 * dw * ds + w * dds;
+        for (axis, sines) in self.axes.iter().enumerate() {
+            let state = sines.at(t_s, self.duration_s);
+            moved.iter_mut().zip(state).for_each(|(moved, value)| moved[axis] = value);
         }
         moved
-    }
-}
-
-/// Rises from 0 to 1 and falls at the end, with two derivatives.
-fn window(t_s: f64, duration_s: f64) -> [f64; 3] {
-    let fade = FADE_S.min(0.5 * duration_s);
-    let rise = |t: f64| {
-        let x = (t / fade).clamp(0.0, 1.0);
-        let value = x.powi(4) * (35.0 + x * (-84.0 + x * (70.0 - 20.0 * x)));
-        let slope = 140.0 * (x * (1.0 - x)).powi(3);
-        let curvature = 420.0 * (x * (1.0 - x)).powi(2) * (1.0 - 2.0 * x);
-        [value, slope / fade, curvature / (fade * fade)]
-    };
-    if t_s <= 0.5 * duration_s {
-        rise(t_s)
-    } else {
-        let [w, dw, ddw] = rise(duration_s - t_s);
-        [w, -dw, ddw]
     }
 }
 
