@@ -5,8 +5,8 @@
 
 use super::curriculum_page;
 use crate::paper::{
-    Arm, Engine, EstimatorName, Footing, Initial, Job, RunArguments, RunFile, SecretKind, Setup, Source,
-    Subject, SubjectName, do_all,
+    Arm, Detector, Engine, EstimatorName, Footing, Initial, Job, RunArguments, RunFile, SecretKind, Setup,
+    Source, Subject, SubjectName, do_all,
 };
 use anyhow::Context;
 use phiw::console::Console;
@@ -103,6 +103,8 @@ fn arguments(backend: Engine, out: &Path) -> RunArguments {
         arm: vec![Arm::Curriculum, Arm::Closed],
         footing: vec![Footing::Fixed],
         secret: vec![SECRET],
+        control: 0,
+        detector: Detector::Score,
         estimator: EstimatorName::Likelihood,
         noise: NOISE,
         iterations: ITERATIONS,

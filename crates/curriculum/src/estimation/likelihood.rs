@@ -81,12 +81,8 @@ impl Estimator for MotionLikelihood {
             });
         }
         let precision: Vec<f64> = self.torque_noise.iter().map(|noise| noise.powi(-2)).collect();
-        let sensitivities: Result<Vec<Sensitivity>, CurriculumError> = evidence
-            .instants()
-            .iter()
-            .map(|instant| Sensitivity::of(design, instant, &self.standing_on))
-            .collect();
-        let problem = Problem::new(evidence.factor(), sensitivities?, precision);
+        let sensitivities = Sensitivity::all(design, evidence, &self.standing_on)?;
+        let problem = Problem::new(evidence.factor(), sensitivities, precision);
         let mut w = column(present_parameters);
         if problem.log_determinants(&w).is_none() {
             // Random parameters are no bodies; spheres of the same mass at the same place are.
@@ -134,21 +130,17 @@ impl Estimator for MotionLikelihood {
             design.rows().len(),
         )?;
         let precision: Vec<f64> = self.torque_noise.iter().map(|noise| noise.powi(-2)).collect();
-        let sensitivities: Result<Vec<Sensitivity>, CurriculumError> = evidence
-            .instants()
-            .iter()
-            .map(|instant| Sensitivity::of(design, instant, &self.standing_on))
-            .collect();
-        Ok(Some(Problem::new(evidence.factor(), sensitivities?, precision).cost(&column(parameters))))
+        let sensitivities = Sensitivity::all(design, evidence, &self.standing_on)?;
+        Ok(Some(Problem::new(evidence.factor(), sensitivities, precision).cost(&column(parameters))))
     }
 }
 
-fn column(values: &[f64]) -> Mat<f64> {
+pub(super) fn column(values: &[f64]) -> Mat<f64> {
     Mat::from_fn(values.len(), 1, |row, _| values[row])
 }
 
 /// −log L and its derivatives.
-struct Problem<'a> {
+pub(super) struct Problem<'a> {
     factor: &'a GroupedFactor,
     /// RᵀR of each torque over all parameters: for steps only, so half the digits are enough.
     grams: Vec<Mat<f64>>,
@@ -160,7 +152,11 @@ struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    fn new(factor: &'a GroupedFactor, sensitivities: Vec<Sensitivity>, precision: Vec<f64>) -> Self {
+    pub(super) fn new(
+        factor: &'a GroupedFactor,
+        sensitivities: Vec<Sensitivity>,
+        precision: Vec<f64>,
+    ) -> Self {
         let gram = |group: &phiw_regressor::least_squares::Group| {
             let size = group.factor.parameters();
             let r = group.factor.as_mat().get(..size, ..size);
@@ -210,7 +206,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The gradient, and Cholesky's factors of all J.
-    fn gradient(&self, w: &Mat<f64>) -> (Mat<f64>, Vec<Vec<f64>>) {
+    pub(super) fn gradient(&self, w: &Mat<f64>) -> (Mat<f64>, Vec<Vec<f64>>) {
         let mut gradient = Mat::zeros(w.nrows(), 1);
         for (index, group) in self.factor.groups().iter().enumerate() {
             let size = group.factor.parameters();
@@ -232,7 +228,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Σ weight·tr(J⁻¹ J_k J⁻¹ J_l).
-    fn log_determinant_curvature(&self, factors: &[Vec<f64>]) -> Mat<f64> {
+    pub(super) fn log_determinant_curvature(&self, factors: &[Vec<f64>]) -> Mat<f64> {
         let parameters = self.factor.parameter_count();
         let mut curvature = Mat::zeros(parameters, parameters);
         // A part of the instants is enough for a step's length; all of them count in the gradient.
@@ -258,7 +254,7 @@ impl<'a> Problem<'a> {
         curvature
     }
 
-    fn hessian(&self, curvature: &Mat<f64>) -> Mat<f64> {
+    pub(super) fn hessian(&self, curvature: &Mat<f64>) -> Mat<f64> {
         let mut hessian = curvature.clone();
         for ((group, gram), precision) in self.factor.groups().iter().zip(&self.grams).zip(&self.precision) {
             for (column, &right) in group.parameters.iter().enumerate() {
@@ -292,7 +288,7 @@ impl<'a> Problem<'a> {
 }
 
 /// The inverse from Cholesky's factor, packed with √2 beside the diagonal.
-fn packed_inverse(n: usize, lower: &[f64]) -> Mat<f64> {
+pub(super) fn packed_inverse(n: usize, lower: &[f64]) -> Mat<f64> {
     let mut inverse = Mat::zeros(packed(n), 1);
     let mut unit = vec![0.0; n];
     for index in 0..n {
@@ -321,7 +317,7 @@ fn solve_lower(n: usize, lower: &[f64], x: &mut [f64]) {
 }
 
 /// S → L⁻¹ S L⁻ᵀ, packed, in place.
-fn reduce(n: usize, lower: &[f64], column: &mut [f64]) {
+pub(super) fn reduce(n: usize, lower: &[f64], column: &mut [f64]) {
     let mut full = vec![0.0; n * n];
     for row in 0..n {
         for col in 0..=row {

@@ -1,14 +1,17 @@
 //! From what was measured to parameters: equation (4), and estimators that know where the noise comes from.
 
 mod evidence;
+mod foresight;
 mod least_squares;
 mod likelihood;
+mod score;
 mod sensitivity;
 mod stored;
 
 pub use evidence::{Evidence, Instant, RowsAt};
 pub use least_squares::{LeastSquares, WeightedLeastSquares};
 pub use likelihood::MotionLikelihood;
+pub use score::Gain;
 
 use crate::{CurriculumError, RobotModel};
 use phiw_identification::Design;

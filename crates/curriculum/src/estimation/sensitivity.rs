@@ -1,6 +1,6 @@
 //! How a noise in the torque moves the robot, as a linear function of the parameters.
 
-use super::Instant;
+use super::{Evidence, Instant};
 use crate::CurriculumError;
 use crate::standing::free_directions;
 use faer::Mat;
@@ -38,7 +38,13 @@ pub(super) fn place(row: usize, column: usize) -> usize {
 
 impl Sensitivity {
     /// By evaluating the design's columns around the instant: exact in the acceleration, in which they are linear. `standing` bodies do not move.
-    pub fn of(design: &Design, instant: &Instant, standing: &[usize]) -> Result<Self, CurriculumError> {
+    /// Columns that `foreseen` has are of the period's beginning, and do not move with its noise.
+    pub fn of(
+        design: &Design,
+        instant: &Instant,
+        standing: &[usize],
+        foreseen: impl Fn(usize) -> bool,
+    ) -> Result<Self, CurriculumError> {
         let directions = match standing {
             [] => Mat::identity(instant.state[0].len(), instant.state[0].len()),
             bodies => free_directions(design.tree(), bodies, &instant.state[0])?,
@@ -57,7 +63,9 @@ impl Sensitivity {
         let mut packed_columns = Mat::zeros(packed(n), design.parameter_count());
         let half_period = 0.5 * instant.period_s;
         for (torque, layout) in design.rows().iter().enumerate() {
-            for (column, &parameter) in layout.parameters.iter().enumerate() {
+            let columns =
+                layout.parameters.iter().enumerate().filter(|(_, parameter)| !foreseen(**parameter));
+            for (column, &parameter) in columns {
                 let at = layout.range.start + column;
                 for moved in 0..n {
                     let by_acceleration = rows[1 + moved][at] - rows[0][at];
@@ -74,6 +82,16 @@ impl Sensitivity {
             }
         }
         Ok(Sensitivity { weight: instant.weight, directions: n, packed: packed_columns })
+    }
+
+    /// Those of all instants.
+    pub fn all(
+        design: &Design,
+        evidence: &Evidence,
+        standing: &[usize],
+    ) -> Result<Vec<Self>, CurriculumError> {
+        let foreseen = |parameter: usize| evidence.is_foreseen(parameter);
+        evidence.instants().iter().map(|instant| Self::of(design, instant, standing, foreseen)).collect()
     }
 }
 
