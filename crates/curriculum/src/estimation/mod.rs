@@ -4,6 +4,7 @@ mod evidence;
 mod foresight;
 mod least_squares;
 mod likelihood;
+mod response;
 mod score;
 mod sensitivity;
 mod stored;

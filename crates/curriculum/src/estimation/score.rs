@@ -5,7 +5,8 @@
 //! degrees of freedom as θ has. All that it asks of a candidate are its products with what the model leaves, with the model's columns and with itself.
 
 use super::foresight;
-use super::likelihood::{Problem, column, packed_inverse, reduce};
+use super::likelihood::{Problem, column};
+use super::response::Response;
 use super::sensitivity::Sensitivity;
 use super::{Evidence, MotionLikelihood, RowsAt};
 use crate::{CurriculumError, Measured, Robot, RobotModel};
@@ -69,11 +70,11 @@ impl MotionLikelihood {
         let problem = Problem::new(evidence.factor(), sensitivities, precision.clone());
         let w = model.parameters(robot)?;
         let nothing = || Ok(vec![None; candidates.len()]);
-        let (gradient, factors) = problem.gradient(&column(&w));
-        if factors.iter().any(Vec::is_empty) {
+        let (gradient, responses) = problem.gradient(&column(&w));
+        if responses.iter().any(Option::is_none) {
             return nothing();
         }
-        let hessian = problem.hessian(&problem.log_determinant_curvature(&factors));
+        let hessian = problem.hessian(&problem.log_determinant_curvature(&responses));
         let Ok(own) = hessian.llt(Side::Lower) else { return nothing() };
 
         let design = robot.design_beside(model, candidates)?;
@@ -86,7 +87,7 @@ impl MotionLikelihood {
             })?;
             score.flush();
         }
-        self.add_determinants(robot, model, candidates, &foreseen, &evidence, &factors, &mut score)?;
+        self.add_determinants(robot, model, candidates, &foreseen, &evidence, &responses, &mut score)?;
         let ahead = looking_ahead(&design, logs)?;
 
         let (mut own_score, mut cross) = (gradient, std::mem::replace(&mut score.cross, Mat::zeros(0, 0)));
@@ -126,7 +127,7 @@ impl MotionLikelihood {
         candidates: &[EffectSpec],
         foreseen: &[bool],
         evidence: &Evidence,
-        factors: &[Vec<f64>],
+        responses: &[Option<Response>],
         score: &mut Score<'_>,
     ) -> Result<(), CurriculumError> {
         let moves = |index: &usize| score.range(*index).any(|parameter| !foreseen[score.present + parameter]);
@@ -143,28 +144,23 @@ impl MotionLikelihood {
         };
         let present = score.present;
         let mut curvature = Mat::zeros(design.parameter_count(), places.len());
-        let instants = || evidence.instants().iter().zip(factors).enumerate();
+        let instants = || evidence.instants().iter().zip(responses).enumerate();
         let all: f64 = instants().map(|(_, (instant, _))| instant.weight).sum();
         let part: f64 =
             instants().skip(EVERY / 2).step_by(EVERY).map(|(_, (instant, _))| instant.weight).sum();
-        for (index, (instant, lower)) in instants() {
+        for (index, (instant, response)) in instants() {
+            let Some(response) = response else { continue };
             let sensitivity = Sensitivity::of(&design, instant, &self.standing_on, still)?;
-            let (n, weight) = (sensitivity.directions, sensitivity.weight);
-            let mut packed = sensitivity.packed;
-            let slopes = packed.get(.., present..).transpose() * packed_inverse(n, lower);
+            let slopes = response.gradient(&sensitivity, present);
             for (place, &parameter) in places.iter().enumerate() {
-                score.gradient[parameter] -= weight * slopes[(place, 0)];
+                score.gradient[parameter] -= sensitivity.weight * slopes[(place, 0)];
             }
             // A part of the instants is enough for a curvature, which is the dearest part.
-            if index % EVERY != EVERY / 2 {
-                continue;
+            if index % EVERY == EVERY / 2 {
+                let (reduced, weight) = (response.reduced(&sensitivity), sensitivity.weight * all / part);
+                let added = reduced.get(.., present..);
+                matmul(&mut curvature, Accum::Add, reduced.transpose(), added, weight, Par::Seq);
             }
-            let weight = weight * all / part;
-            for parameter in (0..design.parameter_count()).filter(|&parameter| !still(parameter)) {
-                reduce(n, lower, packed.col_as_slice_mut(parameter));
-            }
-            let added = packed.get(.., present..);
-            matmul(&mut curvature, Accum::Add, packed.transpose(), added, weight, Par::Seq);
         }
         let mut start = 0;
         for &index in &moving {
