@@ -40,7 +40,7 @@ impl Setup {
         let name = |effect: &EffectSpec| format!("{}[{}]", effect.kind, effect.joints.join("+"));
         Ok(Some(Detection {
             secret: own.first().map(|gain| gain.gain),
-            other: others.first().map(|other| (name(&other.effect), other.gain, other.merit())),
+            other: others.first().map(|other| (name(&other.effect), other.gain, other.merit)),
         }))
     }
 }

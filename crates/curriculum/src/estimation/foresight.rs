@@ -20,6 +20,10 @@ const REACH: [f64; 2] = [1.0, 5.0];
 const MOMENTS: [f64; 4] = [0.0, 0.7, 1.9, 4.1];
 /// Largest position of a joint without limits \[rad, m\].
 const TURN: f64 = std::f64::consts::PI;
+/// A motion on which columns are tried that may look ahead: the row that is looked at, and all rows; time between them \[s\], and how it swings.
+const LOOKED_AT: [usize; 2] = [20, 40];
+const PERIOD_S: f64 = 0.01;
+const SWING_RAD_PER_S: f64 = 5.0;
 /// What rounding leaves of a sum, over its terms.
 const ROUNDING: f64 = 1e-9;
 
@@ -64,10 +68,56 @@ pub(super) fn foreseen(design: &Design) -> Result<Vec<bool>, CurriculumError> {
             }
         }
     }
+    // What looks ahead can not be foreseen: a delay's rate of change has the noise of the next period in it, whenever it is taken.
+    let ahead = looking_ahead(design)?;
     for parameter in rigid..foreseen.len() {
-        foreseen[parameter] = !(moving[parameter] && linear[parameter]);
+        foreseen[parameter] = !(moving[parameter] && linear[parameter] || ahead[parameter]);
     }
     Ok(foreseen)
+}
+
+/// For each parameter, whether its columns of a row change with what comes after the row.
+///
+/// # Errors
+/// None that a design can cause.
+pub(super) fn looking_ahead(design: &Design) -> Result<Vec<bool>, CurriculumError> {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let (middle, [[speed, _], _]) = state(design, &mut random);
+    let joints = middle.len();
+    let [looked, rows] = LOOKED_AT;
+    // Swings about one posture.
+    let at = |index: usize| (index % joints, SWING_RAD_PER_S * PERIOD_S * (index / joints) as f64);
+    let signal = |value: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
+        (0..rows * joints).map(at).map(|(joint, phase)| value(joint, phase)).collect()
+    };
+    let signals = [
+        signal(&|joint, phase| middle[joint] + speed[joint] / SWING_RAD_PER_S * phase.sin()),
+        signal(&|joint, phase| speed[joint] * phase.cos()),
+        signal(&|joint, phase| -speed[joint] * SWING_RAD_PER_S * phase.sin()),
+    ];
+    let torque = signal(&|joint, phase| (phase + joint as f64).sin());
+    let mut evaluated = Vec::with_capacity(2);
+    for length in [looked + 1, rows] {
+        let count = length * joints;
+        let t = (0..length).map(|row| PERIOD_S * row as f64).collect();
+        let signals = signals.each_ref().map(|signal| signal[..count].to_vec());
+        let mut block = Block::unfiltered(joints, t, signals, torque[..count].to_vec());
+        design.correct(&mut block);
+        let (mut scratch, mut row) = (design.scratch(), vec![0.0; design.evaluation_width()]);
+        scratch.begin(&block)?;
+        for sample in 0..=looked {
+            scratch.evaluate(&block, sample, &mut row)?;
+        }
+        evaluated.push(row);
+    }
+    let mut ahead = vec![false; design.parameter_count()];
+    for layout in design.rows() {
+        for (column, &parameter) in layout.parameters.iter().enumerate() {
+            let [one, other] = [0, 1].map(|which: usize| evaluated[which][layout.range.start + column]);
+            ahead[parameter] |= (one - other).abs() > ROUNDING * one.abs().max(other.abs());
+        }
+    }
+    Ok(ahead)
 }
 
 /// Positions within the limits, and twice velocities and accelerations.

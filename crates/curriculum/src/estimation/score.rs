@@ -14,7 +14,6 @@ use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, Mat, Par, Side};
 use phiw_identification::{Design, EffectSpec, RowLayout};
-use phiw_telemetry::Block;
 use std::ops::Range;
 
 /// What an effect beside the model would save.
@@ -26,17 +25,13 @@ pub struct Gain {
     pub gain: f64,
     /// What its parameters would be.
     pub parameters: Vec<f64>,
+    /// What it saves less the price of its parameters; where constants were chosen, the mean over all of them (as likelihoods, not as logarithms), so
+    /// that a constant on which nothing depends costs nothing.
+    pub merit: f64,
 }
 
 /// Price of a parameter: half the logarithm of the rows of one torque in a minute (BIC, Schwarz 1978).
 const PRICE: f64 = 4.0;
-
-impl Gain {
-    /// What the effect saves less the price of its parameters, constants that were chosen counted.
-    pub fn merit(&self) -> f64 {
-        self.gain - PRICE * (self.parameters.len() + self.effect.constants.len()) as f64
-    }
-}
 
 /// Share of a column's square that the model must leave of it; of less, nothing can be said.
 const LEFT: f64 = 1e-3;
@@ -44,8 +39,6 @@ const LEFT: f64 = 1e-3;
 const EVERY: usize = 4;
 /// Rows that are multiplied at a time.
 const CHUNK: usize = 256;
-/// Rows of a log on which columns are tried that may look ahead.
-const TRIED: [usize; 2] = [20, 40];
 
 impl MotionLikelihood {
     /// What each of the `candidates` would save beside a model that has been fitted to these logs with this estimator. None for one that the model already
@@ -88,7 +81,7 @@ impl MotionLikelihood {
             score.flush();
         }
         self.add_determinants(robot, model, candidates, &foreseen, &evidence, &responses, &mut score)?;
-        let ahead = looking_ahead(&design, logs)?;
+        let ahead = foresight::looking_ahead(&design)?;
 
         let (mut own_score, mut cross) = (gradient, std::mem::replace(&mut score.cross, Mat::zeros(0, 0)));
         solve_lower_triangular_in_place(own.L(), own_score.as_mut(), Par::Seq);
@@ -113,7 +106,8 @@ impl MotionLikelihood {
                 let (lower, upper) = parameter.bounds;
                 (lower..=upper).contains(value)
             });
-            within.then(|| Gain { effect: effect.clone(), gain, parameters })
+            let merit = gain - PRICE * parameters.len() as f64;
+            within.then(|| Gain { effect: effect.clone(), gain, parameters, merit })
         };
         Ok(candidates.iter().enumerate().map(gain).collect())
     }
@@ -325,39 +319,4 @@ fn newton(s: &Mat<f64>, g: &[f64], squares: &[f64]) -> Option<(f64, Vec<f64>)> {
         reduced[row] = (reduced[row] - known) / lower[(row, row)];
     }
     Some((gain, reduced.into_iter().map(|value| -value).collect()))
-}
-
-/// For each parameter, whether its columns of a row change with what comes after the row.
-fn looking_ahead(design: &Design, logs: &[Measured]) -> Result<Vec<bool>, CurriculumError> {
-    let mut ahead = vec![false; design.parameter_count()];
-    let [last, end] = TRIED;
-    for log in logs.iter().filter(|log| log.rows() > end) {
-        let begun = log.begun();
-        let part = |rows: usize| {
-            let count = rows * begun.joints;
-            let signals = [&begun.q, &begun.qd, &begun.qdd].map(|signal| signal[..count].to_vec());
-            Block::unfiltered(begun.joints, begun.t[..rows].to_vec(), signals, begun.tau[..count].to_vec())
-        };
-        if begun.len() < end {
-            continue;
-        }
-        let mut evaluated = Vec::with_capacity(TRIED.len());
-        for mut block in [part(last + 1), part(end)] {
-            design.correct(&mut block);
-            let (mut scratch, mut row) = (design.scratch(), vec![0.0; design.evaluation_width()]);
-            scratch.begin(&block)?;
-            for sample in 0..=last {
-                scratch.evaluate(&block, sample, &mut row)?;
-            }
-            evaluated.push(row);
-        }
-        for layout in design.rows() {
-            for (column, &parameter) in layout.parameters.iter().enumerate() {
-                let [one, other] = [0, 1].map(|which: usize| evaluated[which][layout.range.start + column]);
-                ahead[parameter] |= (one - other).abs() > 1e-9 * one.abs().max(other.abs());
-            }
-        }
-        break;
-    }
-    Ok(ahead)
 }
