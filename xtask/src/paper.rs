@@ -5,6 +5,7 @@
 
 mod arguments;
 mod arm;
+mod detection;
 mod ending;
 mod figures;
 mod jobs;
@@ -24,7 +25,7 @@ mod whole_body;
 
 pub use crate::plant_experiment::engine::Engine;
 pub use crate::plant_experiment::secret::SecretKind;
-pub use arguments::{Arguments, Command, EstimatorName, Initial, RunArguments};
+pub use arguments::{Arguments, Command, Detector, EstimatorName, Initial, RunArguments};
 pub use arm::{Arm, Footing};
 pub use figures::{balance, choices};
 pub use jobs::{Job, do_all};

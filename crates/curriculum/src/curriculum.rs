@@ -1,7 +1,7 @@
 //! Algorithm 1, lines 10 to 17: select, measure, estimate, relax; and, where the model may grow, look for what it lacks.
 
 use crate::estimation::RowsAt;
-use crate::growth::{Found, LEAST_GAIN};
+use crate::growth::Found;
 use crate::selection::{Choice, Question};
 use crate::triangle::Triangle;
 use crate::{
@@ -104,13 +104,12 @@ impl Curriculum<'_> {
             next.evidence = Some(learning.evidence);
             estimate = Some(learning.estimate);
         }
-        let candidates = self.candidates_of(&next.model)?;
-        let condition_number = match next.evidence.as_ref().filter(|evidence| !evidence.is_empty()) {
-            Some(evidence) => Some(candidates.measured(evidence.factor())?.condition_number()),
-            None => None,
-        };
+        let condition_number = self.measured(&next)?.map(|measured| measured.condition_number());
         let (before, after) = (run.model.parameters(self.robot)?, next.model.parameters(self.robot)?);
-        let grown = run.model.specs() != next.model.specs();
+        let torque_change = match run.model.specs() == next.model.specs() {
+            true => self.candidates_of(&next.model)?.torque_change(&before, &after),
+            false => None,
+        };
         next.history.push(IterationRecord {
             motion: motion.name.clone(),
             allowed: if plan.forced { 0 } else { plan.allowed.len() },
@@ -121,9 +120,12 @@ impl Curriculum<'_> {
             still_share: trial.measured.still_share(),
             tracking_error: trial.tracking_error,
             condition_number: condition_number.filter(|cond| cond.is_finite()),
-            torque_change: if grown { None } else { candidates.torque_change(&before, &after) },
+            torque_change,
             torque_uncertainty: match &estimate {
-                Some(estimate) => estimate.uncertainty_along(candidates.everything(), self.dataset.rows()),
+                Some(estimate) => {
+                    let candidates = self.candidates_of(&next.model)?;
+                    estimate.uncertainty_along(candidates.everything(), self.dataset.rows())
+                }
                 None => run.history.last().and_then(|record| record.torque_uncertainty),
             },
             separates: plan.separates,
@@ -154,7 +156,8 @@ impl Curriculum<'_> {
         // What stood in the place of the answer, and is not true, makes way for it.
         for _ in 0..MOST_ANSWERS {
             found = growth.look(self.robot, &learning.model, &run.logs, doubted, &refuted)?;
-            (learning, believed) = self.confirmed(learning, found.effects.clone(), &run.logs)?;
+            (learning, believed) =
+                self.confirmed(learning, found.effects.clone(), &run.logs, growth.least_gain())?;
             let wrong: Vec<EffectSpec> =
                 found.effects.iter().filter(|effect| !believed.contains(effect)).cloned().collect();
             if wrong.is_empty() {
@@ -175,12 +178,13 @@ impl Curriculum<'_> {
     }
 
     /// The model with those of the found `effects` that the estimator's likelihood confirms: the least of them goes until each is worth
-    /// [`LEAST_GAIN`].
+    /// `least_gain`.
     fn confirmed(
         &self,
         learning: Learning,
         mut effects: Vec<EffectSpec>,
         logs: &[Measured],
+        least_gain: f64,
     ) -> Result<(Learning, Vec<EffectSpec>), CurriculumError> {
         let mut with = self.fitted(&learning, &effects, logs)?;
         while let Some(misfit) = self.misfit(&with)? {
@@ -194,7 +198,7 @@ impl Curriculum<'_> {
                 }
             }
             match least {
-                Some((gain, place, without)) if gain < LEAST_GAIN => {
+                Some((gain, place, without)) if gain < least_gain => {
                     effects.remove(place);
                     with = without;
                 }
@@ -243,7 +247,7 @@ impl Curriculum<'_> {
         Ok(Learning { evidence, model, estimate })
     }
 
-    /// The factors of the motions under a belief's columns: those made once, unless the model has grown.
+    /// The factors of the motions under all columns of a belief: those made once, unless the model has grown.
     ///
     /// # Errors
     /// The belief is of another robot.
@@ -252,6 +256,22 @@ impl Curriculum<'_> {
             return Ok(Cow::Borrowed(self.candidates));
         }
         Candidates::of_model(self.robot, model, self.dataset, self.candidates.weights()).map(Cow::Owned)
+    }
+
+    /// R of all that was measured over the declared parameters, whose cond decides: the next motion (11), and how far the constraint is relaxed (20).
+    ///
+    /// The columns of effects that were found are left out. With them cond is that of other parameters, in other units, than before they were found; the offset of a
+    /// spring is so nearly a weight that cond grows five-fold, the constraint is never relaxed again, and the same safe motion is asked for until the end. What tells
+    /// effects apart is asked for by rivalry.
+    ///
+    /// # Errors
+    /// The run is not of this robot.
+    pub fn measured(&self, run: &Run) -> Result<Option<Triangle>, CurriculumError> {
+        let Some(evidence) = run.evidence.as_ref().filter(|evidence| !evidence.is_empty()) else {
+            return Ok(None);
+        };
+        let declared: Vec<usize> = (0..self.candidates.everything().size()).collect();
+        Ok(Some(self.candidates.measured(&evidence.factor().select(&declared)?)?))
     }
 
     /// What the next iteration would do; none once the run has ended. For a real robot this is all there is to do before it moves.
@@ -305,12 +325,8 @@ impl Curriculum<'_> {
 
     /// Line 12.
     fn select(&self, run: &Run, allowed: &[usize]) -> Result<Choice, CurriculumError> {
-        let candidates = self.candidates_of(&run.model)?;
-        let measured: Option<Triangle> = match run.evidence.as_ref().filter(|evidence| !evidence.is_empty()) {
-            Some(evidence) => Some(candidates.measured(evidence.factor())?),
-            None => None,
-        };
-        let question = Question { candidates: &candidates, allowed, measured: measured.as_ref() };
+        let measured = self.measured(run)?;
+        let question = Question { candidates: self.candidates, allowed, measured: measured.as_ref() };
         let mut dice = random(run.seed, run.history.len(), Purpose::Selection);
         Ok(self.selection.choose(&question, &mut dice))
     }

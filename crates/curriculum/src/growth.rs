@@ -43,6 +43,11 @@ pub trait Growth: Send + Sync {
         doubted: bool,
         refuted: &[EffectSpec],
     ) -> Result<Found, CurriculumError>;
+
+    /// −log L that an effect must save to be believed, where the estimator knows a likelihood.
+    fn least_gain(&self) -> f64 {
+        LEAST_GAIN
+    }
 }
 
 /// Traces the residual with `phiw-residual`, where one is not white; effects that act on no such torque are not asked for.

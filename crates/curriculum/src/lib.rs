@@ -16,6 +16,7 @@ mod record;
 mod relaxation;
 mod rivalry;
 mod robot;
+mod score_test;
 pub mod selection;
 pub mod standing;
 mod triangle;
@@ -28,7 +29,7 @@ pub use curriculum::{Curriculum, Plan, unreliable_model};
 pub use end::{Converged, EndCriterion, EndReason, FixedCount};
 pub use error::CurriculumError;
 pub use estimation::{
-    Estimate, Estimator, Evidence, Instant, LeastSquares, MotionLikelihood, Prior, RowsAt,
+    Estimate, Estimator, Evidence, Gain, Instant, LeastSquares, MotionLikelihood, Prior, RowsAt,
     WeightedLeastSquares,
 };
 pub use experiment::{BuildBackend, Experiment, SimulatedRobot, Trial};
@@ -39,5 +40,6 @@ pub use record::{IterationRecord, Run};
 pub use relaxation::{ConditionRelaxation, Learnt, Maximum, Relaxation, Scale, UncertaintyRelaxation};
 pub use rivalry::Rivalry;
 pub use robot::{KnownEffect, Robot, RobotModel};
+pub use score_test::ScoreTest;
 pub use selection::Selection;
 pub use triangle::Triangle;

@@ -102,6 +102,21 @@ impl Measured {
     /// One row for each period as it was when it began, with the acceleration of the period before: nothing that the noise of a period has done
     /// to the motion is in its own row. The torques of the rows are `tau`, `[period × joint]` of those that count.
     pub(crate) fn before_noise(&self, tau: Vec<f64>) -> Block {
+        let mut block = self.beginnings();
+        block.tau = tau;
+        block
+    }
+
+    /// One row for each period as it could be foreseen when it began: where the joints would be in its middle at the speed that they had, that speed, the
+    /// acceleration of the period before, and the torque that was commanded.
+    pub(crate) fn begun(&self) -> Block {
+        let mut block = self.beginnings();
+        let half_s = 0.5 * self.period_s;
+        block.q.iter_mut().zip(&block.qd).for_each(|(position, speed)| *position += half_s * speed);
+        block
+    }
+
+    fn beginnings(&self) -> Block {
         let count = self.rows().saturating_sub(1) * self.joints;
         let acceleration = |index: usize| match index.checked_sub(self.joints) {
             Some(before) => (self.qd[index] - self.qd[before]) / self.period_s,
@@ -109,9 +124,7 @@ impl Measured {
         };
         let signals =
             [self.q[..count].to_vec(), self.qd[..count].to_vec(), (0..count).map(acceleration).collect()];
-        let mut block = self.counted(0.0, signals, vec![0.0; count]);
-        block.tau = tau;
-        block
+        self.counted(0.0, signals, self.tau[..count].to_vec())
     }
 
     /// One row for each period: the middle position of Hermite's cubic, and the means of velocity and acceleration.

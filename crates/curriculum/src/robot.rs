@@ -116,12 +116,24 @@ impl Robot {
     /// # Errors
     /// An effect is unknown, or the belief is of another robot.
     pub fn design_of(&self, model: &RobotModel) -> Result<Design, CurriculumError> {
+        self.design_beside(model, &[])
+    }
+
+    /// The same with more effects after those of the belief.
+    ///
+    /// # Errors
+    /// As [`Self::design_of`].
+    pub(crate) fn design_beside(
+        &self,
+        model: &RobotModel,
+        more: &[EffectSpec],
+    ) -> Result<Design, CurriculumError> {
         let known = |effect: &KnownEffect| {
             Ok((self.catalogue.build(&effect.spec, &self.tree)?, effect.parameters.clone()))
         };
         let effects: Result<Vec<_>, CurriculumError> = model.effects.iter().map(known).collect();
         let reference = ReferenceModel::new(model.tree(self)?).with_effects(effects?);
-        Ok(self.design(&model.specs())?.with_reference(reference))
+        Ok(self.design(&[&model.specs(), more].concat())?.with_reference(reference))
     }
 
     /// The truth of a simulated robot: the tree's own standard parameters, and one number for each declared effect's parameters.

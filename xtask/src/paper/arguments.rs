@@ -71,6 +71,12 @@ pub struct RunArguments {
     /// Effects that nobody declared, one in the plant of each run; without any, there is none.
     #[arg(long, value_name = "KIND,…", value_delimiter = ',')]
     pub secret: Vec<SecretKind>,
+    /// With secrets: so many seeds of a plant without any beside them, to count what is invented.
+    #[arg(long, value_name = "COUNT", default_value_t = 0)]
+    pub control: u64,
+    /// Who looks for what the model lacks, where the loop is closed.
+    #[arg(long, default_value = "score")]
+    pub detector: Detector,
     /// How parameters are estimated.
     #[arg(long, default_value = "likelihood")]
     pub estimator: EstimatorName,
@@ -140,6 +146,19 @@ pub enum RelaxationName {
     Condition,
     /// How uncertain the torques of all motions are.
     Uncertainty,
+}
+
+/// Who looks for what the model lacks.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Detector {
+    /// The likelihood itself: a score test of every effect. Another estimator has none, and traces.
+    #[default]
+    Score,
+    /// A trace of the residuals that are not white.
+    Trace,
 }
 
 /// How many initial models there are.

@@ -3,11 +3,11 @@
 use super::arguments::{Initial, RunArguments};
 use super::arm::{Arm, Footing};
 use super::run_file::RunFile;
-use super::setup::Setup;
+use super::setup::{Setup, Validation};
 use super::subject::SubjectName;
 use crate::plant_experiment::engine::Engine;
 use crate::plant_experiment::secret::SecretKind;
-use phiw_curriculum::{Curriculum, FixedCount, RowsAt, Run, TraceResidual, unreliable_model};
+use phiw_curriculum::{Curriculum, FixedCount, RowsAt, Run, unreliable_model};
 use phiw_plant::Effect;
 use rayon::prelude::*;
 use std::path::Path;
@@ -42,17 +42,17 @@ pub enum Outcome {
 /// All runs that the arguments ask for, seed by seed, so that an interrupted experiment has some of every arm.
 pub fn all(arguments: &RunArguments) -> Vec<Job> {
     let mut jobs = Vec::new();
-    let secrets: Vec<Option<SecretKind>> = match arguments.secret.as_slice() {
-        [] => vec![None],
-        secrets => secrets.iter().copied().map(Some).collect(),
-    };
+    let kinds = arguments.secret.iter().copied().map(Some);
     // A robot with legs stands on them.
     let footings = match arguments.robot {
         SubjectName::WholeBody => &[Footing::Standing][..],
         _ => &arguments.footing,
     };
-    for seed in arguments.first_seed..arguments.first_seed + arguments.seeds {
-        for &secret in &secrets {
+    let control = if arguments.secret.is_empty() { arguments.seeds } else { arguments.control };
+    for seed in arguments.first_seed..arguments.first_seed + arguments.seeds.max(control) {
+        let own = seed - arguments.first_seed;
+        let kinds = kinds.clone().filter(|_| own < arguments.seeds);
+        for secret in kinds.chain((own < control).then_some(None)) {
             for &footing in footings {
                 for &arm in &arguments.arm {
                     let representative =
@@ -77,38 +77,51 @@ pub fn do_all(
     progress: &(dyn Fn(u64) + Sync),
 ) -> anyhow::Result<Outcome> {
     let left = AtomicUsize::new(stop_after.unwrap_or(usize::MAX));
-    let outcomes: Vec<Outcome> =
-        jobs.par_iter().map(|job| job.run(setup, out, &left, progress)).collect::<anyhow::Result<_>>()?;
-    Ok(if outcomes.contains(&Outcome::Stopped) { Outcome::Stopped } else { Outcome::Done })
+    // Runs beside each other with the same secret are judged on the same logs.
+    let alike: Vec<&[Job]> =
+        jobs.chunk_by(|one, other| one.secret == other.secret && one.seed == other.seed).collect();
+    let do_alike = |jobs: &&[Job]| -> anyhow::Result<Vec<Outcome>> {
+        let secret = jobs[0].secret.map(|kind| setup.secret(kind, jobs[0].seed)).transpose()?;
+        let mut own = None;
+        if secret.is_some() && !jobs.iter().all(|job| job.is_done(out)) {
+            own = Some(setup.validation(jobs[0].backend, secret.as_ref())?);
+        }
+        let validation = own.as_ref().unwrap_or(&setup.validation);
+        let run = |job: &Job| job.run(setup, secret.as_ref(), validation, out, &left, progress);
+        jobs.par_iter().map(run).collect()
+    };
+    let outcomes: Vec<Vec<Outcome>> = alike.par_iter().map(do_alike).collect::<anyhow::Result<_>>()?;
+    Ok(if outcomes.concat().contains(&Outcome::Stopped) { Outcome::Stopped } else { Outcome::Done })
 }
 
 impl Job {
+    fn is_done(&self, out: &Path) -> bool {
+        matches!(RunFile::read(&RunFile::path(out, self)), Ok(Some(file)) if file.run.ended.is_some())
+    }
+
     fn run(
         &self,
         setup: &Setup,
+        secret: Option<&Effect>,
+        validation: &Validation,
         out: &Path,
         left: &AtomicUsize,
         progress: &(dyn Fn(u64) + Sync),
     ) -> anyhow::Result<Outcome> {
         let path = RunFile::path(out, self);
-        let secret = self.secret.map(|kind| setup.secret(kind, self.seed)).transpose()?;
         let mut file = match RunFile::read(&path)? {
             Some(file) => file,
-            None => self.begin(setup, secret.as_ref())?,
+            None => self.begin(setup, secret)?,
         };
         progress(file.run.history.len() as u64);
         if file.run.ended.is_some() {
             return Ok(Outcome::Done);
         }
         let standing = self.footing == Footing::Standing;
-        let experiment = setup.trial_ground(self.backend, standing, setup.settings.noise, secret.as_ref());
-        let validation = match &secret {
-            Some(secret) => Some(setup.validation_logs(self.backend, Some(secret))?),
-            None => None,
-        };
+        let experiment = setup.trial_ground(self.backend, standing, setup.settings.noise, secret);
         let selection = self.arm.selection(&setup.dataset, &setup.settings.tasks);
         let estimator = setup.estimator(&file.run.initial);
-        let growth = TraceResidual::default();
+        let growth = setup.growth();
         let curriculum = Curriculum {
             robot: &setup.robot,
             dataset: &setup.dataset,
@@ -118,7 +131,7 @@ impl Job {
             constraint: self.arm.constraint(&setup.constraint),
             relaxation: setup.relaxation.as_ref(),
             estimator: estimator.as_ref(),
-            growth: (self.arm == Arm::Closed).then_some(&growth),
+            growth: (self.arm == Arm::Closed).then_some(growth.as_ref()),
             end: &FixedCount(setup.settings.iterations),
             rows_at: RowsAt::Periods,
         };
@@ -131,14 +144,11 @@ impl Job {
             }
             curriculum.step(&mut file.run)?;
             if file.scores.is_empty() {
-                file.scores.push(setup.score(&file.run.initial, None, validation.as_deref())?);
+                file.scores.push(setup.score(&file.run.initial, None, validation)?);
             }
-            file.scores.push(setup.score(
-                &file.run.model,
-                file.run.evidence.as_ref(),
-                validation.as_deref(),
-            )?);
+            file.scores.push(setup.score(&file.run.model, file.run.evidence.as_ref(), validation)?);
             if file.run.ended.is_some() {
+                file.detection = setup.detection(&file)?;
                 file.run.evidence = None;
                 file.run.logs.clear();
                 file.run.rivals.clear();
@@ -165,6 +175,7 @@ impl Job {
             scores: Vec::new(),
             run: Run::new(self.seed, initial),
             details: Vec::new(),
+            detection: None,
         })
     }
 }

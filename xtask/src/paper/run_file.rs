@@ -1,6 +1,7 @@
 //! One file for each run: where it is, and how it is written so that it is whole at any moment.
 
 use super::arm::{Arm, Footing};
+use super::detection::Detection;
 use super::jobs::Job;
 use super::score::{Detail, Score};
 use crate::plant_experiment::secret::SecretKind;
@@ -28,6 +29,9 @@ pub struct RunFile {
     pub scores: Vec<Score>,
     /// More, of the run that stands for all.
     pub details: Vec<Detail>,
+    /// What all its logs say beside the declared model, where the loop is closed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub detection: Option<Detection>,
 }
 
 impl RunFile {

@@ -1,6 +1,6 @@
 //! How good a belief is, against the truth that no curriculum sees.
 
-use super::setup::Setup;
+use super::setup::{Setup, Validation};
 use phiw_curriculum::selection::Question;
 use phiw_curriculum::{
     Curriculum, Estimator, Evidence, LeastSquares, Measured, RobotModel, RowsAt, Run, WeightedLeastSquares,
@@ -52,14 +52,14 @@ impl Setup {
     /// The belief is not of this robot.
     pub fn torque_error(&self, model: &RobotModel, logs: &[Measured]) -> anyhow::Result<TorqueError> {
         let design = self.robot.design_of(model)?;
-        let mut evidence = Evidence::none(&design, RowsAt::Periods)?;
+        let mut evidence = Evidence::none(&design, RowsAt::Periods)?.without_noise();
         for log in logs {
             evidence.add(&design, log)?;
         }
         Ok(torque_error(std::slice::from_ref(evidence.factor()), &model.parameters(&self.robot)?)?)
     }
 
-    /// Scores a belief, and what simpler estimators would make of the same logs. `validation` are the held-out motions of a plant with a secret.
+    /// Scores a belief, and what simpler estimators would make of the same logs. `validation` are the held-out motions of the plant.
     ///
     /// # Errors
     /// The belief is not of this robot.
@@ -67,15 +67,15 @@ impl Setup {
         &self,
         model: &RobotModel,
         evidence: Option<&Evidence>,
-        validation: Option<&[Measured]>,
+        validation: &Validation,
     ) -> anyhow::Result<Score> {
         let parameters = model.parameters(&self.robot)?;
         let truth = self.settings.truth();
-        let (factor, samples) = match validation {
-            Some(logs) => &self.validation_of(model, logs)?,
-            None => &self.validation,
-        };
         let declared = model.effects.len() == self.robot.declared().len();
+        let (factor, samples) = match declared {
+            true => &validation.declared,
+            false => &self.validation_of(model, &validation.logs)?,
+        };
         let design = self.robot.design_of(model)?;
         let bystander = |estimator: &dyn Estimator| -> anyhow::Result<Option<f64>> {
             let Some(evidence) = evidence.filter(|evidence| declared && !evidence.is_empty()) else {
@@ -99,13 +99,12 @@ impl Setup {
     /// The run is not of this robot.
     pub fn detail(&self, curriculum: &Curriculum<'_>, run: &Run) -> anyhow::Result<Option<Detail>> {
         let Some(plan) = curriculum.plan(run)? else { return Ok(None) };
-        let candidates = curriculum.candidates_of(&run.model)?;
-        let measured = match run.evidence.as_ref().filter(|evidence| !evidence.is_empty()) {
-            Some(evidence) => Some(candidates.measured(evidence.factor())?),
-            None => None,
+        let measured = curriculum.measured(run)?;
+        let question = Question {
+            candidates: curriculum.candidates,
+            allowed: &plan.allowed,
+            measured: measured.as_ref(),
         };
-        let question =
-            Question { candidates: &candidates, allowed: &plan.allowed, measured: measured.as_ref() };
         let condition_numbers =
             (0..self.dataset.len()).map(|motion| question.stack(motion).condition_number()).collect();
         let motion = &self.dataset.motions()[plan.choice.motion];

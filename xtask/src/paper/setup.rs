@@ -1,6 +1,6 @@
 //! Everything that all runs share, and what of it decides their results.
 
-use super::arguments::{EstimatorName, Initial, PriorName, RelaxationName, RunArguments};
+use super::arguments::{Detector, EstimatorName, Initial, PriorName, RelaxationName, RunArguments};
 use super::motions::{Motions, Source};
 use super::run_file;
 use super::subject::{Subject, SubjectName};
@@ -11,9 +11,9 @@ use crate::plant_experiment::secret::SecretKind;
 use anyhow::{Context, ensure};
 use phiw::console::Console;
 use phiw_curriculum::{
-    Candidates, ConditionRelaxation, Estimator, Evidence, Experiment, FeedForward, LeastSquares, Measured,
-    Motion, MotionDataset, MotionLikelihood, Prior, Relaxation, Robot, RobotModel, RowsAt, SimulatedRobot,
-    UncertaintyRelaxation, WeightedLeastSquares, ZmpConstraint,
+    Candidates, ConditionRelaxation, Estimator, Evidence, Experiment, FeedForward, Growth, LeastSquares,
+    Measured, Motion, MotionDataset, MotionLikelihood, Prior, Relaxation, Robot, RobotModel, RowsAt,
+    ScoreTest, SimulatedRobot, TraceResidual, UncertaintyRelaxation, WeightedLeastSquares, ZmpConstraint,
 };
 use phiw_dynamics::{PARAMETERS_PER_BODY, Workspace, World};
 use phiw_identification::{parameter_name, standard_unit};
@@ -45,8 +45,16 @@ pub struct Setup {
     pub relaxation: Box<dyn Relaxation>,
     /// Motions to validate on.
     pub held_out: Vec<Motion>,
-    /// R of [Φ f] of the validation motions, and their number of samples T.
-    pub validation: (Factor, f64),
+    /// The logs of the plant without a secret on them.
+    pub validation: Validation,
+}
+
+/// Logs of held-out motions, and what they are under the declared columns.
+pub struct Validation {
+    /// The logs, without noise.
+    pub logs: Vec<Measured>,
+    /// R of [Φ f], and the number of samples T.
+    pub declared: (Factor, f64),
 }
 
 /// What decides the results of a run, beside its arm and seed. Runs with different settings are never mixed.
@@ -74,6 +82,9 @@ pub struct Settings {
     /// What α follows.
     #[serde(default)]
     pub relaxation: RelaxationName,
+    /// Who looks for what the model lacks.
+    #[serde(default)]
+    pub detector: Detector,
     /// Torque noise over the torque limit.
     pub noise: f64,
     /// Iterations.
@@ -184,6 +195,7 @@ impl Setup {
             estimator: arguments.estimator,
             prior,
             relaxation,
+            detector: arguments.detector,
             noise: arguments.noise,
             iterations: arguments.iterations,
             initial: arguments.initial,
@@ -197,7 +209,7 @@ impl Setup {
                 RelaxationName::Condition => Box::new(ConditionRelaxation::default()),
                 RelaxationName::Uncertainty => Box::new(UncertaintyRelaxation::default()),
             },
-            validation: (Factor::empty(0), 0.0),
+            validation: Validation { logs: Vec::new(), declared: (Factor::empty(0), 0.0) },
             held_out: motions.validation,
             settings,
             subject,
@@ -206,9 +218,18 @@ impl Setup {
             dataset,
             candidates,
         };
-        let logs = setup.validation_logs(arguments.backend, None)?;
-        setup.validation = setup.validation_of(&setup.truth, &logs)?;
+        setup.validation = setup.validation(arguments.backend, None)?;
         Ok(setup)
+    }
+
+    /// The held-out motions of a plant with or without a secret.
+    ///
+    /// # Errors
+    /// The robot can not be run.
+    pub fn validation(&self, backend: Engine, secret: Option<&Effect>) -> anyhow::Result<Validation> {
+        let logs = self.validation_logs(backend, secret)?;
+        let declared = self.validation_of(&self.truth, &logs)?;
+        Ok(Validation { logs, declared })
     }
 
     /// Where motions are tried: the robot in an engine with noise, and with what is in it that nobody declared. One with legs always stands.
@@ -251,16 +272,33 @@ impl Setup {
             EstimatorName::LeastSquares => Box::new(LeastSquares),
             EstimatorName::Weighted => Box::new(WeightedLeastSquares),
             EstimatorName::Likelihood => {
-                // Without noise there is no likelihood.
-                let share = if self.settings.noise > 0.0 { self.settings.noise } else { SILENT };
-                let likelihood = MotionLikelihood::new(self.subject.torque_noise(share));
-                let standing_on = self.subject.standing.as_ref().map(Standing::foot_bodies);
-                let likelihood = likelihood.standing_on(standing_on.unwrap_or_default());
+                let likelihood = self.likelihood();
                 Box::new(match self.settings.prior {
                     PriorName::None => likelihood,
                     PriorName::Initial => likelihood.believing(Prior::unreliable(initial.clone())),
                 })
             }
+        }
+    }
+
+    /// The likelihood of motions under the noise of the plant.
+    pub fn likelihood(&self) -> MotionLikelihood {
+        // Without noise there is no likelihood.
+        let share = if self.settings.noise > 0.0 { self.settings.noise } else { SILENT };
+        let standing_on = self.subject.standing.as_ref().map(Standing::foot_bodies);
+        MotionLikelihood::new(self.subject.torque_noise(share)).standing_on(standing_on.unwrap_or_default())
+    }
+
+    /// Who looks for what the model lacks by the likelihood, if that is how parameters are estimated.
+    pub fn score_test(&self) -> Option<ScoreTest> {
+        (self.settings.estimator == EstimatorName::Likelihood).then(|| ScoreTest::new(self.likelihood()))
+    }
+
+    /// Who looks for what the model lacks.
+    pub fn growth(&self) -> Box<dyn Growth> {
+        match self.score_test().filter(|_| self.settings.detector == Detector::Score) {
+            Some(test) => Box::new(test),
+            None => Box::new(TraceResidual::default()),
         }
     }
 
@@ -284,7 +322,7 @@ impl Setup {
     /// The belief is not of this robot.
     pub fn validation_of(&self, model: &RobotModel, logs: &[Measured]) -> anyhow::Result<(Factor, f64)> {
         let design = self.robot.design_of(model)?;
-        let mut evidence = Evidence::none(&design, RowsAt::Periods)?;
+        let mut evidence = Evidence::none(&design, RowsAt::Periods)?.without_noise();
         for log in logs {
             evidence.add(&design, log)?;
         }

@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Writes `iterations.csv`, `parameters.csv`, `motions.csv` and `numbers.csv`.
+/// Writes `iterations.csv`, `parameters.csv`, `motions.csv`, `numbers.csv`, `secrets.csv` and `detection.csv`.
 ///
 /// # Errors
 /// A file can not be written.
@@ -19,6 +19,8 @@ pub fn write(results: &Results, out: &Path) -> anyhow::Result<()> {
         ("parameters.csv", parameters(results)),
         ("motions.csv", motions(results)),
         ("numbers.csv", numbers_table(results)),
+        ("secrets.csv", secrets_table(results)),
+        ("detection.csv", detection(results)),
     ] {
         replace(&out.join(name), text.as_bytes())?;
     }
@@ -128,6 +130,47 @@ fn numbers_table(results: &Results) -> String {
     std::iter::once("what,paper,here,why\n".to_owned())
         .chain(numbers::rows(results).iter().map(line))
         .collect()
+}
+
+/// The table of the report.
+fn secrets_table(results: &Results) -> String {
+    let line =
+        |row: Vec<String>| row.iter().map(|cell| format!("\"{cell}\"")).collect::<Vec<_>>().join(",") + "\n";
+    let head = secrets::HEAD.map(str::to_owned).to_vec();
+    std::iter::once(head)
+        .chain(secrets::rows(results).into_iter().map(|row| row.to_vec()))
+        .map(line)
+        .collect()
+}
+
+/// One row for each run with the loop closed.
+fn detection(results: &Results) -> String {
+    let mut text = String::from(
+        "secret,joints,seed,found,secret_gain,secret_deviations,other,other_gain,other_merit,rmse_w,rmse_torque_nm\n",
+    );
+    for run in &results.runs {
+        let Some(detection) = &run.detection else { continue };
+        let (other, gain, merit) = match &detection.other {
+            Some((name, gain, merit)) => (name.as_str(), Some(*gain), Some(*merit)),
+            None => ("", None, None),
+        };
+        let score = run.scores.last();
+        let _ = writeln!(
+            text,
+            "{},{},{},{},{},{},{other},{},{},{},{}",
+            run.secret.map_or_else(String::new, SecretKind::name),
+            run.secret_joints.join("+"),
+            run.run.seed,
+            secrets::names(run).join(" "),
+            cell(detection.secret),
+            cell(detection.deviations()),
+            cell(gain),
+            cell(merit),
+            cell(score.map(|score| score.rmse_w)),
+            cell(score.map(|score| score.rmse_torque)),
+        );
+    }
+    text
 }
 
 fn cell(value: Option<f64>) -> String {

@@ -1,5 +1,6 @@
 //! All that estimators remember of what was measured.
 
+use super::foresight;
 use super::stored::StoredFactor;
 use crate::candidates::grouped_factor;
 use crate::{CurriculumError, Measured};
@@ -20,7 +21,8 @@ pub enum RowsAt {
     /// The stamps: position, velocity and acceleration as they were measured there, as the paper has it.
     Stamps,
     /// The middle of each period: what the motion was on average while one command was held. Position by Hermite's cubic, velocity
-    /// Δq/T, acceleration Δq̇/T, so that inertia and viscous friction balance the command exactly, however fast the motion changes within a period.
+    /// Δq/T, acceleration Δq̇/T, so that inertia and viscous friction balance the command exactly, however fast the motion changes within a period. Effects that are not
+    /// linear in the motion are taken as they were when the period began, so that its noise is not in them.
     #[default]
     Periods,
 }
@@ -43,6 +45,8 @@ pub struct Evidence {
     rows_at: RowsAt,
     factor: GroupedFactor,
     instants: Vec<Instant>,
+    /// Of which parameters the columns are those of the periods' beginnings; none of them if it is empty.
+    foreseen: Vec<bool>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -50,12 +54,14 @@ struct StoredEvidence {
     rows_at: RowsAt,
     factor: StoredFactor,
     instants: Vec<Instant>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    foreseen: Vec<bool>,
 }
 
 impl From<Evidence> for StoredEvidence {
     fn from(evidence: Evidence) -> Self {
-        let Evidence { rows_at, factor, instants } = evidence;
-        StoredEvidence { rows_at, factor: StoredFactor::from(&factor), instants }
+        let Evidence { rows_at, factor, instants, foreseen } = evidence;
+        StoredEvidence { rows_at, factor: StoredFactor::from(&factor), instants, foreseen }
     }
 }
 
@@ -63,8 +69,8 @@ impl TryFrom<StoredEvidence> for Evidence {
     type Error = RegressorError;
 
     fn try_from(stored: StoredEvidence) -> Result<Self, RegressorError> {
-        let StoredEvidence { rows_at, factor, instants } = stored;
-        Ok(Evidence { rows_at, factor: factor.try_into()?, instants })
+        let StoredEvidence { rows_at, factor, instants, foreseen } = stored;
+        Ok(Evidence { rows_at, factor: factor.try_into()?, instants, foreseen })
     }
 }
 
@@ -80,7 +86,19 @@ impl Evidence {
         };
         let groups = design.rows().iter().map(group).collect();
         let factor = GroupedFactor::new(design.parameter_count(), groups)?;
-        Ok(Evidence { rows_at, factor, instants: Vec::new() })
+        let mut foreseen = match rows_at {
+            RowsAt::Stamps => Vec::new(),
+            RowsAt::Periods => foresight::foreseen(design)?,
+        };
+        if !foreseen.contains(&true) {
+            foreseen.clear();
+        }
+        Ok(Evidence { rows_at, factor, instants: Vec::new(), foreseen })
+    }
+
+    /// The same for a robot that moves without noise: all columns are those of a period's mean motion.
+    pub fn without_noise(self) -> Self {
+        Evidence { foreseen: Vec::new(), ..self }
     }
 
     /// Takes in a log.
@@ -93,7 +111,11 @@ impl Evidence {
             RowsAt::Periods => measured.over_periods(),
         };
         self.instants.extend(instants(&block, measured.period_s));
-        self.factor = self.factor.merge(&grouped_factor(design, block)?)?;
+        let factor = match self.foreseen.as_slice() {
+            [] => grouped_factor(design, block)?,
+            foreseen => foresight::factor(design, foreseen, measured)?,
+        };
+        self.factor = self.factor.merge(&factor)?;
         Ok(())
     }
 
@@ -105,6 +127,11 @@ impl Evidence {
     /// Instants that stand for the motion.
     pub fn instants(&self) -> &[Instant] {
         &self.instants
+    }
+
+    /// Whether a parameter's columns are those of the periods' beginnings, which their own noise has not moved.
+    pub(super) fn is_foreseen(&self, parameter: usize) -> bool {
+        self.foreseen.get(parameter).copied().unwrap_or(false)
     }
 
     /// Whether there is none.

@@ -1,7 +1,8 @@
 //! Maximum likelihood where the noise moves the robot.
 
 use super::prior::{Prior, with_prior};
-use super::sensitivity::{Sensitivity, cholesky, packed, place};
+use super::response::{Response, log_determinant};
+use super::sensitivity::Sensitivity;
 use super::{Estimate, Estimator, Evidence};
 use crate::robot::spheres;
 use crate::{CurriculumError, RobotModel};
@@ -15,21 +16,21 @@ use phiw_regressor::least_squares::GroupedFactor;
 ///
 /// The paper's plant adds noise δ to the commanded torque f on its way to the robot, and logs the command: Φ(q, q̇, q̈)·w = f + δ, and δ
 /// is in q̈. What is random is the motion, not the right-hand side. Its density is that of δ times the Jacobian
-/// |∂δ/∂q̈| = det J(q; w), J the mass matrix (and what half a period of friction adds to it), so with σ_j the noise of torque j
+/// |∂δ/∂q̈| = det J(q; w), J the mass matrix (and what friction does within a period, in closed form), so with σ_j the noise of torque j
 ///
 /// −log L(w) = Σ_t ½‖Φ_t w − f_t‖²_σ − Σ_t log det J_t(w).
 ///
 /// Least squares is the first sum alone, and shrinks every inertia to explain the noise's own accelerations; the second sum is what
-/// a robot without inertia would be unlikely for. J is linear in w and log det is concave, so the problem is convex: damped Newton steps
-/// find its only minimum from anywhere inside. Bodies that make some J indefinite can not exist, and lie outside. A closed loop does no
+/// a robot without inertia would be unlikely for. J is linear in w but for the square of how much friction slows a joint within one period, and log det is concave, so the
+/// problem is convex: damped Newton steps find its only minimum from anywhere inside. Bodies that make some J indefinite can not exist, and lie outside. A closed loop does no
 /// harm: a command may depend on the past as it likes. (Compare the prediction-error view of closed-loop identification, Forssell & Ljung
 /// 1999.)
 ///
 /// σ must be known: the noise of the actuators, as a data sheet gives it. With σ free, a robot with more inertia and more noise
 /// is nearly as likely, and little is gained over least squares.
 ///
-/// Right for rows over periods ([`super::RowsAt::Periods`]) and exact encoders, to first order in how much friction slows a joint within one
-/// period. Noise in the logged torque, which moves nothing, is taken for noise that does; where that dominates,
+/// Right for rows over periods ([`super::RowsAt::Periods`]) and exact encoders. Columns that are not linear in the motion are those of a period's beginning and have no
+/// share in J. Noise in the logged torque, which moves nothing, is taken for noise that does; where that dominates,
 /// [`super::WeightedLeastSquares`] is right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionLikelihood {
@@ -64,7 +65,8 @@ impl MotionLikelihood {
         MotionLikelihood { prior: Some(prior), ..self }
     }
 
-    fn problem(&self, design: &Design, evidence: &Evidence) -> Result<Problem, CurriculumError> {
+    /// −log L of the evidence, that of the prior included.
+    pub(super) fn problem(&self, design: &Design, evidence: &Evidence) -> Result<Problem, CurriculumError> {
         check_size(
             "standard deviations of the torques' noise",
             self.torque_noise.len(),
@@ -78,11 +80,7 @@ impl MotionLikelihood {
             });
         }
         let mut precision: Vec<f64> = self.torque_noise.iter().map(|noise| noise.powi(-2)).collect();
-        let sensitivities: Result<Vec<Sensitivity>, CurriculumError> = evidence
-            .instants()
-            .iter()
-            .map(|instant| Sensitivity::of(design, instant, &self.standing_on))
-            .collect();
+        let sensitivities = Sensitivity::all(design, evidence, &self.standing_on)?;
         let factor = match &self.prior {
             Some(prior) => {
                 precision.push(1.0);
@@ -90,7 +88,7 @@ impl MotionLikelihood {
             }
             None => evidence.factor().clone(),
         };
-        Ok(Problem::new(factor, sensitivities?, precision))
+        Ok(Problem::new(factor, sensitivities, precision))
     }
 }
 
@@ -117,10 +115,10 @@ impl Estimator for MotionLikelihood {
         let mut curvature = Mat::zeros(0, 0);
         let mut freshness = 0;
         for step in 0..self.most_steps {
-            let (gradient, factors) = problem.gradient(&w);
+            let (gradient, responses) = problem.gradient(&w);
             // The curvature of log det changes slowly: it is the dearest part.
             if step < 2 || step % 4 == 0 {
-                curvature = problem.log_determinant_curvature(&factors);
+                curvature = problem.log_determinant_curvature(&responses);
                 freshness = step;
             }
             let hessian = problem.hessian(&curvature);
@@ -156,37 +154,28 @@ impl Estimator for MotionLikelihood {
     }
 }
 
-fn column(values: &[f64]) -> Mat<f64> {
+pub(super) fn column(values: &[f64]) -> Mat<f64> {
     Mat::from_fn(values.len(), 1, |row, _| values[row])
 }
 
 /// −log L and its derivatives.
-struct Problem {
+pub(super) struct Problem {
     factor: GroupedFactor,
     /// RᵀR of each torque over all parameters: for steps only, so half the digits are enough.
     grams: Vec<Mat<f64>>,
     sensitivities: Vec<Sensitivity>,
-    /// Directions in which the noise moves the robot.
-    directions: usize,
     /// 1/σ² of each torque.
     precision: Vec<f64>,
 }
 
 impl Problem {
-    fn new(factor: GroupedFactor, sensitivities: Vec<Sensitivity>, precision: Vec<f64>) -> Self {
+    pub(super) fn new(factor: GroupedFactor, sensitivities: Vec<Sensitivity>, precision: Vec<f64>) -> Self {
         let gram = |group: &phiw_regressor::least_squares::Group| {
             let size = group.factor.parameters();
             let r = group.factor.as_mat().get(..size, ..size);
             r.transpose() * r
         };
-        let directions = sensitivities.first().map_or(0, |sensitivity| sensitivity.directions);
-        Problem {
-            grams: factor.groups().iter().map(gram).collect(),
-            factor,
-            sensitivities,
-            directions,
-            precision,
-        }
+        Problem { grams: factor.groups().iter().map(gram).collect(), factor, sensitivities, precision }
     }
 
     /// R_j·w − z_j of a torque.
@@ -198,20 +187,13 @@ impl Problem {
         r.get(.., ..size) * own - r.get(.., size..)
     }
 
-    /// Σ weight·log det J; none where some J is not positive definite.
+    /// Σ weight·log det J; none where some inertia is not positive definite.
     fn log_determinants(&self, w: &Mat<f64>) -> Option<f64> {
         let mut sum = 0.0;
         for sensitivity in &self.sensitivities {
-            let lower = self.cholesky(sensitivity, w)?;
-            sum += sensitivity.weight
-                * (0..self.directions).map(|row| 2.0 * lower[place(row, row)].ln()).sum::<f64>();
+            sum += sensitivity.weight * log_determinant(sensitivity, w)?;
         }
         Some(sum)
-    }
-
-    fn cholesky(&self, sensitivity: &Sensitivity, w: &Mat<f64>) -> Option<Vec<f64>> {
-        let j = &sensitivity.packed * w;
-        cholesky(self.directions, j.col_as_slice(0))
     }
 
     fn cost(&self, w: &Mat<f64>) -> f64 {
@@ -222,8 +204,8 @@ impl Problem {
         squares - log_determinants
     }
 
-    /// The gradient, and Cholesky's factors of all J.
-    fn gradient(&self, w: &Mat<f64>) -> (Mat<f64>, Vec<Vec<f64>>) {
+    /// The gradient, and what it was made of at each instant; none where an inertia is not positive definite.
+    pub(super) fn gradient(&self, w: &Mat<f64>) -> (Mat<f64>, Vec<Option<Response>>) {
         let mut gradient = Mat::zeros(w.nrows(), 1);
         for (index, group) in self.factor.groups().iter().enumerate() {
             let size = group.factor.parameters();
@@ -232,32 +214,29 @@ impl Problem {
                 gradient[(parameter, 0)] += self.precision[index] * own[(row, 0)];
             }
         }
-        let mut factors = Vec::with_capacity(self.sensitivities.len());
+        let mut responses = Vec::with_capacity(self.sensitivities.len());
         for sensitivity in &self.sensitivities {
-            let lower = self.cholesky(sensitivity, w).unwrap_or_default();
-            if !lower.is_empty() {
-                let inverse = packed_inverse(self.directions, &lower);
-                gradient -= sensitivity.packed.transpose() * inverse * faer::Scale(sensitivity.weight);
+            let response = Response::of(sensitivity, w);
+            if let Some(response) = &response {
+                gradient -= response.gradient(sensitivity, 0) * faer::Scale(sensitivity.weight);
             }
-            factors.push(lower);
+            responses.push(response);
         }
-        (gradient, factors)
+        (gradient, responses)
     }
 
     /// Σ weight·tr(J⁻¹ J_k J⁻¹ J_l).
-    fn log_determinant_curvature(&self, factors: &[Vec<f64>]) -> Mat<f64> {
+    pub(super) fn log_determinant_curvature(&self, responses: &[Option<Response>]) -> Mat<f64> {
         let parameters = self.factor.parameter_count();
         let mut curvature = Mat::zeros(parameters, parameters);
         // A part of the instants is enough for a step's length; all of them count in the gradient.
         const EVERY: usize = 4;
         let all: f64 = self.sensitivities.iter().map(|sensitivity| sensitivity.weight).sum();
-        let chosen = || self.sensitivities.iter().zip(factors).skip(EVERY / 2).step_by(EVERY);
+        let chosen = || self.sensitivities.iter().zip(responses).skip(EVERY / 2).step_by(EVERY);
         let part: f64 = chosen().map(|(sensitivity, _)| sensitivity.weight).sum();
-        for (sensitivity, lower) in chosen().filter(|(_, lower)| !lower.is_empty()) {
-            let mut reduced = sensitivity.packed.clone();
-            for parameter in 0..parameters {
-                reduce(self.directions, lower, reduced.col_as_slice_mut(parameter));
-            }
+        for (sensitivity, response) in chosen() {
+            let Some(response) = response else { continue };
+            let reduced = response.reduced(sensitivity);
             let weight = sensitivity.weight * all / part;
             faer::linalg::matmul::matmul(
                 &mut curvature,
@@ -271,7 +250,7 @@ impl Problem {
         curvature
     }
 
-    fn hessian(&self, curvature: &Mat<f64>) -> Mat<f64> {
+    pub(super) fn hessian(&self, curvature: &Mat<f64>) -> Mat<f64> {
         let mut hessian = curvature.clone();
         for ((group, gram), precision) in self.factor.groups().iter().zip(&self.grams).zip(&self.precision) {
             for (column, &right) in group.parameters.iter().enumerate() {
@@ -301,62 +280,5 @@ impl Problem {
             length *= 0.5;
         }
         false
-    }
-}
-
-/// The inverse from Cholesky's factor, packed with √2 beside the diagonal.
-fn packed_inverse(n: usize, lower: &[f64]) -> Mat<f64> {
-    let mut inverse = Mat::zeros(packed(n), 1);
-    let mut unit = vec![0.0; n];
-    for index in 0..n {
-        unit.fill(0.0);
-        unit[index] = 1.0;
-        solve_lower(n, lower, &mut unit);
-        for row in (0..n).rev() {
-            for below in row + 1..n {
-                unit[row] -= lower[place(below, row)] * unit[below];
-            }
-            unit[row] /= lower[place(row, row)];
-        }
-        for row in index..n {
-            let scale = if row == index { 1.0 } else { std::f64::consts::SQRT_2 };
-            inverse[(place(row, index), 0)] = scale * unit[row];
-        }
-    }
-    inverse
-}
-
-fn solve_lower(n: usize, lower: &[f64], x: &mut [f64]) {
-    for row in 0..n {
-        let known: f64 = (0..row).map(|k| lower[place(row, k)] * x[k]).sum();
-        x[row] = (x[row] - known) / lower[place(row, row)];
-    }
-}
-
-/// S → L⁻¹ S L⁻ᵀ, packed, in place.
-fn reduce(n: usize, lower: &[f64], column: &mut [f64]) {
-    let mut full = vec![0.0; n * n];
-    for row in 0..n {
-        for col in 0..=row {
-            let scale = if row == col { 1.0 } else { std::f64::consts::FRAC_1_SQRT_2 };
-            let value = scale * column[place(row, col)];
-            full[row * n + col] = value;
-            full[col * n + row] = value;
-        }
-    }
-    // Rows are columns of a symmetric matrix: solve each, transpose, solve each again.
-    for _ in 0..2 {
-        full.chunks_exact_mut(n).for_each(|row| solve_lower(n, lower, row));
-        for row in 0..n {
-            for col in 0..row {
-                full.swap(row * n + col, col * n + row);
-            }
-        }
-    }
-    for row in 0..n {
-        for col in 0..=row {
-            let scale = if row == col { 1.0 } else { std::f64::consts::SQRT_2 };
-            column[place(row, col)] = scale * full[row * n + col];
-        }
     }
 }

@@ -1,9 +1,12 @@
 //! From what was measured to parameters: equation (4), and estimators that know where the noise comes from.
 
 mod evidence;
+mod foresight;
 mod least_squares;
 mod likelihood;
 mod prior;
+mod response;
+mod score;
 mod sensitivity;
 mod stored;
 
@@ -11,6 +14,7 @@ pub use evidence::{Evidence, Instant, RowsAt};
 pub use least_squares::{LeastSquares, WeightedLeastSquares};
 pub use likelihood::MotionLikelihood;
 pub use prior::Prior;
+pub use score::Gain;
 
 use crate::triangle::Triangle;
 use crate::{CurriculumError, RobotModel};

@@ -1,6 +1,6 @@
 //! How a noise in the torque moves the robot, as a linear function of the parameters.
 
-use super::Instant;
+use super::{Evidence, Instant};
 use crate::CurriculumError;
 use crate::standing::free_directions;
 use faer::Mat;
@@ -11,19 +11,20 @@ use phiw_telemetry::Block;
 /// turns with the sign it takes the mean slope over speeds that noise reaches within a period: an instant stands for the rows around it.
 const SPEED_STEP: f64 = 0.1;
 
-/// The matrices J_k of an instant: J = Σ w_k·J_k = ∂τ/∂q̈ + ½T·∂τ/∂q̇ is what a change of the mean acceleration over a period asks of the
-/// torque, its share in the mean velocity counted. Only the symmetric part is kept: what Coriolis' term adds beside it is a
-/// thousandth.
+/// How the torque of an instant depends on the motion: inertia A = Σ w_k·A_k = ∂τ/∂q̈ and damping T·F = Σ w_k·T·F_k = T·∂τ/∂q̇. Only the symmetric parts are
+/// kept: what Coriolis' term adds beside them is a thousandth.
 ///
-/// Where bodies stand still, J is that of the directions N that are left: Nᵀ·J·N.
+/// Where bodies stand still, they are those of the directions N that are left: Nᵀ·A·N.
 pub(super) struct Sensitivity {
     /// Rows that it stands for.
     pub weight: f64,
     /// Number n of directions: all joints, or those that the standing bodies leave.
     pub directions: usize,
-    /// `packed(n)` × parameters: the lower triangle of each J_k, elements beside the diagonal times √2, so that products of columns are
+    /// `packed(n)` × parameters: the lower triangle of each A_k, elements beside the diagonal times √2, so that products of columns are
     /// traces of products.
-    pub packed: Mat<f64>,
+    pub inertia: Mat<f64>,
+    /// The same of each T·F_k.
+    pub damping: Mat<f64>,
 }
 
 /// Numbers in the lower triangle of an n × n matrix.
@@ -38,7 +39,13 @@ pub(super) fn place(row: usize, column: usize) -> usize {
 
 impl Sensitivity {
     /// By evaluating the design's columns around the instant: exact in the acceleration, in which they are linear. `standing` bodies do not move.
-    pub fn of(design: &Design, instant: &Instant, standing: &[usize]) -> Result<Self, CurriculumError> {
+    /// Columns that `foreseen` has are of the period's beginning, and do not move with its noise.
+    pub fn of(
+        design: &Design,
+        instant: &Instant,
+        standing: &[usize],
+        foreseen: impl Fn(usize) -> bool,
+    ) -> Result<Self, CurriculumError> {
         let directions = match standing {
             [] => Mat::identity(instant.state[0].len(), instant.state[0].len()),
             bodies => free_directions(design.tree(), bodies, &instant.state[0])?,
@@ -54,26 +61,38 @@ impl Sensitivity {
             scratch.begin(&block)?;
             scratch.evaluate(&block, 0, row)?;
         }
-        let mut packed_columns = Mat::zeros(packed(n), design.parameter_count());
-        let half_period = 0.5 * instant.period_s;
+        let [mut inertia, mut damping] = [0; 2].map(|_| Mat::zeros(packed(n), design.parameter_count()));
         for (torque, layout) in design.rows().iter().enumerate() {
-            for (column, &parameter) in layout.parameters.iter().enumerate() {
+            let columns =
+                layout.parameters.iter().enumerate().filter(|(_, parameter)| !foreseen(**parameter));
+            for (column, &parameter) in columns {
                 let at = layout.range.start + column;
                 for moved in 0..n {
                     let by_acceleration = rows[1 + moved][at] - rows[0][at];
                     let by_velocity =
                         (rows[1 + n + moved][at] - rows[1 + 2 * n + moved][at]) / (2.0 * SPEED_STEP);
-                    let value = by_acceleration + half_period * by_velocity;
                     for along in (0..n).filter(|&along| directions[(torque, along)] != 0.0) {
-                        // Half of J + Jᵀ; √2 for what stands for two elements.
+                        // Half of A + Aᵀ; √2 for what stands for two elements.
                         let scale = if along == moved { 1.0 } else { 0.5 * std::f64::consts::SQRT_2 };
-                        packed_columns[(place(along.max(moved), along.min(moved)), parameter)] +=
-                            scale * directions[(torque, along)] * value;
+                        let (to, share) =
+                            (place(along.max(moved), along.min(moved)), directions[(torque, along)]);
+                        inertia[(to, parameter)] += scale * share * by_acceleration;
+                        damping[(to, parameter)] += scale * share * instant.period_s * by_velocity;
                     }
                 }
             }
         }
-        Ok(Sensitivity { weight: instant.weight, directions: n, packed: packed_columns })
+        Ok(Sensitivity { weight: instant.weight, directions: n, inertia, damping })
+    }
+
+    /// Those of all instants.
+    pub fn all(
+        design: &Design,
+        evidence: &Evidence,
+        standing: &[usize],
+    ) -> Result<Vec<Self>, CurriculumError> {
+        let foreseen = |parameter: usize| evidence.is_foreseen(parameter);
+        evidence.instants().iter().map(|instant| Self::of(design, instant, standing, foreseen)).collect()
     }
 }
 

@@ -1,0 +1,218 @@
+//! The loop closed by the estimator's own likelihood.
+
+use crate::growth::{Found, Growth};
+use crate::{
+    CurriculumError, Estimator, Evidence, Gain, Measured, MotionLikelihood, Robot, RobotModel, RowsAt,
+};
+use phiw_identification::EffectSpec;
+use phiw_residual::catalogue::{Constants, JointRange, SignalRanges};
+
+/// Asks of every effect of the catalogue what it would save of −log L ([`MotionLikelihood::gains`]), adds the best if it is worth it, fits again, and asks again.
+///
+/// The likelihood knows that noise moves the robot, and needs no residual with a colour: what many rows say together is enough, however far below the noise of
+/// one row an effect is. Effects whose columns look ahead in time or need derivatives of the model's torque (delay, elasticity, an encoder's offset) are no candidates:
+/// what is known when a period begins is not enough to tell them. [`crate::TraceResidual`] asks for them.
+#[derive(Clone, Debug)]
+pub struct ScoreTest {
+    /// The estimator that the curriculum runs with.
+    pub estimator: MotionLikelihood,
+    /// −log L that an effect must save beyond the price of its parameters.
+    pub least_merit: f64,
+    /// Effects at most.
+    pub most_effects: usize,
+    /// Measured time below which nothing is looked for \[s\].
+    pub least_s: f64,
+    /// A rival counts if it has at least this probability beside the effect that is believed.
+    pub least_rival: f64,
+}
+
+/// An effect of one parameter must then be four standard deviations from nothing. Seventy such effects are asked for after each log of an 18-joint robot: with all of them
+/// together, one right model in two hundred gets a false name.
+const LEAST_MERIT: f64 = 5.0;
+/// How often the constants of the best are refined.
+const REFINEMENTS: usize = 2;
+
+impl ScoreTest {
+    /// For a curriculum with this estimator: three effects at most, from 12 s of logs on; a rival is what has a chance of one in ten.
+    pub fn new(estimator: MotionLikelihood) -> Self {
+        ScoreTest { estimator, least_merit: LEAST_MERIT, most_effects: 3, least_s: 12.0, least_rival: 0.1 }
+    }
+
+    /// Every effect of the catalogue on every joint that a fit leaves something of, each with the constants that save most, the best first by gain
+    /// less price. `model` has been fitted to the logs.
+    ///
+    /// # Errors
+    /// The logs are not of this robot.
+    pub fn rank(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        logs: &[Measured],
+    ) -> Result<Vec<Gain>, CurriculumError> {
+        let ranges = ranges(robot, logs);
+        let present = model.specs();
+        let candidates = candidates(robot, &ranges, &present);
+        let gains = self.estimator.gains(robot, model, logs, &candidates)?;
+        let mut best = Vec::new();
+        // Constants of one effect on one site follow each other.
+        let mut start = 0;
+        for alike in candidates.chunk_by(is_alike) {
+            let own = &gains[start..start + alike.len()];
+            start += alike.len();
+            let known = || own.iter().flatten();
+            let Some(first) = known().max_by(|a, b| a.merit.total_cmp(&b.merit)) else { continue };
+            let sum: f64 = known().map(|gain| (gain.merit - first.merit).exp()).sum();
+            best.push(Gain { merit: first.merit + (sum / alike.len() as f64).ln(), ..first.clone() });
+        }
+        best.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+        Ok(best)
+    }
+
+    /// The model fitted to all logs with these effects in the place of its own.
+    ///
+    /// # Errors
+    /// The logs are not of this robot.
+    pub fn fitted(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        effects: &[EffectSpec],
+        logs: &[Measured],
+    ) -> Result<RobotModel, CurriculumError> {
+        let specs = [robot.declared(), effects].concat();
+        let model = model.with_effects(robot, &specs)?;
+        let design = robot.design_of(&model)?;
+        let mut evidence = Evidence::none(&design, RowsAt::Periods)?;
+        for log in logs {
+            evidence.add(&design, log)?;
+        }
+        let present = model.parameters(robot)?;
+        let estimate = self.estimator.estimate(&design, &evidence, &model, &present)?;
+        model.with_parameters(robot, &specs, &estimate.parameters)
+    }
+
+    /// The same effect with constants between those that were tried.
+    fn refined(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        logs: &[Measured],
+        mut best: Gain,
+    ) -> Result<Gain, CurriculumError> {
+        let kind = robot.catalogue().kind(&best.effect.kind)?;
+        for step in 0..REFINEMENTS {
+            let near: Vec<EffectSpec> = kind
+                .refine(&best.effect.constants, step)
+                .into_iter()
+                .map(|constants| EffectSpec { constants, ..best.effect.clone() })
+                .collect();
+            if near.is_empty() {
+                break;
+            }
+            let gains = self.estimator.gains(robot, model, logs, &near)?;
+            best = gains
+                .into_iter()
+                .flatten()
+                .fold(best, |best, gain| if gain.gain > best.gain { gain } else { best });
+        }
+        Ok(best)
+    }
+}
+
+impl Growth for ScoreTest {
+    fn name(&self) -> &'static str {
+        "score_test"
+    }
+
+    fn look(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        logs: &[Measured],
+        _doubted: bool,
+        refuted: &[EffectSpec],
+    ) -> Result<Found, CurriculumError> {
+        let mut found = Found::default();
+        if logs.iter().map(Measured::duration_s).sum::<f64>() < self.least_s {
+            return Ok(found);
+        }
+        // From the declared model on: what was found before may have been the wrong half of the truth.
+        let mut model = match model.effects.len() == robot.declared().len() {
+            true => model.clone(),
+            false => self.fitted(robot, model, &[], logs)?,
+        };
+        while found.effects.len() < self.most_effects {
+            let mut ranked = self.rank(robot, &model, logs)?;
+            ranked.retain(|gain| !refuted.iter().any(|effect| is_alike(effect, &gain.effect)));
+            let Some(best) = ranked.first().filter(|best| best.merit >= self.least_merit) else { break };
+            let least = best.merit + self.least_rival.ln();
+            let rivals = ranked[1..].iter().take_while(|gain| gain.merit >= least);
+            let best_effect = self.refined(robot, &model, logs, best.clone())?.effect;
+            found.rivals.extend(rivals.map(|rival| [best_effect.clone(), rival.effect.clone()]));
+            found.effects.push(best_effect);
+            if found.effects.len() < self.most_effects {
+                model = self.fitted(robot, &model, &found.effects, logs)?;
+            }
+        }
+        Ok(found)
+    }
+
+    fn least_gain(&self) -> f64 {
+        self.least_merit
+    }
+}
+
+/// Kind and joints are the same.
+fn is_alike(one: &EffectSpec, other: &EffectSpec) -> bool {
+    one.kind == other.kind && one.joints == other.joints
+}
+
+/// Every effect that may be beside `present`, with all constants to try.
+fn candidates(robot: &Robot, ranges: &SignalRanges, present: &[EffectSpec]) -> Vec<EffectSpec> {
+    let tree = robot.tree();
+    let mut specs = Vec::new();
+    for kind in robot.catalogue().kinds().filter(|kind| !kind.needs_held_model()) {
+        for site in kind.sites(tree) {
+            let joints: Vec<String> = site.iter().map(|&joint| tree.joint(joint).joint.clone()).collect();
+            let spec = |constants: Constants| EffectSpec {
+                kind: kind.name().to_owned(),
+                joints: joints.clone(),
+                constants,
+            };
+            let needs = kind.build(tree, &site, &Constants::new()).needs();
+            let is_present = present.iter().any(|other| is_alike(other, &spec(Constants::new())));
+            if !is_present && !needs.derivatives {
+                specs.extend(kind.scan(&site, ranges).into_iter().map(spec));
+            }
+        }
+    }
+    specs
+}
+
+/// What the logs cover. No period of a ripple is known from a residual that is mostly noise, so there is none to try.
+fn ranges(robot: &Robot, logs: &[Measured]) -> SignalRanges {
+    let joints = robot.tree().joint_count();
+    let joint = |joint: usize| {
+        let each = |pick: fn(&Measured) -> &Vec<f64>| {
+            logs.iter().flat_map(move |log| pick(log).iter().skip(joint).step_by(joints.max(1)).copied())
+        };
+        let rms = |pick: fn(&Measured) -> &Vec<f64>| {
+            let (sum, count) = each(pick).fold((0.0, 0_usize), |(sum, count), x| (sum + x * x, count + 1));
+            (sum / count.max(1) as f64).sqrt()
+        };
+        JointRange {
+            position: each(|log| &log.q)
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q))),
+            velocity_rms: rms(|log| &log.qd),
+            torque_rms: rms(|log| &log.tau),
+            torque_peak: each(|log| &log.tau).fold(0.0, |peak, torque| peak.max(torque.abs())),
+        }
+    };
+    SignalRanges {
+        joints: (0..joints).map(joint).collect(),
+        session: (0.0, logs.iter().map(Measured::duration_s).fold(0.0, f64::max)),
+        period: logs.first().map_or(0.0, |log| log.period_s),
+        ripple_frequencies: vec![Vec::new(); joints],
+        temperature: false,
+    }
+}

@@ -1,0 +1,141 @@
+//! The score test: it foretells what a fit saves, finds what no residual's colour shows, and invents nothing.
+
+mod arm;
+
+use arm::Arm;
+use phiw_curriculum::*;
+use phiw_identification::EffectSpec;
+use phiw_plant::{Effect, Friction, Mechanism};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// The paper's noise: more than the torque of any secret here.
+const NOISE: f64 = 0.05;
+
+fn logs(arm: &Arm, secret: Option<&Effect>, seed: u64) -> Vec<Measured> {
+    let mut experiment = arm.experiment();
+    experiment.effects.extend(secret.cloned());
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let trial = |motion| experiment.perform(&arm.robot, &arm.truth, motion, &mut random).unwrap().measured;
+    arm.dataset.motions().iter().map(trial).collect()
+}
+
+fn test_of(arm: &Arm) -> ScoreTest {
+    ScoreTest::new(arm.estimator())
+}
+
+fn secrets(arm: &Arm) -> [(Effect, &'static str, usize); 3] {
+    let effort = |joint: usize| arm.tree.joint(joint).limits.effort;
+    let coulomb = Friction::Coulomb { torque: 0.035 * effort(1), width: 0.01 };
+    let spring = Mechanism::Spring { stiffness: 0.1 * effort(5), rest: 0.2 };
+    [
+        (Effect::Friction { joint: 1, law: coulomb }, "coulomb_friction", 1),
+        (Effect::Mechanism { joint: 5, law: spring }, "joint_spring", 5),
+        (Effect::RotorInertia { joint: 4, inertia: 0.008 }, "rotor_inertia", 4),
+    ]
+}
+
+/// −log L of a model fitted to the logs.
+fn misfit(arm: &Arm, model: &RobotModel, logs: &[Measured]) -> f64 {
+    let design = arm.robot.design_of(model).unwrap();
+    let mut evidence = Evidence::none(&design, RowsAt::Periods).unwrap();
+    logs.iter().for_each(|log| evidence.add(&design, log).unwrap());
+    arm.estimator().misfit(&design, &evidence, &model.parameters(&arm.robot).unwrap()).unwrap().unwrap()
+}
+
+#[test]
+fn what_it_foretells_is_what_a_fit_saves() {
+    let arm = Arm::new(NOISE);
+    let test = test_of(&arm);
+    for (index, (secret, kind, joint)) in secrets(&arm).into_iter().enumerate() {
+        let logs = logs(&arm, Some(&secret), index as u64);
+        let name = arm.tree.joint_names().nth(joint).unwrap();
+        let spec = EffectSpec::new(kind, &[name]);
+        let declared = test.fitted(&arm.robot, &arm.truth, &[], &logs).unwrap();
+        let gains = arm.estimator().gains(&arm.robot, &declared, &logs, std::slice::from_ref(&spec)).unwrap();
+        let foretold = gains[0].clone().unwrap();
+        let grown = test.fitted(&arm.robot, &declared, &[spec], &logs).unwrap();
+        let saved = misfit(&arm, &declared, &logs) - misfit(&arm, &grown, &logs);
+        assert!(
+            (foretold.gain / saved - 1.0).abs() < 0.25,
+            "{kind}: {} foretold, {saved} saved",
+            foretold.gain
+        );
+        let fitted = &grown.effects.last().unwrap().parameters;
+        for (foretold, fitted) in foretold.parameters.iter().zip(fitted) {
+            assert!((foretold / fitted - 1.0).abs() < 0.25, "{kind}: {foretold} foretold, {fitted} fitted");
+        }
+    }
+}
+
+#[test]
+fn an_effect_far_below_the_noise_of_a_row_is_found_in_many() {
+    let arm = Arm::new(NOISE);
+    let test = test_of(&arm);
+    for (index, (secret, kind, joint)) in secrets(&arm).into_iter().enumerate() {
+        let logs = logs(&arm, Some(&secret), index as u64);
+        let declared = test.fitted(&arm.robot, &arm.truth, &[], &logs).unwrap();
+        let ranked = test.rank(&arm.robot, &declared, &logs).unwrap();
+        let best: Vec<_> =
+            ranked.iter().take(3).map(|gain| (&gain.effect.kind, &gain.effect.joints, gain.merit)).collect();
+        let found = test.look(&arm.robot, &declared, &logs, false, &[]).unwrap();
+        let name = arm.tree.joint_names().nth(joint).unwrap();
+        // In 18 s of this noise Coulomb and quadratic friction are nearly as likely: then one is the other's rival.
+        let is_it = |spec: &EffectSpec| spec.kind == kind && spec.joints == [name];
+        let [effect] = found.effects.as_slice() else { panic!("{kind}: {:?}, {best:?}", found.effects) };
+        assert_eq!(effect.joints, [name], "{kind}: {best:?}");
+        let told = is_it(effect) || ranked.iter().take(2).any(|gain| is_it(&gain.effect));
+        assert!(told, "{kind}: {best:?}");
+    }
+}
+
+/// Twice the gain of a right model's missing effect is χ²: of all kinds on all joints none is worth its price, and of an effect of one parameter the gain is ½
+/// on average.
+#[test]
+fn a_right_model_lacks_nothing() {
+    let arm = Arm::new(NOISE);
+    let test = test_of(&arm);
+    let (mut sum, mut count) = (0.0, 0);
+    for seed in 0..3 {
+        let logs = logs(&arm, None, 100 + seed);
+        let model = test.fitted(&arm.robot, &arm.truth, &[], &logs).unwrap();
+        let ranked = test.rank(&arm.robot, &model, &logs).unwrap();
+        let best = &ranked[0];
+        assert!(best.merit < test.least_merit, "seed {seed}: {best:?}");
+        for joint in arm.tree.joint_names() {
+            let offset = EffectSpec::new("torque_offset", &[joint]);
+            let ripple = EffectSpec::new("asymmetric_friction", &[joint]).with("part", 0.0);
+            let gains = arm.estimator().gains(&arm.robot, &model, &logs, &[offset, ripple]).unwrap();
+            for gain in gains.into_iter().flatten() {
+                sum += gain.gain;
+                count += 1;
+            }
+        }
+    }
+    let mean = sum / f64::from(count);
+    assert!((0.25..0.9).contains(&mean), "{mean} of {count}");
+}
+
+/// The offset of a spring is so nearly a weight that cond of all columns grew five-fold once the spring was found: the constraint was never relaxed again, and the
+/// same motion was chosen four times.
+#[test]
+fn an_effect_that_was_found_does_not_change_what_cond_is_of() {
+    let arm = Arm::new(0.02);
+    let (spring, _, joint) = secrets(&arm)[1].clone();
+    let mut experiment = arm.experiment();
+    experiment.effects.push(spring);
+    let (estimator, end) = (arm.estimator(), FixedCount(3));
+    let growth = ScoreTest { least_s: 5.0, ..test_of(&arm) };
+    let curriculum = Curriculum { growth: Some(&growth), ..arm.curriculum(&experiment, &estimator, &end) };
+    let mut run = Run::new(1, unreliable_model(&arm.truth, 1));
+    curriculum.run::<CurriculumError>(&mut run, |_| Ok(())).unwrap();
+    let found = &run.model.effects[arm.robot.declared().len()..];
+    let name = arm.tree.joint_names().nth(joint).unwrap();
+    assert!(found.iter().any(|effect| effect.spec.joints == [name]), "{found:?}");
+    let design = arm.robot.design(arm.robot.declared()).unwrap();
+    let mut evidence = Evidence::none(&design, RowsAt::Periods).unwrap();
+    run.logs.iter().for_each(|log| evidence.add(&design, log).unwrap());
+    let declared = arm.candidates.measured(evidence.factor()).unwrap().condition_number();
+    let kept = run.history.last().unwrap().condition_number.unwrap();
+    assert!((kept / declared - 1.0).abs() < 1e-6, "{kept}, not {declared}");
+}
