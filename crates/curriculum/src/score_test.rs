@@ -32,6 +32,8 @@ const LEAST_MERIT: f64 = 5.0;
 /// Effects of at least this share of the best one's merit are fitted beside it, and so many at most.
 const NEAR: f64 = 0.6;
 const MOST_NEAR: usize = 5;
+/// Effects whose merits differ by no more explain the logs alike; then the simplest is believed.
+const ALIKE: f64 = 3.0;
 /// How often the constants of the best are refined.
 const REFINEMENTS: usize = 2;
 
@@ -187,11 +189,17 @@ impl Growth for ScoreTest {
             let near =
                 ranked.iter().take_while(|gain| gain.merit >= NEAR * best.merit).count().min(MOST_NEAR);
             let worth = self.contest(robot, &model, &found.effects, &ranked[..near], logs)?;
-            let [(best, merit), others @ ..] = worth.as_slice() else { break };
-            let least = merit + self.least_rival.ln();
-            let rivals = others.iter().take_while(|(_, merit)| *merit >= least);
-            found.rivals.extend(rivals.map(|(rival, _)| [best.clone(), rival.clone()]));
-            found.effects.push(best.clone());
+            let Some((_, most)) = worth.first() else { break };
+            let alike: Vec<&EffectSpec> = worth
+                .iter()
+                .take_while(|(_, merit)| *merit >= most - ALIKE)
+                .map(|(effect, _)| effect)
+                .collect();
+            let Some(&simplest) = alike.iter().min_by_key(|effect| size(robot, effect)) else { break };
+            let least = most + self.least_rival.ln();
+            let rivals = worth.iter().filter(|(effect, merit)| *merit >= least && effect != simplest);
+            found.rivals.extend(rivals.map(|(rival, _)| [simplest.clone(), rival.clone()]));
+            found.effects.push(simplest.clone());
             if found.effects.len() < self.most_effects {
                 model = self.fitted(robot, &model, &found.effects, logs)?;
             }
@@ -202,6 +210,12 @@ impl Growth for ScoreTest {
     fn least_gain(&self) -> f64 {
         self.least_merit
     }
+}
+
+/// Parameters and constants of an effect.
+fn size(robot: &Robot, effect: &EffectSpec) -> usize {
+    let built = robot.catalogue().build(effect, robot.tree());
+    built.map_or(usize::MAX, |built| built.parameters().len() + effect.constants.len())
 }
 
 /// Kind and joints are the same.
