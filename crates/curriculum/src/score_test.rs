@@ -4,7 +4,7 @@ use crate::growth::{Found, Growth};
 use crate::{
     CurriculumError, Estimator, Evidence, Gain, Measured, MotionLikelihood, Robot, RobotModel, RowsAt,
 };
-use phiw_identification::EffectSpec;
+use phiw_identification::{EffectCatalogue, EffectSpec};
 use phiw_residual::catalogue::{Constants, JointRange, SignalRanges};
 
 /// Asks of every effect of the catalogue what it would save of −log L ([`MotionLikelihood::gains`]), adds the best if it is worth it, fits again, and asks again.
