@@ -24,6 +24,8 @@ pub struct ScoreTest {
     pub least_s: f64,
     /// A rival counts if it has at least this probability beside the effect that is believed.
     pub least_rival: f64,
+    /// Kinds that are not asked for. Every log of a curriculum has a clock of its own: of what changes with the time since a motor was switched on, nothing is known.
+    pub excluded: Vec<String>,
 }
 
 /// An effect of one parameter must then be four standard deviations from nothing. Seventy such effects are asked for after each log of an 18-joint robot: with all of them
@@ -40,7 +42,14 @@ const REFINEMENTS: usize = 2;
 impl ScoreTest {
     /// For a curriculum with this estimator: three effects at most, from 12 s of logs on; a rival is what has a chance of one in ten.
     pub fn new(estimator: MotionLikelihood) -> Self {
-        ScoreTest { estimator, least_merit: LEAST_MERIT, most_effects: 3, least_s: 12.0, least_rival: 0.1 }
+        ScoreTest {
+            estimator,
+            least_merit: LEAST_MERIT,
+            most_effects: 3,
+            least_s: 12.0,
+            least_rival: 0.1,
+            excluded: vec!["thermal_drift".to_owned()],
+        }
     }
 
     /// Every effect of the catalogue on every joint that a fit leaves something of, each with the constants that save most, the best first by gain
@@ -56,7 +65,8 @@ impl ScoreTest {
     ) -> Result<Vec<Gain>, CurriculumError> {
         let ranges = ranges(robot, logs);
         let present = model.specs();
-        let candidates = candidates(robot, &ranges, &present);
+        let mut candidates = candidates(robot, &ranges, &present);
+        candidates.retain(|effect| !self.excluded.contains(&effect.kind));
         let gains = self.estimator.gains(robot, model, logs, &candidates)?;
         let mut best = Vec::new();
         // Constants of one effect on one site follow each other.
