@@ -133,7 +133,7 @@ impl ScoreTest {
         let mut worth = Vec::with_capacity(near.len());
         for gain in near {
             let effect = self.refined(robot, model, logs, gain.clone())?.effect;
-            let (_, with) = self.fit(robot, model, &[known, &[effect.clone()]].concat(), logs)?;
+            let (_, with) = self.fit(robot, model, &[known, std::slice::from_ref(&effect)].concat(), logs)?;
             let price = gain.gain - gain.merit;
             worth.push((effect, without - with - price));
         }

@@ -157,7 +157,7 @@ fn iterations_section(outcome: &Outcome) -> Section {
             curves("cond(Φ) of all that was measured", &cond(closed), &cond(open), 1),
         ],
         notes: vec![
-            "cond(Φ) of a model that has grown counts its new columns too.".to_owned(),
+            "cond(Φ) is that of the declared columns, also once the model has grown.".to_owned(),
             "Iteration 0 is the initial model.".to_owned(),
         ],
         ..Section::default()
