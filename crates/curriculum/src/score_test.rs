@@ -7,7 +7,8 @@ use crate::{
 use phiw_identification::{EffectCatalogue, EffectSpec};
 use phiw_residual::catalogue::{Constants, JointRange, SignalRanges};
 
-/// Asks of every effect of the catalogue what it would save of −log L ([`MotionLikelihood::gains`]), adds the best if it is worth it, fits again, and asks again.
+/// Asks of every effect of the catalogue what it would save of −log L ([`MotionLikelihood::gains`]), fits the few best in full, adds the simplest
+/// of those that explain alike if it is worth its price, and asks again.
 ///
 /// The likelihood knows that noise moves the robot, and needs no residual with a colour: what many rows say together is enough, however far below the noise of
 /// one row an effect is. Effects whose columns look ahead in time or need derivatives of the model's torque (delay, elasticity, an encoder's offset) are no candidates:
