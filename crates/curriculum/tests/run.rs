@@ -121,7 +121,7 @@ impl Selection for First {
     }
 }
 
-/// Allows a motion up to an α that is its number over ten.
+/// Allows a motion up to an α that is its number over ten, and a little more: no test of equal numbers.
 struct Numbered;
 
 impl Constraint for Numbered {
@@ -130,7 +130,7 @@ impl Constraint for Numbered {
     }
     fn safety(&self, _: &Robot, _: &RobotModel, motion: &Motion) -> Result<Safety, CurriculumError> {
         let number: f64 = motion.name.trim_start_matches("sine_").parse().unwrap();
-        Ok(Safety { largest_reduction: 0.1 * number, margin_m: 0.0 })
+        Ok(Safety { largest_reduction: 0.1 * number + 1e-9, margin_m: 0.0 })
     }
 }
 
@@ -146,13 +146,13 @@ fn the_constraint_lets_more_in_as_it_is_relaxed() {
     let mut run = Run::new(3, unreliable_model(&arm.truth, 3));
     // One of six motions is 5 %, rounded up: the one that may be reduced most.
     let plan = curriculum.plan(&run).unwrap().unwrap();
-    assert_eq!((plan.allowed, plan.alpha), (vec![5], 0.5));
+    assert_eq!((plan.allowed, plan.alpha), (vec![5], 0.1 * 5.0 + 1e-9));
     curriculum.run::<CurriculumError>(&mut run, |_| Ok(())).unwrap();
     let alphas: Vec<f64> = run.history.iter().map(|record| record.alpha).collect();
-    assert!((alphas[1] - 0.4).abs() < 1e-12, "{alphas:?}");
+    assert!((alphas[1] - 0.4).abs() < 1e-8, "{alphas:?}");
     let conds: Vec<f64> = run.history.iter().filter_map(|record| record.condition_number).collect();
     let learnt = Learnt {
-        first_alpha: 0.5,
+        first_alpha: plan.alpha,
         first_condition_number: conds[0],
         condition_number: conds[1],
         torque_uncertainty: None,
