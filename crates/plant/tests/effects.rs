@@ -1,11 +1,11 @@
 //! Each effect, seen from outside: what the log's torque has beyond the rigid body's inverse dynamics along the true motion is the
 //! effect's own formula. The effect is felt by the motion (the loop is closed), and the log is the plant's ordinary one.
 
-mod common;
+mod plants;
 
-use common::{TrueStep, model, rms, rotors, run, setup, true_steps};
 use phiw_dynamics::{Placement, Tree, Vec3, Workspace, World};
 use phiw_plant::{Coupling, Effect, Friction, Mechanism, Presliding, Run, Sensors};
+use plants::{TrueStep, model, rms, rotors, run, setup, true_steps};
 
 /// What an effect adds to a joint's torque, step by step.
 type Formula<'a> = &'a dyn Fn(&Tree, &[TrueStep], usize) -> Vec<f64>;

@@ -1,10 +1,10 @@
 //! The robots in `models/`: their soles fit them, and what a plant needs of them is there.
 
-mod common;
+mod plants;
 
-use common::model;
 use phiw_dynamics::Placement;
 use phiw_plant::{SupportError, feet_from_toml};
+use plants::model;
 
 #[test]
 fn every_model_has_limits() {

@@ -1,13 +1,13 @@
 //! The plant as a whole: without secrets it is the rigid body, with the same seed it is the same, and it refuses nonsense.
 
-mod common;
+mod plants;
 
-use common::{analytic, model, motion, poor_controller, random, rms, rotors, run, setup, true_steps};
 use phiw_dynamics::{BackendError, DimensionError, DynamicsBackend, Foot, Placement, Tree, World};
 use phiw_plant::{
     Clock, ComputedTorque, Coupling, Effect, Friction, Gains, Mechanism, Plant, PlantError, PlantSetup, Run,
     Sensors, Timing, TorqueModel,
 };
+use plants::{analytic, model, motion, poor_controller, random, rms, rotors, run, setup, true_steps};
 
 /// A plant without noise: the logged torque is the inverse dynamics of the true motion, for any model and period.
 fn check_rigid(name: &str, control_period_s: f64, period_s: f64) {

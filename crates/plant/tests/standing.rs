@@ -1,13 +1,13 @@
 //! Robots that stand on their feet in a physics engine, under the plant's controller.
 
-mod common;
+mod plants;
 
-use common::{model, random};
 use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World};
 use phiw_plant::{
     ComputedTorque, Gains, Plant, PlantSetup, Reference, RigidBodyModel, Run, Timing, feet_from_toml,
 };
 use phiw_sim_rapier::RapierBackend;
+use plants::{model, random};
 
 fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
     Ok(Box::new(RapierBackend::new(tree, world)?.with_solver_iterations(4)?))
