@@ -30,7 +30,7 @@ pub struct ScoreTest {
 }
 
 /// An effect of one parameter must then be four standard deviations from nothing. Seventy such effects are asked for after each log of an 18-joint robot: with all of them
-/// together, one right model in two hundred gets a false name.
+/// together, one right model in two hundred gets a false name if their gains are χ² (arithmetic, not a count).
 const LEAST_MERIT: f64 = 5.0;
 /// Effects of at least this share of the best one's merit are fitted beside it, and so many at most.
 const NEAR: f64 = 0.6;
