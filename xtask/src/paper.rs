@@ -20,6 +20,7 @@ mod secrets;
 mod setup;
 mod shard;
 mod subject;
+mod tasks;
 mod tidy;
 mod whole_body;
 

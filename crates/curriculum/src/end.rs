@@ -73,3 +73,35 @@ impl EndCriterion for Converged {
         (history.len() >= self.least && settled).then_some(EndReason::Converged)
     }
 }
+
+/// The curriculum ends when the torques are known as well as was asked for.
+///
+/// [`Converged`] asks what the last motion changed; a dull one changes nothing and ends it. This asks what the estimate knows of itself
+/// ([`IterationRecord::torque_uncertainty`]), and so needs an estimator that knows its covariance ([`crate::MotionLikelihood`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Certain {
+    /// Largest RMS standard deviation of the torques that the model predicts for all motions of the dataset, weighted like the candidates: where their weights are
+    /// 1/σ, a share of the noise σ of each torque.
+    pub torque_uncertainty: f64,
+    /// Iterations at most.
+    pub most: usize,
+}
+
+impl Default for Certain {
+    /// 0.3 of the noise of a torque, ten iterations.
+    fn default() -> Self {
+        Certain { torque_uncertainty: 0.3, most: 10 }
+    }
+}
+
+impl EndCriterion for Certain {
+    fn reason(&self, history: &[IterationRecord]) -> Option<EndReason> {
+        let known = |record: &IterationRecord| {
+            record.torque_uncertainty.is_some_and(|u| u <= self.torque_uncertainty)
+        };
+        match history.last().is_some_and(known) {
+            true => Some(EndReason::Converged),
+            false => (history.len() >= self.most).then_some(EndReason::Count),
+        }
+    }
+}

@@ -26,7 +26,7 @@ pub use candidates::{Candidate, Candidates};
 pub use constraint::{Constraint, Safety, Unconstrained, ZmpConstraint};
 pub use controller::{Controller, FeedForward};
 pub use curriculum::{Curriculum, Plan, unreliable_model};
-pub use end::{Converged, EndCriterion, EndReason, FixedCount};
+pub use end::{Certain, Converged, EndCriterion, EndReason, FixedCount};
 pub use error::CurriculumError;
 pub use estimation::{
     Estimate, Estimator, Evidence, Gain, Instant, LeastSquares, MotionLikelihood, Prior, RowsAt,

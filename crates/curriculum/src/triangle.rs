@@ -154,6 +154,24 @@ impl Triangle {
         }
         if sum.is_finite() { sum } else { f64::INFINITY }
     }
+
+    /// trace(X·(ΦᵀΦ)⁻¹·Xᵀ), where `of` is R of X: the variance that unit noise leaves in X·w, summed over the rows of X; infinite for a Φ without full rank.
+    ///
+    /// # Panics
+    /// For triangles of different sizes.
+    pub fn variance_along(&self, of: &Triangle) -> f64 {
+        assert_eq!(self.size, of.size, "triangles of different sizes");
+        let mut sum = 0.0;
+        let mut row = vec![0.0; self.size];
+        for index in 0..self.size {
+            row.iter_mut()
+                .enumerate()
+                .for_each(|(column, value)| *value = of.entries[column * of.size + index]);
+            self.solve_transposed(&mut row);
+            sum += dot(&row, &row);
+        }
+        if sum.is_finite() { sum } else { f64::INFINITY }
+    }
 }
 
 pub(crate) fn dot(left: &[f64], right: &[f64]) -> f64 {

@@ -186,6 +186,17 @@ fn a_curriculum_ends_when_nothing_moves_any_more() {
     assert_eq!(criterion.reason(&long), Some(EndReason::Count));
 }
 
+#[test]
+fn a_curriculum_ends_when_the_torques_are_known_as_well_as_was_asked() {
+    let criterion = Certain { torque_uncertainty: 0.3, most: 4 };
+    let history = [Some(0.9), None, Some(0.31), Some(0.3)]
+        .map(|uncertainty| IterationRecord { torque_uncertainty: uncertainty, ..record(3000.0, 0.0) });
+    let reasons: Vec<_> = (1..=4).map(|count| criterion.reason(&history[..count])).collect();
+    assert_eq!(reasons, [None, None, None, Some(EndReason::Converged)]);
+    let ignorant: Vec<_> = (0..4).map(|_| record(3000.0, 0.0)).collect();
+    assert_eq!(criterion.reason(&ignorant), Some(EndReason::Count));
+}
+
 /// The feed-forward of a model with any effects is the torque of its columns.
 #[test]
 fn the_controller_s_torque_is_that_of_the_model() {

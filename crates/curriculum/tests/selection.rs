@@ -3,7 +3,9 @@
 mod arm;
 
 use arm::{motions, tree};
-use phiw_curriculum::selection::{AOptimal, DOptimal, Question, RandomMotion, Selection, SmallestCondition};
+use phiw_curriculum::selection::{
+    AOptimal, DOptimal, Question, RandomMotion, Selection, SmallestCondition, TorqueOptimal,
+};
 use phiw_curriculum::{Candidates, MotionDataset, Robot, Triangle};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -70,6 +72,21 @@ fn optimal_designs_are_best_by_their_own_measure() {
     let best = AOptimal.choose(&question, &mut random());
     let trace = |motion: usize| question.stack(motion).inverse_trace();
     assert!(allowed.iter().all(|&motion| trace(motion) >= trace(best.motion)));
+    let best = TorqueOptimal.choose(&question, &mut random());
+    let variance = |motion: usize| question.stack(motion).variance_along(candidates.everything());
+    assert!(allowed.iter().all(|&motion| variance(motion) >= variance(best.motion)));
+}
+
+/// cond of a motion done twice is that of one; the torques are known better after the second.
+#[test]
+fn doing_a_motion_again_is_worth_something_to_the_torques_alone() {
+    let candidates = candidates(4);
+    let once = candidates.all()[2].triangle.clone();
+    let mut twice = once.clone();
+    twice.absorb(&mut once.clone());
+    assert!((twice.condition_number() / once.condition_number() - 1.0).abs() < 1e-6);
+    let [first, second] = [&once, &twice].map(|stack| stack.variance_along(candidates.everything()));
+    assert!((second / first - 0.5).abs() < 1e-6);
 }
 
 #[test]

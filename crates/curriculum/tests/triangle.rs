@@ -1,5 +1,6 @@
 //! Small triangles against the full factor and the full singular value decomposition.
 
+use faer::linalg::solvers::DenseSolveCore;
 use phiw_curriculum::Triangle;
 use phiw_regressor::factor::Factor;
 use proptest::prelude::*;
@@ -58,6 +59,17 @@ proptest! {
         prop_assert!((triangle.log_determinant() - determinant).abs() < 1e-8 * size as f64);
         prop_assert!(close(triangle.inverse_trace(), trace, 1e-7));
     }
+
+    /// trace(X·(ΦᵀΦ)⁻¹·Xᵀ) by the inverse's columns, row by row of X.
+    #[test]
+    fn the_variance_of_predictions_is_that_of_the_inverse(size in 1..12_usize, seed in 0..1000_u64) {
+        let (factor, other) = (factor(size, 3 * size, seed, 1.0), factor(size, 2 * size, seed + 5000, 1.0));
+        let [r, x] = [&factor, &other].map(|factor| factor.as_mat().get(..size, ..size).to_owned());
+        let inverse = r.partial_piv_lu().inverse();
+        let expected = (&x * inverse).squared_norm_l2();
+        let [measured, of] = [&factor, &other].map(Triangle::of_factor);
+        prop_assert!(close(measured.variance_along(&of), expected, 1e-7));
+    }
 }
 
 #[test]
@@ -65,5 +77,6 @@ fn a_column_of_zeros_has_no_finite_condition_number() {
     let triangle = Triangle::of_factor(&Factor::of_rows(3, &[1.0, 0.0, 1.0, 2.0, 0.0, 3.0]).unwrap());
     assert_eq!(triangle.condition_number(), f64::INFINITY);
     assert_eq!(triangle.inverse_trace(), f64::INFINITY);
+    assert_eq!(triangle.variance_along(&triangle), f64::INFINITY);
     assert_eq!(Triangle::empty(0).condition_number(), 1.0);
 }

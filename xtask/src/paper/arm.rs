@@ -1,6 +1,6 @@
 //! What is compared: the arms of the experiment.
 
-use phiw_curriculum::selection::{Choice, Question, RandomMotion, SmallestCondition};
+use phiw_curriculum::selection::{Choice, Question, RandomMotion, SmallestCondition, TorqueOptimal};
 use phiw_curriculum::{Constraint, MotionDataset, Selection, Unconstrained};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -18,9 +18,11 @@ pub enum Arm {
     Random,
     /// The smallest cond, whatever the constraint says.
     Greedy,
-    /// Any motion of one task: the paper's Open.
+    /// The smallest uncertainty of the torques of all motions, under the constraint.
+    TorqueOptimal,
+    /// Any motion of one task that could be chosen at first: the paper's Open.
     TaskA,
-    /// Any motion of another task: the paper's Scoop.
+    /// Any motion of another such task: the paper's Scoop.
     TaskB,
 }
 
@@ -42,6 +44,7 @@ impl Arm {
             Arm::Closed => "closed",
             Arm::Random => "random",
             Arm::Greedy => "greedy",
+            Arm::TorqueOptimal => "torque-optimal",
             Arm::TaskA => "task-a",
             Arm::TaskB => "task-b",
         }
@@ -58,6 +61,7 @@ impl Arm {
         match self {
             Arm::Curriculum | Arm::Closed | Arm::Greedy => Box::new(SmallestCondition),
             Arm::Random => Box::new(RandomMotion),
+            Arm::TorqueOptimal => Box::new(TorqueOptimal),
             Arm::TaskA => of_task(&tasks[0]),
             Arm::TaskB => of_task(&tasks[1]),
         }
@@ -66,7 +70,7 @@ impl Arm {
     /// What it may choose.
     pub fn constraint(self, zmp: &dyn Constraint) -> &dyn Constraint {
         match self {
-            Arm::Curriculum | Arm::Closed | Arm::Random => zmp,
+            Arm::Curriculum | Arm::Closed | Arm::Random | Arm::TorqueOptimal => zmp,
             Arm::Greedy | Arm::TaskA | Arm::TaskB => &Unconstrained,
         }
     }

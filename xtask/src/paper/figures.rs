@@ -127,8 +127,10 @@ fn parameters(results: &Results, page: &mut Page) {
         ("same logs, (4)", scores(|score| score.rmse_w_least_squares)),
         ("same logs, weighted", scores(|score| score.rmse_w_weighted)),
     ];
-    let random = results.scores(results.home(), Arm::Random, |score| Some(score.rmse_w));
-    let groups: Vec<_> = groups.into_iter().chain([("random choice", random)]).collect();
+    let others = [("random choice", Arm::Random), ("torque-optimal", Arm::TorqueOptimal)];
+    let others =
+        others.map(|(name, arm)| (name, results.scores(results.home(), arm, |score| Some(score.rmse_w))));
+    let groups: Vec<_> = groups.into_iter().chain(others).collect();
     let last = groups[0].1.last().map_or(f64::NAN, |values| median(values));
     boxes(
         page,
@@ -141,7 +143,11 @@ fn parameters(results: &Results, page: &mut Page) {
 
 fn conditions(results: &Results, page: &mut Page) {
     let cond = |arm| results.records(results.home(), arm, |record| record.condition_number);
-    let groups = [("curriculum", cond(Arm::Curriculum)), ("random", cond(Arm::Random))];
+    let groups = [
+        ("curriculum", cond(Arm::Curriculum)),
+        ("random", cond(Arm::Random)),
+        ("torque-optimal", cond(Arm::TorqueOptimal)),
+    ];
     boxes(
         page,
         &groups,
@@ -158,6 +164,8 @@ fn torques(results: &Results, page: &mut Page) {
         (a.as_str(), scores(Arm::TaskA)),
         (b.as_str(), scores(Arm::TaskB)),
         ("curriculum", scores(Arm::Curriculum)),
+        ("random", scores(Arm::Random)),
+        ("torque-optimal", scores(Arm::TorqueOptimal)),
     ];
     boxes(
         page,

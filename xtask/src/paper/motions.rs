@@ -35,8 +35,6 @@ pub struct Motions {
     pub identification: Vec<Motion>,
     /// Those to validate on.
     pub validation: Vec<Motion>,
-    /// The two tasks of the task-specific models.
-    pub tasks: [String; 2],
     /// A number that tells these motions from others.
     pub digest: String,
 }
@@ -146,12 +144,11 @@ impl Motions {
                 held.push(index);
             }
         }
-        let tasks = two_tasks(&motions);
         let (mut identification, mut validation) = (Vec::new(), Vec::new());
         for (index, motion) in motions.into_iter().enumerate() {
             if held.contains(&index) { &mut validation } else { &mut identification }.push(motion);
         }
-        Motions { identification, validation, tasks, digest }
+        Motions { identification, validation, digest }
     }
 }
 
@@ -169,18 +166,6 @@ fn task(name: &str) -> &str {
         Some("F") => "reach forward",
         _ => name.split('_').next().unwrap_or(name),
     }
-}
-
-/// The paper's open and scoop where there are such; else the two largest tasks.
-fn two_tasks(motions: &[Motion]) -> [String; 2] {
-    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-    motions.iter().for_each(|motion| *counts.entry(&motion.task).or_default() += 1);
-    if ["open", "scoop"].iter().all(|task| counts.contains_key(task)) {
-        return ["open", "scoop"].map(str::to_owned);
-    }
-    let mut names: Vec<(&str, usize)> = counts.into_iter().collect();
-    names.sort_by_key(|&(name, count)| (std::cmp::Reverse(count), name));
-    [0, 1].map(|place| names.get(place).map_or_else(String::new, |(name, _)| (*name).to_owned()))
 }
 
 /// The set's folder as C3D files: two-handed motions, then single trials. Static trials lie beside both.

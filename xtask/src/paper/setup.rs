@@ -4,6 +4,7 @@ use super::arguments::{Detector, EstimatorName, Initial, PriorName, RelaxationNa
 use super::motions::{Motions, Source};
 use super::run_file;
 use super::subject::{Subject, SubjectName};
+use super::tasks::two_tasks;
 use super::whole_body::Standing;
 use crate::plant_experiment::case;
 use crate::plant_experiment::engine::Engine;
@@ -167,6 +168,11 @@ impl Setup {
         };
         let prior = arguments.prior.unwrap_or(prior);
         let relaxation = arguments.relaxation.unwrap_or(relaxation);
+        let relaxation_of_alpha: Box<dyn Relaxation> = match relaxation {
+            RelaxationName::Condition => Box::new(ConditionRelaxation::default()),
+            RelaxationName::Uncertainty => Box::new(UncertaintyRelaxation::default()),
+        };
+        let constraint = ZmpConstraint::new(subject.stance.clone());
         let settings = Settings {
             backend: format!("{:?}", arguments.backend).to_lowercase(),
             robot: arguments.robot,
@@ -191,7 +197,7 @@ impl Setup {
                 })
                 .collect(),
             held_out: motions.validation.iter().map(|motion| motion.name.clone()).collect(),
-            tasks: motions.tasks,
+            tasks: two_tasks(&robot, &truth, &dataset, &constraint, relaxation_of_alpha.as_ref())?,
             estimator: arguments.estimator,
             prior,
             relaxation,
@@ -204,11 +210,8 @@ impl Setup {
             about: subject.stance.about(),
         };
         let mut setup = Setup {
-            constraint: ZmpConstraint::new(subject.stance.clone()),
-            relaxation: match relaxation {
-                RelaxationName::Condition => Box::new(ConditionRelaxation::default()),
-                RelaxationName::Uncertainty => Box::new(UncertaintyRelaxation::default()),
-            },
+            constraint,
+            relaxation: relaxation_of_alpha,
             validation: Validation { logs: Vec::new(), declared: (Factor::empty(0), 0.0) },
             held_out: motions.validation,
             settings,

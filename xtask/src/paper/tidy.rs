@@ -5,6 +5,7 @@ use super::report::Results;
 use super::run_file::replace;
 use super::{numbers, reliability, secrets};
 use crate::plant_experiment::secret::SecretKind;
+use phiw_curriculum::Converged;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
@@ -34,7 +35,7 @@ fn iterations(results: &Results) -> String {
          rmse_w_least_squares,rmse_w_weighted,rmse_torque_nm,would_have_ended\n",
     );
     for run in &results.runs {
-        let end = ended_after(run);
+        let end = ended_after(run, &Converged::default());
         for (iteration, score) in run.scores.iter().enumerate() {
             let record = iteration.checked_sub(1).and_then(|index| run.run.history.get(index));
             // Writing to a string does not fail.

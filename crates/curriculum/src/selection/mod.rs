@@ -4,7 +4,7 @@ mod optimal;
 mod random;
 mod smallest_condition;
 
-pub use optimal::{AOptimal, DOptimal};
+pub use optimal::{AOptimal, DOptimal, TorqueOptimal};
 pub use random::RandomMotion;
 pub use smallest_condition::SmallestCondition;
 

@@ -31,3 +31,23 @@ impl Selection for AOptimal {
         smallest(question.allowed, |motion| question.stack(motion).inverse_trace())
     }
 }
+
+/// The smallest variance of the torques that the model will predict, on average over all motions of the dataset: what the torque error (19) measures.
+///
+/// The paper's cond does not change when Φ is done again, so that where one motion keeps it small it is chosen again and again, though another sample of it
+/// tells little. The variance of the predictions counts both: each direction of w as much as the motions feel it, and how often it was seen. It is the
+/// I- or V-optimality of the design of experiments (Atkinson, Donev and Tobias, Optimum Experimental Designs, 2007, §10.6), over a finite set of motions.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TorqueOptimal;
+
+impl Selection for TorqueOptimal {
+    fn name(&self) -> &'static str {
+        "torque_optimal"
+    }
+
+    /// The merit is trace(Φ_all·(ΦᵀΦ)⁻¹·Φ_allᵀ), with the rows weighted like the candidates.
+    fn choose(&self, question: &Question<'_>, _: &mut ChaCha8Rng) -> Choice {
+        let everything = question.candidates.everything();
+        smallest(question.allowed, |motion| question.stack(motion).variance_along(everything))
+    }
+}

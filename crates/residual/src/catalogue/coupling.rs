@@ -191,19 +191,27 @@ impl Effect for Coupling {
         self.terms.iter().enumerate().flat_map(of_term).collect()
     }
     fn evaluator(&self) -> Box<dyn Evaluator + '_> {
-        Box::new(CouplingColumns(self))
+        Box::new(CouplingColumns {
+            site: self.site,
+            width: constant(&self.spec.constants, WIDTH, 0.0),
+            formulas: self.terms.iter().flat_map(|term| term.columns).flatten().collect(),
+        })
     }
 }
 
-struct CouplingColumns<'a>(&'a Coupling);
+struct CouplingColumns {
+    site: [usize; 2],
+    /// Velocity over which a sign turns \[rad/s, m/s\].
+    width: f64,
+    formulas: Vec<MotionColumn>,
+}
 
-impl Evaluator for CouplingColumns<'_> {
+impl Evaluator for CouplingColumns {
     fn evaluate(&mut self, sample: &Sample<'_>, columns: &mut [f64]) {
-        let both = |values: &[f64]| self.0.site.map(|joint| values[joint]);
-        let width = constant(&self.0.spec.constants, WIDTH, 0.0);
-        let motion = Motion { velocity: both(sample.qd()), acceleration: both(sample.qdd()), width };
-        let formulas = self.0.terms.iter().flat_map(|term| term.columns).flatten();
-        for (column, formula) in columns.iter_mut().zip(formulas) {
+        let both = |values: &[f64]| self.site.map(|joint| values[joint]);
+        let motion =
+            Motion { velocity: both(sample.qd()), acceleration: both(sample.qdd()), width: self.width };
+        for (column, formula) in columns.iter_mut().zip(&self.formulas) {
             *column = formula(&motion);
         }
     }
