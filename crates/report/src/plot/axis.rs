@@ -52,7 +52,7 @@ impl Axis {
         let (low, high) = if low > high { (0.0, 1.0) } else { (low, high) };
         let (mut low, mut high) = (low - 0.02, high + 0.02);
         if high - low < 1.0 {
-            (low, high) = (low.floor(), high.ceil());
+            (low, high) = between_round_values((low, high));
         }
         let (first, last) = (low.ceil() as i32, high.floor() as i32);
         let ticks = if last - first < 2 { few_decades((low, high)) } else { decades(first, last) };
@@ -89,6 +89,18 @@ fn few_decades((low, high): (f64, f64)) -> Vec<(f64, String)> {
         .map(|value| (value.log10(), number::tick(value, 10f64.powf(value.log10().floor()))))
         .filter(|(position, _)| (low..=high).contains(position))
         .collect()
+}
+
+/// The nearest of 1, 2 and 5 times the decades below and above a range, so that a narrow one has ticks and is not lost between whole decades.
+fn between_round_values((low, high): (f64, f64)) -> (f64, f64) {
+    let round = || {
+        let exponents = low.floor() as i32..=high.ceil() as i32;
+        exponents
+            .flat_map(|exponent| [1.0, 2.0, 5.0].map(|multiple| (multiple * 10f64.powi(exponent)).log10()))
+    };
+    let below = round().filter(|value| *value <= low).fold(low.floor(), f64::max);
+    let above = round().filter(|value| *value >= high).fold(high.ceil(), f64::min);
+    (below, above)
 }
 
 /// log₁₀, NaN where there is none.
@@ -169,6 +181,8 @@ mod tests {
         }
         assert_eq!(labels(Axis::logarithmic("", [0.02, 300.0, 0.0])), "0.1 1 10 100");
         assert_eq!(labels(Axis::logarithmic("", [66.0, 900.0])), "100 200 500");
+        assert_eq!(labels(Axis::logarithmic("", [3300.0, 6400.0])), "2000 5000 10000");
+        assert_eq!(labels(Axis::logarithmic("", [7.0])), "5 10");
         assert_eq!(labels(Axis::logarithmic("", [])), "1 2 5 10");
     }
 
