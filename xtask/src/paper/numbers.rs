@@ -72,7 +72,9 @@ pub fn rows(results: &Results) -> Vec<[String; 4]> {
     }
     let cond = |arm: Arm| results.records(home, arm, |record| record.condition_number);
     row("cond(Φ), median by iteration: curriculum", "falls, see figure 7", medians(&cond(Curriculum), 0), "");
-    row("cond(Φ), median by iteration: random", "above it", medians(&cond(Random), 0), "");
+    if results.has(home, Random) {
+        row("cond(Φ), median by iteration: random", "above it", medians(&cond(Random), 0), "");
+    }
     for arm in others().filter(|arm| *arm != Random) {
         row(&format!("cond(Φ), median by iteration: {}", arm.name()), "", medians(&cond(arm), 0), "");
     }

@@ -1,0 +1,52 @@
+//! The next motion among 98 of the 18-joint upper body, four of them measured: 132 parameters, motions of 7 s.
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use phiw_curriculum::selection::{Question, Selection, SmallestCondition, TorqueOptimal};
+use phiw_curriculum::{Candidates, Motion, MotionDataset, Robot, Triangle};
+use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+use phiw_plant::{MultiSine, Reference};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::hint::black_box;
+
+const MOTIONS: usize = 98;
+const SAMPLES: usize = 701;
+
+fn all(criterion: &mut Criterion) {
+    let urdf = include_str!("../../../models/upper_body18.urdf");
+    let tree = read_urdf(urdf, &UrdfOptions::default()).expect("a URDF").tree;
+    let joints = tree.joint_count();
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let motions = (0..MOTIONS)
+        .map(|index| {
+            let sine = MultiSine::random(&tree, 7.0, 0.6, [0.4, 0.4], &mut random);
+            let mut signals = [0; 3].map(|_| vec![0.0; SAMPLES * joints]);
+            let [q, v, a] = &mut signals;
+            for k in 0..SAMPLES {
+                let own = k * joints..(k + 1) * joints;
+                sine.at(0.01 * k as f64, &mut q[own.clone()], &mut v[own.clone()], &mut a[own]);
+            }
+            Motion::new(&index.to_string(), "sine", joints, 0.01, signals).expect("a motion")
+        })
+        .collect();
+    let dataset = MotionDataset::new(joints, motions).expect("a dataset");
+    let robot = Robot::with_viscous_friction(tree, [0.0; 10]).expect("a robot");
+    let weights = vec![1.0; joints];
+    let candidates =
+        Candidates::new(&robot, robot.declared(), &dataset, &weights).expect("motions of this robot");
+    let mut measured = Triangle::empty(candidates.everything().size());
+    for candidate in &candidates.all()[..4] {
+        measured.absorb(&mut candidate.triangle.clone());
+    }
+    let allowed: Vec<usize> = (0..MOTIONS).collect();
+    let question = Question { candidates: &candidates, allowed: &allowed, measured: Some(&measured) };
+    criterion.bench_function("smallest condition, 98 candidates", |bencher| {
+        bencher.iter(|| SmallestCondition.choose(black_box(&question), &mut random));
+    });
+    criterion.bench_function("torque-optimal, 98 candidates", |bencher| {
+        bencher.iter(|| TorqueOptimal.choose(black_box(&question), &mut random));
+    });
+}
+
+criterion_group!(selection, all);
+criterion_main!(selection);
