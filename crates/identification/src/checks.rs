@@ -52,6 +52,15 @@ pub enum InputError {
         /// The joint.
         joint: String,
     },
+    /// Nothing moves in what is held out.
+    #[error(
+        "{held_out}: no joint moves there, so nothing can be said of the model's error on motion held out; \
+         name a log with motion (--validate), or cut the rest off the log"
+    )]
+    NothingHeldOut {
+        /// The stretches that are held out, in words.
+        held_out: String,
+    },
     /// Fewer rows than parameters.
     #[error(
         "the training logs are too short: {rows} rows after filtering, but {parameters} parameters are to be found; \

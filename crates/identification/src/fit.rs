@@ -100,6 +100,18 @@ pub fn torque_error(folds: &[GroupedFactor], parameters: &[f64]) -> Result<Torqu
     Ok(TorqueError { rmse: rms(&squares), rms_torque: rms(&torques), relative, rows })
 }
 
+/// Rows of a torque from which on its error counts as measured; fewer come from a joint that only twitches.
+const LEAST_ROWS: u64 = 8;
+
+/// For each torque whether `folds` hold enough motion of its joint to say anything of its error.
+///
+/// # Errors
+/// The folds are of different designs.
+pub fn tells_of_torques(folds: &[GroupedFactor]) -> Result<Vec<bool>, RegressorError> {
+    let all = merge(folds)?;
+    Ok(all.groups().iter().map(|group| group.factor.rows() >= LEAST_ROWS).collect())
+}
+
 fn check_length(design: &Design, all: &GroupedFactor) -> Result<(), IdentificationError> {
     let rows = all.rows();
     let parameters = design.parameter_count();

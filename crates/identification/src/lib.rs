@@ -20,7 +20,7 @@ pub use checks::{InputError, check_excitation, check_logs};
 pub use design::{Design, DesignScratch, RowLayout};
 pub use effect::{Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Entry, Evaluator};
 pub use error::IdentificationError;
-pub use fit::{Fit, TorqueError, fit, merge, torque_error};
+pub use fit::{Fit, TorqueError, fit, merge, tells_of_torques, torque_error};
 pub use identify::{Data, Identified, Variants, identify};
 pub use kept_blocks::KeptBlocks;
 pub use log_set::{HELD_OUT_SHARE, LogFile, LogSet, Progress};

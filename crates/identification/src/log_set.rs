@@ -122,6 +122,19 @@ impl LogSet {
         }
     }
 
+    /// What is held out, in words: the logs for validation, or the ends of the training logs.
+    pub fn held_out_in_words(&self) -> String {
+        let names = |surveys: &[Survey]| {
+            surveys.iter().map(|survey| survey.path.display().to_string()).collect::<Vec<_>>().join(", ")
+        };
+        match self.splits_training_logs() {
+            true => {
+                format!("the last {:.0} % of {}", 1e2 * HELD_OUT_SHARE, names(self.training()))
+            }
+            false => names(&self.surveys[self.train..]),
+        }
+    }
+
     /// The logs as sources of blocks.
     pub fn sources<'a>(&'a self, progress: Progress<'a>) -> Vec<LogFile<'a>> {
         self.surveys
@@ -140,7 +153,10 @@ fn cut<'a>(parts: impl Iterator<Item = (usize, &'a Survey, f64, f64)>, count: us
     let spans: Vec<(usize, f64, f64)> = parts
         .map(|(log, survey, from, to)| {
             let (first, last) = survey.time_range();
-            (log, first + from * (last - first), first + to * (last - first))
+            // A fold does not hold its end, and the last moment of a log belongs to its last fold.
+            let last_moment =
+                if to >= 1.0 { last + 0.5 * survey.period } else { first + to * (last - first) };
+            (log, first + from * (last - first), last_moment)
         })
         .collect();
     let total: f64 = spans.iter().map(|(_, start, end)| end - start).sum();
@@ -150,10 +166,6 @@ fn cut<'a>(parts: impl Iterator<Item = (usize, &'a Survey, f64, f64)>, count: us
         let pieces = pieces(start, end);
         let edge = |piece: usize| start + (end - start) * piece as f64 / pieces as f64;
         folds.extend((0..pieces).map(|piece| Fold { log, start: edge(piece), end: edge(piece + 1) }));
-        // The last moment belongs to the last stretch.
-        if let Some(last) = folds.last_mut() {
-            last.end = end + 1e-9 * end.abs().max(1.0);
-        }
     }
     folds
 }

@@ -32,13 +32,15 @@ impl<'a> Analysis<'a> {
     /// A log cannot be read any more.
     pub fn new(session: &'a Session, data: &Data<'_>, identified: &'a Identified) -> Result<Self, Error> {
         let Identified { design, fit, .. } = identified;
+        let at_rest = session.joints_without_held_out_motion(&identified.held_out_folds)?;
         let conditioning = session.logs.conditioning();
         let cutoffs = (conditioning.cutoff_hz, conditioning.parallel_cutoff_hz);
         let model = Model::of_fit(design, fit, &session.declared, &session.arguments.hold, cutoffs)?;
         let folds = [data.train.as_slice(), data.held_out.as_slice()];
         let traces = Traces::collect(design, &fit.parameters, folds, &data.sources)?;
         let noise_floor = noise_floor(session, data, &model)?;
-        let warnings = warnings::all(session, identified);
+        let mut warnings = warnings::all(session, identified);
+        warnings.extend(warnings::at_rest_where_held_out(session, &at_rest));
         Ok(Analysis { session, identified, model, traces, noise_floor, warnings })
     }
 

@@ -131,6 +131,7 @@ fn start(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Re
     let cutoffs = (session.logs.conditioning().cutoff_hz, session.logs.conditioning().parallel_cutoff_hz);
     let Some(path) = &arguments.model else {
         let identified: Identified = identify(&session.tree, session.effects()?, data)?;
+        session.joints_without_held_out_motion(&identified.held_out_folds)?;
         let Identified { design, fit, .. } = &identified;
         return Ok(Start {
             model: Model::of_fit(design, fit, &session.declared, &session.arguments.hold, cutoffs)?,

@@ -5,8 +5,10 @@ use crate::arguments::SessionArguments;
 use phiw_dynamics::urdf::{Finding, UrdfOptions, read_urdf};
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::{
-    BlockSource, Data, EffectError, LogFile, LogSet, Progress, Variants, check_excitation,
+    BlockSource, Data, EffectError, IdentificationError, InputError, LogFile, LogSet, Progress, Variants,
+    check_excitation, tells_of_torques,
 };
+use phiw_regressor::least_squares::GroupedFactor;
 use phiw_residual::{Catalogue, SignalRanges};
 use phiw_telemetry::ConditioningOptions;
 
@@ -74,6 +76,18 @@ impl Session {
             sources: sources.iter().map(|source| source as &dyn BlockSource).collect(),
             rest_speeds: self.logs.rest_speeds(),
         }
+    }
+
+    /// Joints of which the folds held out say nothing, since they do not move there.
+    ///
+    /// # Errors
+    /// No joint moves in what is held out: then there is no error to report, and no verdict.
+    pub fn joints_without_held_out_motion(&self, held_out: &[GroupedFactor]) -> Result<Vec<usize>, Error> {
+        let tells = tells_of_torques(held_out).map_err(IdentificationError::from)?;
+        if !tells.contains(&true) {
+            return Err(InputError::NothingHeldOut { held_out: self.logs.held_out_in_words() }.into());
+        }
+        Ok((0..tells.len()).filter(|&joint| !tells[joint]).collect())
     }
 
     /// Unit of a joint's torque.

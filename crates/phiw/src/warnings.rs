@@ -30,6 +30,19 @@ pub fn all(session: &Session, identified: &Identified) -> Vec<String> {
     warnings
 }
 
+/// Joints that do not move in what is held out: an error of zero there means nothing.
+pub fn at_rest_where_held_out(session: &Session, joints: &[usize]) -> Option<String> {
+    let names: Vec<String> =
+        joints.iter().map(|&joint| format!("`{}`", session.tree.joint(joint).joint)).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{} does not move in what is held out ({}): nothing is known of the model's error there; hold out a log in which it moves",
+            names.join(", "),
+            session.logs.held_out_in_words()
+        )
+    })
+}
+
 /// File name of a log.
 pub fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
