@@ -135,6 +135,11 @@ impl Design {
         moves(evaluation[self.width + row])
     }
 
+    /// What the effects' columns need beside the signals.
+    pub fn needs(&self) -> Needs {
+        self.needs
+    }
+
     /// The same with a rigid-body model for the effects whose columns need torques.
     pub fn with_reference(mut self, reference: ReferenceModel) -> Self {
         self.reference = Some(reference);

@@ -1,8 +1,8 @@
 //! The declared model, identified: constants chosen, parameters fitted, error held out.
 
 use crate::{
-    BlockSource, Design, Effect, Fit, Fold, IdentificationError, TorqueError, accumulate, fit, merge,
-    torque_error,
+    BlockSource, Design, Effect, Fit, Fold, IdentificationError, ReferenceModel, TorqueError, accumulate,
+    fit, merge, torque_error,
 };
 use phiw_dynamics::Tree;
 use phiw_regressor::factor::FactorBuilder;
@@ -59,8 +59,17 @@ pub fn identify(
         slots.push(all.len()..all.len() + variants.len());
         all.extend(variants);
     }
-    let design = Design::new(tree.clone(), base.clone(), all).with_rest_speeds(rest_speeds.clone());
-    let mut folds = accumulate(&design, &[train.as_slice(), held_out].concat(), sources)?;
+    let mut design = Design::new(tree.clone(), base.clone(), all).with_rest_speeds(rest_speeds.clone());
+    let all_folds = [train.as_slice(), held_out].concat();
+    let mut folds = accumulate(&design, &all_folds, sources)?;
+    if design.needs().of_reference() {
+        // Columns made of the model's torque are zero, or the URDF's, before there is a model.
+        for _ in 0..REFERENCE_PASSES {
+            let reference = ReferenceModel::new(fitted_tree(&design, &slots, &folds[..train.len()])?);
+            design = design.with_reference(reference);
+            folds = accumulate(&design, &all_folds, sources)?;
+        }
+    }
     let chosen = choose(&design, &slots, &merge(&folds[..train.len()])?)?;
     let kept: Vec<usize> =
         (0..base.count()).chain(chosen.iter().flat_map(|&effect| design.effect_parameters(effect))).collect();
@@ -78,6 +87,32 @@ pub fn identify(
         train_folds: folds,
         held_out_folds,
     })
+}
+
+/// Passes over the logs that bring the model's torque into the columns that need it; a third changes nothing that the logs can tell.
+const REFERENCE_PASSES: usize = 2;
+
+/// The robot with the inertial parameters that the training folds tell with the columns as they are.
+fn fitted_tree(
+    design: &Design,
+    slots: &[std::ops::Range<usize>],
+    train: &[GroupedFactor],
+) -> Result<Tree, IdentificationError> {
+    let factors = merge(train)?;
+    let chosen = choose(design, slots, &factors)?;
+    let undetermined = undetermined_with(design, &chosen, &factors)?;
+    let base = design.base();
+    let determined: Vec<usize> = (0..base.count())
+        .chain(chosen.iter().flat_map(|&effect| design.effect_parameters(effect)))
+        .filter(|parameter| !undetermined.contains(parameter))
+        .collect();
+    let solution = weighted_least_squares(&factors.select(&determined)?)?;
+    let mut parameters = vec![0.0; base.count()];
+    let inertial = determined.iter().zip(&solution.parameters).filter(|(column, _)| **column < base.count());
+    inertial.for_each(|(&column, value)| parameters[column] = *value);
+    let mut tree = design.tree().clone();
+    tree.set_inertial_parameters(&base.to_standard(&parameters, &crate::with_masses(design.tree()))?)?;
+    Ok(tree)
 }
 
 /// Share of a torque's residual variance that a variant of a declared effect must save over a simpler one.
@@ -98,25 +133,30 @@ fn choose(
         return Ok(chosen);
     }
     let undetermined = undetermined_with(design, &chosen, factors)?;
-    let columns = |chosen: &[usize]| -> Vec<usize> {
-        (0..design.base().count())
-            .chain(chosen.iter().flat_map(|&effect| design.effect_parameters(effect)))
-            .filter(|parameter| !undetermined.contains(parameter))
-            .collect()
+    // The columns of the slot that is being chosen all stay, so that its variants have equally many: which of them are determined differs.
+    let columns = |chosen: &[usize], open: Option<usize>| -> Vec<usize> {
+        let of_effect = |(slot, &effect): (usize, &usize)| {
+            let stays = open == Some(slot);
+            let parameters = design.effect_parameters(effect);
+            parameters.filter(|parameter| stays || !undetermined.contains(parameter)).collect::<Vec<_>>()
+        };
+        let base = (0..design.base().count()).filter(|parameter| !undetermined.contains(parameter));
+        base.chain(chosen.iter().enumerate().flat_map(of_effect)).collect()
     };
     for _ in 0..SWEEPS {
         let before = chosen.clone();
-        let solution = solve_determined(&factors.select(&columns(&chosen))?)?;
+        let solution = solve_determined(&factors.select(&columns(&chosen, None))?)?;
         for (slot, variants) in slots.iter().enumerate() {
             if variants.len() <= 1 {
                 continue;
             }
-            let rest = Rest::new(design, factors, &solution, &columns(&chosen), chosen[slot])?;
+            let kept = columns(&chosen, Some(slot));
+            let rest = Rest::new(design, factors, &solution, &kept, chosen[slot])?;
             let mut merits = Vec::with_capacity(variants.len());
             for variant in variants.clone() {
                 let mut trial = chosen.clone();
                 trial[slot] = variant;
-                merits.push(rest.log_error(factors, &columns(&trial))?);
+                merits.push(rest.log_error(factors, &columns(&trial, Some(slot)))?);
             }
             let best = merits.iter().copied().fold(f64::INFINITY, f64::min);
             let margin = 0.5 * rest.own_rows(factors) * WORTH_A_VARIANT;

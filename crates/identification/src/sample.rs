@@ -29,6 +29,11 @@ impl Needs {
         }
     }
 
+    /// Whether a reference model is needed.
+    pub fn of_reference(self) -> bool {
+        self.torque || self.total_torque || self.derivatives || self.gravity
+    }
+
     /// Whether nothing is needed.
     pub fn is_empty(self) -> bool {
         self == Self::default()

@@ -107,3 +107,36 @@ fn a_joint_at_rest_where_held_out_is_said() {
         "{warnings:?}"
     );
 }
+
+/// The variants of an effect had different numbers of determined columns: "columns of the merged factor has 49 elements, but this robot needs 48".
+#[test]
+fn short_logs_and_effects_that_need_the_models_torque_end_in_a_result_or_a_reason() {
+    let whole = synthetic::recording(1, 20.0);
+    let declared = "viscous_friction,coulomb_friction,load_dependent_friction";
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("robot.urdf"), synthetic::URDF).unwrap();
+    let mut ends = [0; 2];
+    for (case, rows) in (10..200).step_by(19).chain([400, 4000]).enumerate() {
+        let mut log = whole.clone();
+        log.t.truncate(rows);
+        log.q.truncate(3 * rows);
+        log.tau.truncate(3 * rows);
+        fs::write(path("train.csv"), synthetic::csv(&log)).unwrap();
+        for command in ["identify", "explain"] {
+            let mut phiw = Command::cargo_bin("phiw").unwrap();
+            phiw.arg(command).arg("--urdf").arg(path("robot.urdf")).arg("--train").arg(path("train.csv"));
+            let out = path(&format!("{command}-{case}"));
+            let output = phiw.args(["--declare", declared]).arg("--out").arg(&out).output().unwrap();
+            let message = String::from_utf8_lossy(&output.stderr);
+            let code = output.status.code().unwrap();
+            assert!(code == 0 || code == 2, "{rows} rows, {command}: {message}");
+            assert!(
+                code == 0 || message.starts_with("error: ") && !message.contains("elements"),
+                "{message}"
+            );
+            ends[usize::from(code == 0)] += 1;
+        }
+    }
+    assert!(ends[0] > 0 && ends[1] >= 2, "{ends:?}");
+}
