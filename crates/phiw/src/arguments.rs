@@ -196,6 +196,11 @@ pub struct SessionArguments {
 }
 
 impl SessionArguments {
+    /// The files that are read.
+    pub fn inputs(&self) -> Vec<PathBuf> {
+        std::iter::once(&self.urdf).chain(&self.train).chain(&self.validate).cloned().collect()
+    }
+
     /// The command line that gives these arguments to `phiw` and `command`, quoted for a shell.
     pub fn command_line(&self, command: &str) -> String {
         let mut words = vec!["phiw".to_owned(), command.to_owned()];

@@ -1,6 +1,39 @@
 //! What is shown while the work goes on.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::Write;
+
+/// One message on standard error, of one line. Where nobody listens any more, nothing is lost but the message.
+pub fn say(prefix: &str, message: &str) {
+    let mut line = String::from(prefix);
+    message.chars().for_each(|c| push_visible(&mut line, c));
+    line.push('\n');
+    let _ = std::io::stderr().write_all(line.as_bytes());
+}
+
+/// A text of several lines on standard output. A reader that has seen enough (`| head`) is no failure.
+pub fn print(text: &str) {
+    let _ = std::io::stdout().write_all(visible(text).as_bytes());
+}
+
+/// The text as a terminal may have it: names in logs and robots can hold characters that move its cursor, colour it or turn its direction.
+pub fn visible(text: &str) -> String {
+    let mut clean = String::with_capacity(text.len());
+    for c in text.chars() {
+        if c == '\n' { clean.push(c) } else { push_visible(&mut clean, c) }
+    }
+    clean
+}
+
+fn push_visible(text: &mut String, c: char) {
+    let turns_direction =
+        matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    if c.is_control() || turns_direction {
+        text.extend(c.escape_default());
+    } else {
+        text.push(c);
+    }
+}
 
 /// Shows how far the work is on standard error, or nothing.
 pub struct Console {
@@ -30,8 +63,9 @@ impl Console {
         if self.bar.is_hidden() {
             return;
         }
+        let what = visible(what).replace('\n', "\\n");
         if self.bar.message() != what {
-            self.bar.set_message(what.to_owned());
+            self.bar.set_message(what);
             self.bar.set_length(total);
             self.bar.reset();
         }
@@ -47,5 +81,18 @@ impl Console {
 impl Drop for Console {
     fn drop(&mut self) {
         self.finish();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_characters_of_inputs_do_not_reach_the_terminal() {
+        assert_eq!(
+            visible("a\u{1b}[2Jb\r\u{9b}c\u{202e}d\nε — ü"),
+            "a\\u{1b}[2Jb\\r\\u{9b}c\\u{202e}d\nε — ü"
+        );
     }
 }

@@ -3,6 +3,7 @@
 use phiw_curriculum::CurriculumError;
 use phiw_dynamics::urdf::UrdfError;
 use phiw_identification::{EffectError, IdentificationError, InputError};
+use phiw_result_folder::ResultError;
 use phiw_telemetry::LogError;
 use std::io;
 use std::path::PathBuf;
@@ -55,13 +56,14 @@ pub enum Error {
         /// What was asked for.
         out: PathBuf,
     },
-    /// A result cannot be written.
-    #[error("{}: can't be written: {source}", path.display())]
-    Unwritable {
-        /// The file or folder.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
+    /// A result cannot be written there.
+    #[error(transparent)]
+    Output(#[from] phiw_result_folder::ResultError),
+    /// A motion would get the name of its own reason.
+    #[error("--out {}: this is the motion's file, a log; its reason goes beside it as .json: name it {}", out.display(), out.with_extension("csv").display())]
+    MotionNamedJson {
+        /// What was asked for.
+        out: PathBuf,
     },
     /// A marker map that is none.
     #[error("{}: {source}", path.display())]
@@ -224,13 +226,12 @@ impl Error {
             | Error::FootMoves { .. }
             | Error::NothingSafe { .. }
             | Error::OutIsFolder { .. }
+            | Error::MotionNamedJson { .. }
+            | Error::Output(ResultError::Busy { .. } | ResultError::IsInput { .. })
             | Error::OutIsFile { .. } => 2,
             Error::Identification(IdentificationError::Regressor(_)) => 1,
             Error::Identification(_) => 2,
-            Error::Curriculum(_)
-            | Error::Unwritable { .. }
-            | Error::IdentifiedUrdf(_)
-            | Error::Json { .. } => 1,
+            Error::Curriculum(_) | Error::Output(_) | Error::IdentifiedUrdf(_) | Error::Json { .. } => 1,
         }
     }
 }

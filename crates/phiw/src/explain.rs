@@ -6,7 +6,7 @@ use crate::console::Console;
 use crate::draws::Draws;
 use crate::explain_page;
 use crate::identify::{Outcome, outputs};
-use crate::output::{check_folder, write_folder};
+use crate::output::take_folder;
 use crate::report_json::{by_joint, report_json};
 use crate::session::Session;
 use crate::{Error, summary};
@@ -18,6 +18,7 @@ use phiw_report::json::{
 };
 use phiw_residual::SignalRanges;
 use phiw_residual::trace::{self, HeldModel, TraceInput, TraceOptions, Tracing, trace};
+use phiw_result_folder::{Disk, replace_folder};
 use std::fmt::Write;
 
 /// A model to start from: its effects' specs, its parameters, and what was known if it is held.
@@ -33,7 +34,8 @@ struct Start {
 /// # Errors
 /// An input is wrong, or the results cannot be written: [`Error::exit_status`] tells the two apart.
 pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcome, Error> {
-    check_folder(&arguments.session.out)?;
+    let inputs: Vec<_> = arguments.session.inputs().into_iter().chain(arguments.model.clone()).collect();
+    let place = take_folder(&arguments.session.out, &inputs, "phiw explain")?;
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
     let mut session = Session::open(&arguments.session, &progress)?;
     let sources = session.logs.sources(&progress);
@@ -66,7 +68,7 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
     let mut report = report(&analysis, &tracing);
     report.phiw.iter_mut().for_each(|program| program.draws = draws.json());
     let files = outputs(&analysis, &report, page.render())?;
-    write_folder(&arguments.session.out, &files)?;
+    replace_folder(&Disk, &place, &files)?;
     let mut summary = story(&analysis, &tracing, in_draws);
     summary.push_str(&summary::summary(&analysis, &arguments.session.out, &files));
     Ok(Outcome {

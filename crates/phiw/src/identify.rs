@@ -4,11 +4,12 @@ use crate::analysis::Analysis;
 use crate::arguments::SessionArguments;
 use crate::console::Console;
 use crate::identified_urdf::identified_urdf;
-use crate::output::{OutputFile, check_folder, write_folder};
+use crate::output::take_folder;
 use crate::report_json::report_json;
 use crate::session::Session;
 use crate::{Error, page, summary};
 use phiw_report::ReportJson;
+use phiw_result_folder::{Disk, ResultFile, replace_folder};
 use std::path::PathBuf;
 
 /// What a command has done.
@@ -30,7 +31,7 @@ pub struct Outcome {
 /// # Errors
 /// An input is wrong, or the results cannot be written: [`Error::exit_status`] tells the two apart.
 pub fn identify(arguments: &SessionArguments, console: &Console) -> Result<Outcome, Error> {
-    check_folder(&arguments.out)?;
+    let place = take_folder(&arguments.out, &arguments.inputs(), "phiw identify")?;
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
     let session = Session::open(arguments, &progress)?;
     let sources = session.logs.sources(&progress);
@@ -42,7 +43,7 @@ pub fn identify(arguments: &SessionArguments, console: &Console) -> Result<Outco
     let report = report_json(&analysis);
     let files =
         outputs(&analysis, &report, page::page(&analysis, arguments.command_line("identify")).render())?;
-    write_folder(&arguments.out, &files)?;
+    replace_folder(&Disk, &place, &files)?;
     Ok(Outcome {
         summary: summary::summary(&analysis, &arguments.out, &files),
         warnings: analysis.warnings,
@@ -55,13 +56,13 @@ pub fn identify(arguments: &SessionArguments, console: &Console) -> Result<Outco
 ///
 /// # Errors
 /// The parameters cannot be expressed in a file's form.
-pub fn outputs(analysis: &Analysis<'_>, report: &ReportJson, page: String) -> Result<Vec<OutputFile>, Error> {
+pub fn outputs(analysis: &Analysis<'_>, report: &ReportJson, page: String) -> Result<Vec<ResultFile>, Error> {
     let json = |file| move |source| Error::Json { file, source };
     let model = serde_json::to_string_pretty(&analysis.model).map_err(json("model.json"))?;
     Ok(vec![
-        OutputFile { name: "model.json".to_owned(), text: model + "\n" },
-        OutputFile { name: "report.json".to_owned(), text: report.to_json().map_err(json("report.json"))? },
-        OutputFile { name: "report.html".to_owned(), text: page },
-        OutputFile { name: "identified.urdf".to_owned(), text: identified_urdf(analysis)? },
+        ResultFile::new("model.json", model + "\n"),
+        ResultFile::new("report.json", report.to_json().map_err(json("report.json"))?),
+        ResultFile::new("report.html", page),
+        ResultFile::new("identified.urdf", identified_urdf(analysis)?),
     ])
 }

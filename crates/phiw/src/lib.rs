@@ -20,6 +20,7 @@ pub mod report_json;
 pub mod retarget;
 pub mod session;
 pub mod summary;
+pub mod threads;
 pub mod traces;
 pub mod warnings;
 

@@ -1,70 +1,71 @@
 //! The command `phiw`.
 
 use clap::Parser;
-use phiw::arguments::{Arguments, Command, NextArguments, RetargetArguments};
-use phiw::console::Console;
-use std::io::Write;
+use phiw::arguments::{Arguments, Command};
+use phiw::console::{self, Console};
+use phiw::{Error, threads};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     // A wrong command line ends here, with exit status 2.
     let arguments = Arguments::parse();
-    let outcome = match &arguments.command {
-        Command::Identify(identify) => {
-            phiw::identify::identify(&identify.session, &Console::of_terminal(identify.session.quiet))
-        }
-        Command::Explain(explain) => {
-            phiw::explain::explain(explain, &Console::of_terminal(explain.session.quiet))
-        }
-        Command::Retarget(arguments) => return retarget(arguments),
-        Command::Next(arguments) => return next(arguments),
-    };
-    match outcome {
-        Ok(outcome) => {
-            if !arguments.command.quiet() {
-                outcome.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
-                // A reader that has seen enough (`| head`) is no failure.
-                let _ = std::io::stdout().write_all(outcome.summary.as_bytes());
+    // A fault of ours is one message and status 1, like any other failure that is not the input's.
+    std::panic::set_hook(Box::new(|fault| {
+        console::say("error: phiw itself is at fault, please report it: ", &fault.to_string());
+    }));
+    threads::start();
+    std::panic::catch_unwind(|| run(&arguments)).unwrap_or(ExitCode::FAILURE)
+}
+
+/// Does what was asked for and says what became of it.
+fn run(arguments: &Arguments) -> ExitCode {
+    let quiet = arguments.command.quiet();
+    let console = Console::of_terminal(quiet);
+    match told(&arguments.command, &console) {
+        Ok(told) => {
+            drop(console);
+            if !quiet {
+                told.warnings.iter().for_each(|warning| console::say("warning: ", warning));
+                console::print(&told.summary);
             }
-            ExitCode::SUCCESS
+            told.failures.iter().for_each(|failure| console::say("failed: ", failure));
+            ExitCode::from(u8::from(!told.failures.is_empty()))
         }
         Err(error) => {
-            eprintln!("error: {error}");
+            drop(console);
+            console::say("error: ", &error.to_string());
             ExitCode::from(error.exit_status())
         }
     }
 }
 
-/// Retargets; recordings that could not be are listed at the end, and make the exit status 1 if others could.
-fn retarget(arguments: &RetargetArguments) -> ExitCode {
-    match phiw::retarget::retarget(arguments, &Console::of_terminal(arguments.quiet)) {
-        Ok(outcome) => {
-            if !arguments.quiet {
-                let _ = std::io::stdout().write_all(outcome.summary.as_bytes());
-            }
-            outcome.failures.iter().for_each(|failure| eprintln!("failed: {}", failure.reason));
-            ExitCode::from(u8::from(!outcome.failures.is_empty()))
-        }
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(error.exit_status())
-        }
-    }
+/// What is said at the end of a command.
+struct Told {
+    summary: String,
+    warnings: Vec<String>,
+    /// Parts of the work that could not be done, though others could.
+    failures: Vec<String>,
 }
 
-/// Chooses the next motion.
-fn next(arguments: &NextArguments) -> ExitCode {
-    match phiw::next::next(arguments, &Console::of_terminal(arguments.quiet)) {
-        Ok(outcome) => {
-            if !arguments.quiet {
-                outcome.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
-                let _ = std::io::stdout().write_all(outcome.summary.as_bytes());
-            }
-            ExitCode::SUCCESS
+fn told(command: &Command, console: &Console) -> Result<Told, Error> {
+    let no_failures = Vec::new();
+    Ok(match command {
+        Command::Identify(arguments) => {
+            let outcome = phiw::identify::identify(&arguments.session, console)?;
+            Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
         }
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(error.exit_status())
+        Command::Explain(arguments) => {
+            let outcome = phiw::explain::explain(arguments, console)?;
+            Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
         }
-    }
+        Command::Retarget(arguments) => {
+            let outcome = phiw::retarget::retarget(arguments, console)?;
+            let failures = outcome.failures.iter().map(|failure| failure.reason.to_string()).collect();
+            Told { summary: outcome.summary, warnings: Vec::new(), failures }
+        }
+        Command::Next(arguments) => {
+            let outcome = phiw::next::next(arguments, console)?;
+            Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
+        }
+    })
 }

@@ -10,11 +10,12 @@ mod telling;
 
 use crate::arguments::NextArguments;
 use crate::console::Console;
-use crate::output::{OutputFile, check_file, write_folder};
+use crate::output::check_file;
 use crate::{Error, session};
 use estimate::Estimate;
 use phiw_curriculum::Robot;
 use phiw_residual::Catalogue;
+use phiw_result_folder::{Disk, Lock, ResultFile, check_inputs, replace_files};
 use standing::Standing;
 use std::path::PathBuf;
 
@@ -40,10 +41,18 @@ pub struct NextOutcome {
 /// An input is wrong, no motion is safe, or the results cannot be written: [`Error::exit_status`] tells them apart.
 pub fn next(arguments: &NextArguments, console: &Console) -> Result<NextOutcome, Error> {
     check_file(&arguments.out)?;
+    let report_json = arguments.out.with_extension("json");
+    if report_json == arguments.out {
+        return Err(Error::MotionNamedJson { out: arguments.out.clone() });
+    }
+    let place = Lock::acquire(&arguments.out, "phiw next")?;
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
     let (tree, xml, findings) = session::read_robot(&arguments.session())?;
     let standing = Standing::read(arguments, &xml)?;
     let motions = motions::read(&arguments.motions, &tree, &progress)?;
+    let named = [Some(&arguments.urdf), arguments.support.as_ref(), arguments.model.as_ref()];
+    let inputs = named.into_iter().flatten().chain(&arguments.measured).chain(&motions.files).cloned();
+    check_inputs(&inputs.collect::<Vec<_>>(), &[arguments.out.clone(), report_json.clone()])?;
     let estimate = Estimate::new(arguments, &tree, &motions, &progress)?;
     let robot = Robot::new(tree, standing.base_link, estimate.model.specs(), Catalogue::default())?;
     let choice = selection::choose(arguments, &robot, &estimate, &standing, &motions.dataset)?;
@@ -67,15 +76,14 @@ pub fn next(arguments: &NextArguments, console: &Console) -> Result<NextOutcome,
         findings: &findings,
     };
     let report = story.json();
-    let report_json = arguments.out.with_extension("json");
     let json = |source| Error::Json { file: "the report", source };
     let text = serde_json::to_string_pretty(&report).map_err(json)? + "\n";
     let name = |path: &std::path::Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let files = [
-        OutputFile { name: name(&report_json), text },
-        OutputFile { name: name(&arguments.out), text: plan.csv(motion, robot.tree()) },
+        ResultFile::new(name(&report_json), text),
+        ResultFile::new(name(&arguments.out), plan.csv(motion, robot.tree())),
     ];
-    let folder = arguments.out.parent().filter(|folder| !folder.as_os_str().is_empty());
-    write_folder(folder.unwrap_or(std::path::Path::new(".")), &files)?;
+    let folder = place.target().parent().unwrap_or(std::path::Path::new("."));
+    replace_files(&Disk, folder, &name(&arguments.out), &files)?;
     Ok(NextOutcome { summary: story.text(&report_json), warnings: story.warnings(), report, report_json })
 }

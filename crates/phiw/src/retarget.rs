@@ -12,6 +12,7 @@ use crate::output::check_folder;
 use phiw_bspline_retarget::human::{MapError, MarkerMap};
 use phiw_bspline_retarget::{MarkerRecording, RetargetOptions, Retargeter, read_recording};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+use phiw_result_folder::{Lock, check_inputs};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -24,6 +25,13 @@ use std::path::{Path, PathBuf};
 pub fn retarget(arguments: &RetargetArguments, console: &Console) -> Result<RetargetOutcome, Error> {
     check_folder(&arguments.out)?;
     check_names(&arguments.c3d)?;
+    let inputs: Vec<PathBuf> =
+        std::iter::once(&arguments.urdf).chain(&arguments.c3d).chain(&arguments.map).cloned().collect();
+    let result = |file: &PathBuf, extension| arguments.out.join(format!("{}.{extension}", stem(file)));
+    let outputs: Vec<PathBuf> =
+        arguments.c3d.iter().flat_map(|file| [result(file, "csv"), result(file, "json")]).collect();
+    check_inputs(&inputs, &outputs)?;
+    let _place = Lock::acquire(&arguments.out, "phiw retarget")?;
     let text = |path: &PathBuf| {
         std::fs::read_to_string(path).map_err(|source| Error::Unreadable { path: path.clone(), source })
     };

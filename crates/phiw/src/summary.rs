@@ -2,16 +2,16 @@
 
 use crate::analysis::Analysis;
 use crate::identified_urdf::not_expressed;
-use crate::output::OutputFile;
 use crate::page::{counted, declared_in_words};
 use crate::traces::Role;
 use phiw_identification::HELD_OUT_SHARE;
 use phiw_report::number::{percent, significant};
+use phiw_result_folder::ResultFile;
 use std::fmt::Write;
 use std::path::Path;
 
 /// Errors per joint and pooled, parameters of the effects, where the files are.
-pub fn summary(analysis: &Analysis<'_>, folder: &Path, files: &[OutputFile]) -> String {
+pub fn summary(analysis: &Analysis<'_>, folder: &Path, files: &[ResultFile]) -> String {
     let mut text = format!("{}: {}\n\n", analysis.session.tree.name(), declared_in_words(analysis));
     // Writing to a string does not fail.
     let _ = errors(analysis, &mut text);
@@ -87,7 +87,7 @@ fn effects(analysis: &Analysis<'_>, text: &mut String) -> std::fmt::Result {
 fn closing(
     analysis: &Analysis<'_>,
     folder: &Path,
-    files: &[OutputFile],
+    files: &[ResultFile],
     text: &mut String,
 ) -> std::fmt::Result {
     let base = analysis.identified.design.base().count();

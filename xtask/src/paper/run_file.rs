@@ -7,6 +7,7 @@ use super::score::{Detail, Score};
 use crate::plant_experiment::secret::SecretKind;
 use anyhow::Context;
 use phiw_curriculum::Run;
+use phiw_result_folder::{Disk, replace_file};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -93,8 +94,5 @@ pub fn all(out: &Path) -> anyhow::Result<Vec<PathBuf>> {
 pub fn replace(path: &Path, content: &[u8]) -> anyhow::Result<()> {
     let folder = path.parent().context("a path without a folder")?;
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let partial = folder.join(format!(".{name}.{}.partial", std::process::id()));
-    let written = std::fs::write(&partial, content).and_then(|()| std::fs::rename(&partial, path));
-    written.inspect_err(|_| drop(std::fs::remove_file(&partial))).with_context(|| path.display().to_string())
+    Ok(replace_file(&Disk, path, content)?)
 }

@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::arguments::{Derivatives, RetargetArguments};
 use phiw_bspline_retarget::{Retargeted, Retargeter, backward_differences};
+use phiw_result_folder::{Disk, ResultError, replace_file};
 use phiw_telemetry::{LogColumns, LogWriter};
 use serde_json::json;
 use sha2::{Digest, Sha256};
@@ -71,19 +72,15 @@ impl MotionFile {
         if self.facts.exists() {
             fs::remove_file(&self.facts).map_err(unwritable(&self.facts))?;
         }
-        for (path, text) in [(&self.log, log), (&self.facts, facts.into_bytes())] {
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            let partial = path.with_file_name(format!(".{name}.partial"));
-            let written = fs::write(&partial, text).and_then(|()| fs::rename(&partial, path));
-            written.inspect_err(|_| drop(fs::remove_file(&partial))).map_err(unwritable(path))?;
-        }
+        replace_file(&Disk, &self.log, &log)?;
+        replace_file(&Disk, &self.facts, &facts.into_bytes())?;
         Ok(())
     }
 }
 
 fn unwritable(path: &Path) -> impl FnOnce(io::Error) -> Error {
     let path = path.to_owned();
-    move |source| Error::Unwritable { path, source }
+    move |source| ResultError::Unwritable { path, source }.into()
 }
 
 /// The robot's motion at the recording's rate.

@@ -1,0 +1,150 @@
+//! Files in a folder that is not theirs alone: a generation in a hidden folder, and one link that is renamed.
+
+use crate::error::unwritable;
+use crate::exchange::remove_leftovers;
+use crate::file_system::unique;
+use crate::{FileSystem, ResultError, ResultFile};
+use std::path::{Path, PathBuf};
+
+/// The link that leads to the generation that counts.
+const CURRENT: &str = "current";
+
+/// Replaces `files` in `folder` all at once. `set` names them together; the caller holds a lock for it.
+///
+/// The files lie in `.<set>.phiw/<generation>/`; the visible names are links through `.<set>.phiw/current`. Where there are no symbolic links the files are
+/// renamed one by one.
+///
+/// # Errors
+/// [`ResultError::Unwritable`]; then the files are as they were.
+pub fn replace_files(
+    system: &dyn FileSystem,
+    folder: &Path,
+    set: &str,
+    files: &[ResultFile],
+) -> Result<(), ResultError> {
+    let store = folder.join(format!(".{set}.phiw"));
+    system.create_folders(&store).map_err(unwritable(&store))?;
+    let generations = Generations { system, folder, store, set };
+    generations.remove_all_but_current();
+    let outcome = generations.replace(files);
+    if outcome.is_err() {
+        generations.remove_all_but_current();
+    }
+    outcome
+}
+
+/// Replaces one file.
+///
+/// # Errors
+/// [`ResultError::Unwritable`]; then the file is as it was.
+pub fn replace_file(system: &dyn FileSystem, path: &Path, content: &[u8]) -> Result<(), ResultError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let aside = path.with_file_name(format!(".{name}.{}.partial", unique()));
+    let written = system.create_file(&aside, content).and_then(|()| system.rename(&aside, path));
+    if written.is_err() {
+        let _ = system.remove(&aside);
+    }
+    written.map_err(unwritable(path))?;
+    if let Some(folder) = path.parent() {
+        let _ = system.sync_folder(if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
+    }
+    Ok(())
+}
+
+struct Generations<'a> {
+    system: &'a dyn FileSystem,
+    folder: &'a Path,
+    store: PathBuf,
+    set: &'a str,
+}
+
+impl Generations<'_> {
+    fn replace(&self, files: &[ResultFile]) -> Result<(), ResultError> {
+        let new = self.generation()?;
+        for file in files {
+            let path = new.join(&file.name);
+            let shown = self.folder.join(&file.name);
+            self.system.create_file(&path, &file.content).map_err(unwritable(&shown))?;
+        }
+        self.system.sync_folder(&new).map_err(unwritable(&new))?;
+        if !files.iter().all(|file| self.is_linked(&file.name))
+            && let Err(error) = self.link(files)
+        {
+            return match error {
+                ResultError::Unwritable { source, .. }
+                    if source.kind() == std::io::ErrorKind::Unsupported =>
+                {
+                    files.iter().try_for_each(|file| {
+                        replace_file(self.system, &self.folder.join(&file.name), &file.content)
+                    })
+                }
+                error => Err(error),
+            };
+        }
+        self.point_to(&new)?;
+        let _ = self.system.sync_folder(&self.store);
+        self.remove_all_but_current();
+        Ok(())
+    }
+
+    /// Puts links in the place of the visible files, with what was there behind them.
+    fn link(&self, files: &[ResultFile]) -> Result<(), ResultError> {
+        let old = self.generation()?;
+        for file in files {
+            let shown = self.folder.join(&file.name);
+            // What a link leads to is read through it: a link to somewhere else is replaced, not followed when writing.
+            if let Ok(content) = std::fs::read(&shown) {
+                self.system.create_file(&old.join(&file.name), &content).map_err(unwritable(&shown))?;
+            }
+        }
+        self.point_to(&old)?;
+        for file in files {
+            let shown = self.folder.join(&file.name);
+            self.put_link(&self.target(&file.name), &shown)?;
+        }
+        self.system.sync_folder(self.folder).map_err(unwritable(self.folder))
+    }
+
+    fn generation(&self) -> Result<PathBuf, ResultError> {
+        let path = self.store.join(unique());
+        self.system.create_folder(&path).map_err(unwritable(&path))?;
+        Ok(path)
+    }
+
+    /// What the link of a visible name says.
+    fn target(&self, name: &str) -> PathBuf {
+        Path::new(&format!(".{}.phiw", self.set)).join(CURRENT).join(name)
+    }
+
+    fn is_linked(&self, name: &str) -> bool {
+        self.folder.join(name).read_link().is_ok_and(|link| link == self.target(name))
+    }
+
+    /// The commit point: one rename.
+    fn point_to(&self, generation: &Path) -> Result<(), ResultError> {
+        let name = PathBuf::from(generation.file_name().unwrap_or_default());
+        self.put_link(&name, &self.store.join(CURRENT))
+    }
+
+    /// A link under another name first, then renamed.
+    fn put_link(&self, target: &Path, path: &Path) -> Result<(), ResultError> {
+        let aside = self.store.join(format!("link-{}", unique()));
+        let made = self.system.symbolic_link(target, &aside).and_then(|()| self.system.rename(&aside, path));
+        if made.is_err() {
+            let _ = self.system.remove(&aside);
+        }
+        made.map_err(unwritable(path))
+    }
+
+    fn remove_all_but_current(&self) {
+        let kept = self.store.join(CURRENT).read_link().ok();
+        let entries = self.store.read_dir().into_iter().flatten().flatten();
+        for entry in entries {
+            let name = PathBuf::from(entry.file_name());
+            if name.as_os_str() != CURRENT && Some(&name) != kept.as_ref() {
+                let _ = self.system.remove(&entry.path());
+            }
+        }
+        remove_leftovers(self.system, self.folder, &format!(".{}.phiw-new-", self.set));
+    }
+}
