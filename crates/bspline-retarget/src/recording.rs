@@ -1,6 +1,7 @@
 //! Marker recordings, whatever file they come from.
 
 use crate::c3d::C3dError;
+use phiw_limits::Limits;
 use std::path::{Path, PathBuf};
 
 /// Positions of named markers over time.
@@ -59,11 +60,37 @@ impl MarkerRecording {
 /// # Errors
 /// [`RecordingError`], which names the file, the place and the mend.
 pub fn read_recording(path: &Path, units: Option<&str>) -> Result<MarkerRecording, RecordingError> {
-    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
-        crate::point_csv::read_point_csv(path)
-    } else {
-        crate::c3d::read_c3d_file(path, units)
+    let metadata =
+        path.metadata().map_err(|source| RecordingError::Unreadable { path: path.to_owned(), source })?;
+    let most = Limits::default().recording_bytes;
+    if !metadata.is_file() || metadata.len() > most {
+        let what = if metadata.is_file() { "too large for a recording" } else { "no regular file" };
+        let source = std::io::Error::other(format!("it is {what}; check the path"));
+        return Err(RecordingError::Unreadable { path: path.to_owned(), source });
     }
+    let recording = if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
+        crate::point_csv::read_point_csv(path)?
+    } else {
+        crate::c3d::read_c3d_file(path, units)?
+    };
+    check_distances(path, &recording)?;
+    Ok(recording)
+}
+
+/// A marker farther from the origin than any capture volume is broken, or in another unit \[m\].
+const FARTHEST_M: f64 = 100.0;
+
+fn check_distances(path: &Path, recording: &MarkerRecording) -> Result<(), RecordingError> {
+    let far = |position: &[f64; 3]| position.iter().any(|x| x.abs() > FARTHEST_M);
+    let Some(place) = recording.positions_m.iter().position(far) else { return Ok(()) };
+    let markers = recording.labels.len().max(1);
+    let distance_m = recording.positions_m[place].iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    Err(RecordingError::Far {
+        path: path.to_owned(),
+        marker: recording.labels.get(place % markers).cloned().unwrap_or_default(),
+        frame: place / markers + 1,
+        distance_m,
+    })
 }
 
 /// Why a recording can not be read.
@@ -89,6 +116,21 @@ pub enum RecordingError {
         path: PathBuf,
         /// What is wrong with it.
         source: C3dError,
+    },
+    /// A marker is farther away than any capture volume reaches.
+    #[error(
+        "{}: marker `{marker}` is {distance_m:.3e} m from the origin in frame {frame}: the unit is another (set `units` in the map), \
+         or the sample is broken: delete it", path.display()
+    )]
+    Far {
+        /// The file.
+        path: PathBuf,
+        /// The marker.
+        marker: String,
+        /// The frame, counted from 1.
+        frame: usize,
+        /// Its largest coordinate \[m\].
+        distance_m: f64,
     },
     /// It is no table of points.
     #[error("{}: {what}", path.display())]

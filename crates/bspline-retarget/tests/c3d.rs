@@ -214,3 +214,25 @@ fn real_files_hold_what_is_listed_of_them() {
         assert!((0.005..0.4).contains(&share), "{}: {share}", file.display());
     }
 }
+
+/// A rate of a millionth made the resampling ask for 15 GB; a sample a kilometre away was taken for a marker.
+#[test]
+fn rates_and_places_that_no_recording_has_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("motion.c3d");
+    let read = |change: &dyn Fn(&mut phiw_bspline_retarget::MarkerRecording)| {
+        let mut recording = recording(3, 10);
+        change(&mut recording);
+        std::fs::write(&path, write_c3d(&recording, C3dFormat::default(), &[])).unwrap();
+        phiw_bspline_retarget::read_recording(&path, None).map_err(|error| error.to_string())
+    };
+    assert!(read(&|_| ()).is_ok());
+    for rate_hz in [1e-6, 1e9] {
+        let error = read(&|recording| recording.rate_hz = rate_hz).unwrap_err();
+        assert!(error.contains("motion.c3d") && error.contains("no camera's"), "{error}");
+    }
+    for distance_m in [1e3, -1e30] {
+        let error = read(&|recording| recording.positions_m[4][1] = distance_m).unwrap_err();
+        assert!(error.contains("motion.c3d") && error.contains("in frame 2"), "{error}");
+    }
+}

@@ -20,6 +20,12 @@ pub struct Motion {
     signals: [Vec<f64>; 3],
 }
 
+/// RMS of the difference of a derivative from its signal's slope over the RMS of the larger, from which on they contradict each other. Retargeted motions,
+/// by splines or by backward differences, stay below 0.1.
+const CONTRADICTION: f64 = 0.5;
+/// Below this RMS a derivative is rounding \[rad/s, m/s, rad/s², m/s²\].
+const SLOW: f64 = 1e-3;
+
 impl Motion {
     /// A motion of `joints` joints with a sample every `period_s` \[s\]. `signals` are positions \[rad, m\], velocities and accelerations,
     /// row-major `[sample × joints]`.
@@ -73,7 +79,43 @@ impl Motion {
             return Err(wrong("its time stamps are not even: resample it"));
         }
         let signals = [recording.q.clone(), qd.clone(), qdd.clone()];
-        Self::new(name, task, recording.joints.len(), period_s, signals)
+        let motion = Self::new(name, task, recording.joints.len(), period_s, signals)?;
+        motion.check_derivatives(&recording.joints)?;
+        Ok(motion)
+    }
+
+    /// A robot that is sent positions at these times moves as they say, whatever the columns beside them say: a motion whose signals contradict each
+    /// other is refused.
+    fn check_derivatives(&self, joints: &[String]) -> Result<(), CurriculumError> {
+        let rms = |sum: f64| (sum / self.samples() as f64).sqrt();
+        for (joint, name) in joints.iter().enumerate() {
+            for (order, column, unit) in [(0, "qd", "rad/s or m/s"), (1, "qdd", "rad/s² or m/s²")] {
+                let (mut differences, mut given, mut error) = (0.0, 0.0, 0.0);
+                for sample in 1..self.samples() - 1 {
+                    let value =
+                        |signal: usize, sample: usize| self.signals[signal][sample * self.joints + joint];
+                    let slope = (value(order, sample + 1) - value(order, sample - 1)) / (2.0 * self.period_s);
+                    let stated = value(order + 1, sample);
+                    differences += slope * slope;
+                    given += stated * stated;
+                    error += (slope - stated) * (slope - stated);
+                }
+                let larger = rms(differences.max(given));
+                if larger > SLOW && rms(error) > CONTRADICTION * larger {
+                    let below = &column[..column.len() - 1];
+                    return Err(CurriculumError::Motion {
+                        name: self.name.clone(),
+                        problem: format!(
+                            "its {column}.{name} is {:.3} RMS, but {below}.{name} over the time stamps changes by {:.3} ({unit}): \
+                             the stamps, the positions or the derivatives are in another unit, or of another motion",
+                            rms(given),
+                            rms(differences)
+                        ),
+                    });
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Number of samples.

@@ -20,6 +20,28 @@ pub enum Error {
         /// What the system says.
         source: io::Error,
     },
+    /// A folder, a pipe or a device in the place of a file.
+    #[error("{}: this is no regular file; name a file", path.display())]
+    NotAFile {
+        /// What was named.
+        path: PathBuf,
+    },
+    /// A file of more bytes than such a file has.
+    #[error("{}: it has more than {most} bytes, which no such file needs; check the path", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// The limit \[bytes\].
+        most: u64,
+    },
+    /// A file that is no text.
+    #[error("{}: this is not text but {looks_like}; name a text file in UTF-8", path.display())]
+    NotText {
+        /// The file.
+        path: PathBuf,
+        /// What its bytes look like.
+        looks_like: &'static str,
+    },
     /// The URDF is not one that can be worked with.
     #[error("{}: {source}", path.display())]
     Urdf {
@@ -208,6 +230,9 @@ impl Error {
     pub fn exit_status(&self) -> u8 {
         match self {
             Error::Unreadable { .. }
+            | Error::NotAFile { .. }
+            | Error::TooLarge { .. }
+            | Error::NotText { .. }
             | Error::Urdf { .. }
             | Error::FloatingBase { .. }
             | Error::NotAModel { .. }
@@ -257,7 +282,6 @@ impl From<InputError> for Error {
 fn unreadable(source: &io::Error) -> String {
     match source.kind() {
         io::ErrorKind::NotFound => "no such file; check the path".to_owned(),
-        io::ErrorKind::InvalidData => "not a URDF: it is not text".to_owned(),
         _ => format!("can't be read: {source}"),
     }
 }

@@ -6,11 +6,13 @@ use crate::console::Console;
 use crate::draws::Draws;
 use crate::explain_page;
 use crate::identify::{Outcome, outputs};
+use crate::input::read_text;
 use crate::output::take_folder;
 use crate::report_json::{by_joint, report_json};
 use crate::session::Session;
 use crate::{Error, summary};
 use phiw_identification::{Data, Identified, Model, TorqueError, identify};
+use phiw_limits::Limits;
 use phiw_report::ReportJson;
 use phiw_report::json::{
     DrawsJson, EffectJson, EvidenceJson, JointMap, NamedInDrawsJson, ParameterJson, ProgramJson,
@@ -142,8 +144,7 @@ fn start(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Re
             held: None,
         });
     };
-    let text =
-        std::fs::read_to_string(path).map_err(|source| Error::Unreadable { path: path.clone(), source })?;
+    let text = read_text(path, Limits::default().model_bytes)?;
     let model: Model =
         serde_json::from_str(&text).map_err(|source| Error::NotAModel { path: path.clone(), source })?;
     let (design, parameters) = model.design(&session.tree, &session.catalogue)?;

@@ -11,6 +11,7 @@ pub mod explain;
 mod explain_page;
 pub mod identified_urdf;
 pub mod identify;
+mod input;
 pub mod next;
 mod not_identified;
 pub mod output;

@@ -8,10 +8,12 @@ pub use batch::{Failure, RetargetOutcome};
 use crate::Error;
 use crate::arguments::RetargetArguments;
 use crate::console::Console;
+use crate::input::read_text;
 use crate::output::check_folder;
 use phiw_bspline_retarget::human::{MapError, MarkerMap};
 use phiw_bspline_retarget::{MarkerRecording, RetargetOptions, Retargeter, read_recording};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+use phiw_limits::Limits;
 use phiw_result_folder::{Lock, check_inputs};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -32,17 +34,14 @@ pub fn retarget(arguments: &RetargetArguments, console: &Console) -> Result<Reta
         arguments.c3d.iter().flat_map(|file| [result(file, "csv"), result(file, "json")]).collect();
     check_inputs(&inputs, &outputs)?;
     let _place = Lock::acquire(&arguments.out, "phiw retarget")?;
-    let text = |path: &PathBuf| {
-        std::fs::read_to_string(path).map_err(|source| Error::Unreadable { path: path.clone(), source })
-    };
-    let urdf = text(&arguments.urdf)?;
+    let limits = Limits::default();
+    let urdf = read_text(&arguments.urdf, limits.urdf_bytes)?;
     let options = UrdfOptions { floating_base: false, held: arguments.hold.clone() };
     let reading = read_urdf(&urdf, &options)
         .map_err(|source| Error::Urdf { path: arguments.urdf.clone(), source: Box::new(source) })?;
     let map = match &arguments.map {
-        Some(path) => {
-            MarkerMap::from_toml(&text(path)?).map_err(|source| Error::Map { path: path.clone(), source })?
-        }
+        Some(path) => MarkerMap::from_toml(&read_text(path, limits.toml_bytes)?)
+            .map_err(|source| Error::Map { path: path.clone(), source })?,
         None => default_map(&arguments.c3d)
             .map_err(|source| Error::Map { path: PathBuf::from("the built-in map"), source })?,
     };

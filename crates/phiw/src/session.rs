@@ -2,12 +2,14 @@
 
 use crate::Error;
 use crate::arguments::SessionArguments;
+use crate::input::read_text;
 use phiw_dynamics::urdf::{Finding, UrdfOptions, read_urdf};
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::{
     BlockSource, Data, EffectError, IdentificationError, InputError, LogFile, LogSet, Progress, Variants,
     check_excitation, tells_of_torques,
 };
+use phiw_limits::Limits;
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_residual::{Catalogue, SignalRanges};
 use phiw_telemetry::ConditioningOptions;
@@ -114,8 +116,7 @@ pub(crate) fn declared(names: &[String], catalogue: &Catalogue) -> Result<Vec<St
 /// The robot on its fixed base, the URDF's text, and what in it should not be trusted.
 pub(crate) fn read_robot(arguments: &SessionArguments) -> Result<(Tree, String, Vec<Finding>), Error> {
     let path = || arguments.urdf.clone();
-    let xml = std::fs::read_to_string(&arguments.urdf)
-        .map_err(|source| Error::Unreadable { path: path(), source })?;
+    let xml = read_text(&arguments.urdf, Limits::default().urdf_bytes)?;
     let options = UrdfOptions { held: arguments.hold.clone(), ..UrdfOptions::default() };
     let reading =
         read_urdf(&xml, &options).map_err(|source| Error::Urdf { path: path(), source: Box::new(source) })?;

@@ -84,6 +84,9 @@ fn a_joint_that_no_motion_moves_is_named() {
         let joints: Vec<String> = tree(&urdf(), false).joint_names().map(str::to_owned).collect();
         let mut motion = Recording::from_csv(&path, &joints, TorqueColumns::Absent).unwrap();
         motion.q.iter_mut().skip(1).step_by(JOINTS).for_each(|q| *q = 0.25);
+        for derivative in [&mut motion.qd, &mut motion.qdd].into_iter().flatten() {
+            derivative.iter_mut().skip(1).step_by(JOINTS).for_each(|value| *value = 0.0);
+        }
         motion.write_csv(&path).unwrap();
     }
     let line = "next --urdf DIR/robot.urdf --motions DIR/motions --out DIR/next.csv";
@@ -106,4 +109,29 @@ fn the_result_is_a_file() {
     let (status, summary, message) = scene.run(line);
     assert_eq!((status, summary.as_str(), message.as_str()), (0, "", ""));
     assert!(scene.path("new/folder/plan.csv").is_file() && scene.path("new/folder/plan.json").is_file());
+}
+
+/// Such a motion was said to keep the balance, at 2969 rad/s.
+#[test]
+fn a_motion_whose_stamps_contradict_its_velocities_is_refused() {
+    let spoiled = |column: &'static str, factor: f64| {
+        move |scene: &Scene| {
+            let folder = scene.path("motions").read_dir().unwrap();
+            let mut files: Vec<_> = folder.map(|entry| entry.unwrap().path()).collect();
+            files.sort();
+            let joints: Vec<String> = tree(&urdf(), false).joint_names().map(str::to_owned).collect();
+            let mut motion = Recording::from_csv(&files[0], &joints, TorqueColumns::Absent).unwrap();
+            let scale = |values: &mut Vec<f64>| values.iter_mut().for_each(|value| *value *= factor);
+            match column {
+                "t" => scale(&mut motion.t),
+                "qdd" => scale(motion.qdd.as_mut().unwrap()),
+                _ => scale(&mut motion.q),
+            }
+            motion.write_csv(&files[0]).unwrap();
+            ""
+        }
+    };
+    for (column, factor) in [("t", 1e-3), ("t", 1e3), ("q", 1e3), ("q", 57.3), ("qdd", 57.3)] {
+        check_refused(spoiled(column, factor), &["motions", "over the time stamps changes by"]);
+    }
 }

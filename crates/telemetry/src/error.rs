@@ -28,6 +28,22 @@ pub enum LogError {
         /// What the operating system said.
         source: io::Error,
     },
+    /// The file is something else than text.
+    #[error("{}: this is not text but {kind}; a log is a CSV in UTF-8", path.display())]
+    NotText {
+        /// The path as it was given.
+        path: PathBuf,
+        /// What its first bytes look like, and the mend where there is one.
+        kind: &'static str,
+    },
+    /// More columns than a log has.
+    #[error("{}, line 1: {columns} columns are more than a log has; check the path", path.display())]
+    TooManyColumns {
+        /// The path as it was given.
+        path: PathBuf,
+        /// Columns in the header.
+        columns: usize,
+    },
     /// The file holds nothing, or a header only.
     #[error("{}: the log is empty; expected a header line such as `t,q.joint_1,tau.joint_1` and rows of numbers", path.display())]
     Empty {

@@ -32,6 +32,7 @@ pub use joint_survey::{DerivativeSurvey, JointSurvey, TorqueSurvey};
 pub use kernel::{LowPass, SmoothingKernel};
 pub use parallel_filter::{FilterScratch, ParallelFilter};
 pub use plan::LogPlan;
+pub use reader::looks_like;
 pub use recording::Recording;
 pub use segments::{GapCount, GapReason, Segment};
 pub use spectrum::Spectrum;

@@ -3,6 +3,7 @@
 use crate::columns::{Columns, Layout, TorqueColumns};
 use crate::segments::GapReason;
 use crate::{LogError, number};
+use phiw_limits::Limits;
 use std::cell::RefCell;
 use std::fs::File;
 use std::hash::{DefaultHasher, Hasher};
@@ -59,19 +60,25 @@ pub(crate) struct LogReader {
 impl LogReader {
     pub fn open(path: &Path, joints: &[String], torque: TorqueColumns) -> Result<Self, LogError> {
         let unreadable = |source| LogError::reading(path.into(), source);
-        let mut file = File::open(path).map_err(unreadable)?;
-        if file.metadata().map_err(unreadable)?.is_dir() {
-            return Err(unreadable(io::Error::new(
-                io::ErrorKind::IsADirectory,
-                "it is a folder; name a file",
-            )));
+        // Asked before it is opened: a pipe without a writer would block for ever.
+        let metadata = path.metadata().map_err(unreadable)?;
+        if !metadata.is_file() {
+            let what = if metadata.is_dir() { "a folder" } else { "no regular file" };
+            return Err(unreadable(io::Error::other(format!("it is {what}; name a file"))));
         }
+        let mut file = File::open(path).map_err(unreadable)?;
         let bytes = file.seek(SeekFrom::End(0)).map_err(unreadable)?;
         if bytes == 0 {
             return Err(LogError::Empty { path: path.into() });
         }
         let mut last_byte = [0];
         file.seek(SeekFrom::End(-1)).and_then(|_| file.read_exact(&mut last_byte)).map_err(unreadable)?;
+        file.rewind().map_err(unreadable)?;
+        let mut head = [0; 4];
+        let length = file.read(&mut head).map_err(unreadable)?;
+        if let Some(kind) = looks_like(&head[..length]) {
+            return Err(LogError::NotText { path: path.into(), kind });
+        }
         file.rewind().map_err(unreadable)?;
 
         let hasher = Rc::new(RefCell::new(DefaultHasher::new()));
@@ -81,7 +88,7 @@ impl LogReader {
             .has_headers(false)
             .quoting(false)
             .buffer_capacity(1 << 16)
-            .from_reader(Tap { file, hasher: hasher.clone() });
+            .from_reader(Tap { file, hasher: hasher.clone(), line: 1, line_bytes: 0 });
         let mut record = csv::ByteRecord::new();
         let unreadable = |error: csv::Error| LogError::reading(path.into(), error.into());
         if !csv.read_byte_record(&mut record).map_err(unreadable)? {
@@ -95,6 +102,9 @@ impl LogReader {
                 .trim()
                 .to_owned()
         };
+        if record.len() > Limits::default().log_columns {
+            return Err(LogError::TooManyColumns { path: path.into(), columns: record.len() });
+        }
         let columns = Columns::from_header(path, record.iter().map(name).collect(), joints, torque)?;
         let mut ahead = csv::ByteRecord::new();
         let has_ahead = csv.read_byte_record(&mut ahead).map_err(unreadable)?;
@@ -127,7 +137,7 @@ impl LogReader {
         let mut t = None;
         for (place, value) in values.iter_mut().enumerate() {
             let column = self.columns.of_place[place];
-            let cell = self.record[column].trim_ascii();
+            let cell = unquoted(self.record[column].trim_ascii());
             let (parsed, gap) = if cell.is_empty() {
                 (f64::NAN, Some(GapReason::EmptyCell))
             } else {
@@ -202,16 +212,58 @@ impl Rows for LogReader {
     }
 }
 
-/// A file whose bytes are hashed as they pass.
+/// A cell without the quotes that spreadsheets put round numbers.
+fn unquoted(cell: &[u8]) -> &[u8] {
+    match cell {
+        [b'"', inside @ .., b'"'] => inside.trim_ascii(),
+        cell => cell,
+    }
+}
+
+/// What a file that is not UTF-8 text is by its first bytes, where they tell.
+pub fn looks_like(bytes: &[u8]) -> Option<&'static str> {
+    let kinds: [(&[u8], &str); 9] = [
+        (b"\xff\xfe", "UTF-16"),
+        (b"\xfe\xff", "UTF-16"),
+        (b"\x1f\x8b", "gzip: unpack it"),
+        (b"\x28\xb5\x2f\xfd", "zstd: unpack it"),
+        (b"PK\x03\x04", "a zip archive: unpack it"),
+        (b"BZh", "bzip2: unpack it"),
+        (b"\x89HDF", "HDF5: export it as CSV"),
+        (b"PAR1", "Parquet: export it as CSV"),
+        (b"\x7fELF", "a program"),
+    ];
+    let known = kinds.into_iter().find(|(start, _)| bytes.starts_with(start)).map(|(_, kind)| kind);
+    known.or_else(|| bytes.iter().take(4).any(|&byte| byte == 0).then_some("binary data"))
+}
+
+/// A file whose bytes are hashed as they pass, and whose lines are as long as a log's can be.
 struct Tap {
     file: File,
     hasher: Rc<RefCell<DefaultHasher>>,
+    /// Which line the next byte is on, and how many bytes of it have passed.
+    line: u64,
+    line_bytes: usize,
 }
 
 impl Read for Tap {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.file.read(buffer)?;
         self.hasher.borrow_mut().write(&buffer[..count]);
+        let most = Limits::default().log_line_bytes;
+        for part in buffer[..count].split_inclusive(|&byte| byte == b'\n') {
+            self.line_bytes += part.len();
+            // The reader behind would hold all of the line in memory.
+            if self.line_bytes > most {
+                let line = self.line;
+                return Err(io::Error::other(format!(
+                    "line {line} has more than {most} bytes; this is no log"
+                )));
+            }
+            if part.ends_with(b"\n") {
+                (self.line, self.line_bytes) = (self.line + 1, 0);
+            }
+        }
         Ok(count)
     }
 }

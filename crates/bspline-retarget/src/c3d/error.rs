@@ -55,7 +55,9 @@ pub enum C3dError {
         what: &'static str,
     },
     /// The frame rate is not a positive number.
-    #[error("the point rate is {rate_hz} Hz (header and POINT:RATE): set POINT:RATE to the camera rate")]
+    #[error(
+        "the point rate is {rate_hz} Hz (header and POINT:RATE), no camera's (1 Hz to 100 kHz): set POINT:RATE to the camera rate"
+    )]
     Rate {
         /// What the file says.
         rate_hz: f64,

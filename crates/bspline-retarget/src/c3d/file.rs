@@ -6,6 +6,9 @@ use super::{BLOCK, C3dError, Processor};
 use crate::recording::{MarkerRecording, RecordingError};
 use std::path::Path;
 
+/// Rates that cameras and force plates have \[Hz\]; resampling at another would fill the memory.
+const RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=100_000.0;
+
 /// The points of a C3D file in its own unit, and its parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct C3d {
@@ -40,7 +43,7 @@ pub fn read_c3d(bytes: &[u8]) -> Result<C3d, C3dError> {
         .number("POINT", "RATE", 0)
         .filter(|rate| rate.is_finite() && *rate > 0.0)
         .unwrap_or(f64::from(header.rate_hz));
-    if !(rate_hz.is_finite() && rate_hz > 0.0) {
+    if !RATES_HZ.contains(&rate_hz) {
         return Err(C3dError::Rate { rate_hz });
     }
     let reals = scale < 0.0;

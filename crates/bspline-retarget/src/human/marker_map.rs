@@ -125,7 +125,17 @@ impl MarkerMap {
     /// # Errors
     /// [`MapError::Toml`], or a segment that there is not.
     pub fn from_toml(text: &str) -> Result<Self, MapError> {
-        let map: MarkerMap = toml::from_str(text).map_err(|error| MapError::Toml(error.to_string()))?;
+        let one_line = |error: toml::de::Error| {
+            let line =
+                error.span().map_or(1, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
+            MapError::Toml(format!("line {line}: {}", error.message().replace('\n', "; ")))
+        };
+        let map: MarkerMap = toml::from_str(text).map_err(one_line)?;
+        if !(map.marker_spread_m.is_finite() && map.marker_spread_m >= 0.0) {
+            let message =
+                format!("`marker_spread_m` is {}: give a length in metres, 0 or more", map.marker_spread_m);
+            return Err(MapError::Toml(message));
+        }
         for name in map.segments.keys().chain(map.joints.keys()) {
             if Segment::from_name(name).is_none() {
                 let names: Vec<String> = Segment::ALL.iter().map(|segment| segment.name()).collect();
@@ -160,4 +170,33 @@ fn nearest(name: &str, names: &[String]) -> String {
         names.iter().map(|other| (strsim::osa_distance(name, other), other)).collect();
     ranked.sort();
     ranked.iter().take(3).map(|(_, other)| format!("`{other}`")).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_have_one_line_and_name_theirs() {
+        let map = include_str!("../../maps/ue_adl.toml");
+        let error = MarkerMap::from_toml(&format!("{map}\n[[[")).unwrap_err().to_string();
+        assert!(error.lines().count() == 1 && error.contains("line "), "{error}");
+    }
+
+    #[test]
+    fn a_spread_that_is_no_length_is_refused() {
+        for spread in ["-0.01", "nan", "inf"] {
+            let text = format!(
+                "marker_spread_m = {spread}\n{}",
+                without_spread(include_str!("../../maps/ue_adl.toml"))
+            );
+            let error = MarkerMap::from_toml(&text).unwrap_err().to_string();
+            assert!(error.contains("marker_spread_m") && error.contains("metres"), "{error}");
+        }
+    }
+
+    fn without_spread(map: &str) -> String {
+        let other = |line: &&str| !line.trim_start().starts_with("marker_spread_m");
+        map.lines().filter(other).map(|line| format!("{line}\n")).collect()
+    }
 }

@@ -14,6 +14,24 @@ pub enum UrdfError {
         /// What the system says.
         source: std::io::Error,
     },
+    /// The text asks for more than any robot needs.
+    #[error("line {line}: {what}; no robot needs that: simplify the URDF, or raise the limit")]
+    TooMuch {
+        /// Where the limit is reached.
+        line: usize,
+        /// What is too much, and the limit.
+        what: String,
+    },
+    /// The robot has more joints than its dynamics can be identified with.
+    #[error(
+        "{joints} joints move, but no more than {most} can be identified at once: hold some with --hold JOINT"
+    )]
+    TooManyJoints {
+        /// Joints that move by themselves.
+        joints: usize,
+        /// How many may.
+        most: usize,
+    },
     /// The text is not well-formed XML.
     #[error("not a URDF: it is not XML: {0}")]
     NotXml(#[from] roxmltree::Error),

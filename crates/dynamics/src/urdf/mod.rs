@@ -7,6 +7,7 @@
 mod assemble;
 mod error;
 mod finding;
+mod guard;
 mod inertial;
 mod joint;
 mod movement;
@@ -20,6 +21,7 @@ pub use finding::Finding;
 pub use write::{JointFriction, write_identified_urdf};
 
 use crate::Tree;
+use phiw_limits::Limits;
 use std::path::Path;
 
 /// How to read a URDF.
@@ -50,9 +52,15 @@ pub struct UrdfReading {
 /// The text is not a URDF, its links are not a tree, a joint is of a type that is not supported, a name is unknown, a
 /// number is not finite, or nothing moves.
 pub fn read_urdf(xml: &str, options: &UrdfOptions) -> Result<UrdfReading, UrdfError> {
+    let limits = Limits::default();
+    guard::check(xml, &limits)?;
     let (robot, declared) = source::read(xml)?;
     let topology = topology::Topology::new(&robot)?;
     let movements = movement::movements(&robot, options)?;
+    let joints = movements.iter().filter(|movement| **movement == movement::Movement::Free).count();
+    if joints > limits.moving_joints {
+        return Err(UrdfError::TooManyJoints { joints, most: limits.moving_joints });
+    }
     assemble::assemble(&robot, declared, &topology, &movements, options.floating_base)
 }
 

@@ -20,6 +20,9 @@ pub(super) struct Declared {
 
 const TYPES: [&str; 7] = ["revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical"];
 
+/// Elements that tell nothing of the dynamics.
+const UNNEEDED: [&str; 6] = ["visual", "collision", "material", "gazebo", "transmission", "sensor"];
+
 /// Attributes that hold numbers: element, attribute, how many.
 const NUMBERS: [(&str, &[&str], usize); 7] = [
     ("origin", &["xyz", "rpy"], 3),
@@ -51,7 +54,10 @@ pub(super) fn read(xml: &str) -> Result<(urdf_rs::Robot, Declared), UrdfError> {
     let document = parse(xml)?;
     let mut declared = Declared { inertials: HashSet::new(), limits: HashMap::new(), findings: Vec::new() };
     let mut splices = Splices::new(document.input_text());
+    // What no fit needs is not parsed: a mesh that is missing a part does not stop an identification.
+    unneeded(document.root_element()).for_each(|part| splices.remove(part));
     for link in children(document.root_element(), "link") {
+        unneeded(link).for_each(|part| splices.remove(part));
         check_parts(link, &[("a name", link.has_attribute("name"))])?;
         check_numbers(link)?;
         if let Some(inertial) = child(link, "inertial") {
@@ -107,7 +113,8 @@ fn check_parts(element: Node, parts: &[(&'static str, bool)]) -> Result<(), Urdf
 
 /// `urdf-rs` says of a bad number neither whose it is nor where, and skips words among the numbers of a vector.
 fn check_numbers(element: Node) -> Result<(), UrdfError> {
-    for node in element.descendants() {
+    let needed = element.children().filter(|node| !UNNEEDED.contains(&node.tag_name().name()));
+    for node in needed.flat_map(|child| child.descendants()) {
         let tables = NUMBERS.iter().filter(|(tag, ..)| *tag == node.tag_name().name());
         for (_, attributes, count) in tables {
             for attribute in *attributes {
@@ -171,6 +178,11 @@ fn complete_inertial(inertial: Node, splices: &mut Splices) -> Vec<&'static str>
 
 fn zeros(attributes: &[&str]) -> String {
     attributes.iter().map(|key| format!("{key}=\"0\"")).collect::<Vec<_>>().join(" ")
+}
+
+/// The element's children that tell nothing of its dynamics.
+fn unneeded<'a, 'input>(element: Node<'a, 'input>) -> impl Iterator<Item = Node<'a, 'input>> {
+    element.children().filter(|node| UNNEEDED.contains(&node.tag_name().name()))
 }
 
 /// The element's children of that tag.

@@ -240,8 +240,7 @@ impl Logs {
 }
 
 fn read_model(path: &std::path::Path) -> Result<Model, Error> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|source| Error::Unreadable { path: path.to_owned(), source })?;
+    let text = crate::input::read_text(path, phiw_limits::Limits::default().model_bytes)?;
     serde_json::from_str(&text).map_err(|source| Error::NotAModel { path: path.to_owned(), source })
 }
 

@@ -39,8 +39,7 @@ impl Standing {
 
 /// The support polygon of the soles, seen from the base; `whole` is the robot with no joint held, so that every link has its name.
 fn stance(path: &Path, whole: &Tree, held: &[(String, f64)]) -> Result<Stance, Error> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|source| Error::Unreadable { path: path.to_owned(), source })?;
+    let text = crate::input::read_text(path, phiw_limits::Limits::default().toml_bytes)?;
     let feet =
         feet_from_toml(&text, whole).map_err(|source| Error::Support { path: path.to_owned(), source })?;
     for foot in &feet {
