@@ -72,7 +72,10 @@ fn check_names(files: &[PathBuf]) -> Result<(), Error> {
 /// The built-in map that names most markers of the first recording that can be read.
 fn default_map(files: &[PathBuf]) -> Result<MarkerMap, MapError> {
     let (seated, embedded) = (MarkerMap::ue_adl()?, MarkerMap::embedded()?);
-    let recording = files.iter().find_map(|file| read_recording(file, Some("m")).ok());
+    // Only the names count here: whatever unit the numbers are in, one of these makes them a person's.
+    let named =
+        |file: &PathBuf| read_recording(file, Some("m")).or_else(|_| read_recording(file, Some("mm"))).ok();
+    let recording = files.iter().find_map(named);
     let share = |map: &MarkerMap| recording.as_ref().map_or(0.0, |recording| share_named(map, recording));
     Ok(if share(&embedded) > share(&seated) { embedded } else { seated })
 }

@@ -28,8 +28,8 @@ pub(super) fn check(text: &str, limits: &Limits) -> Result<(), UrdfError> {
     while let Some(found) = bytes[at..].iter().position(|&byte| byte == b'<' || byte == b'&') {
         at += found;
         let rest = &text[at..];
-        if rest.starts_with('&') {
-            let name = rest[1..].split(';').next().unwrap_or_default();
+        if let Some(reference) = rest.strip_prefix('&') {
+            let name = reference.split(';').next().unwrap_or_default();
             if entities.expand(name) > limits.xml_expanded_bytes {
                 return too_much(
                     at,
