@@ -52,6 +52,56 @@ pub enum InputError {
         /// The joint.
         joint: String,
     },
+    /// Stamps that are no seconds.
+    #[error(
+        "{}: the time stamps are {period} apart, and no robot is logged at {rate_hz:.3e} Hz: they are not in seconds; \
+         {mend}", path.display()
+    )]
+    TimeUnit {
+        /// The log.
+        path: PathBuf,
+        /// Distance of the stamps.
+        period: f64,
+        /// What the rate would be \[Hz\].
+        rate_hz: f64,
+        /// What the stamps look like.
+        mend: &'static str,
+    },
+    /// Velocities that are the positions' derivative but for a unit.
+    #[error(
+        "{}: dq/dt of `{joint}` is {factor:.4} times its column qd.{joint}: {mend}", path.display()
+    )]
+    VelocityUnit {
+        /// The log.
+        path: PathBuf,
+        /// The joint.
+        joint: String,
+        /// Slope of dq/dt over qd.
+        factor: f64,
+        /// What the factor looks like.
+        mend: &'static str,
+    },
+    /// Positions far beyond what the joint can reach.
+    #[error(
+        "{}: q.{joint} runs from {min:.4} to {max:.4}, far beyond the joint's limits {lower:.3} to {upper:.3} {unit}: \
+         it is in another unit (mm for m, degrees or encoder steps for rad); convert it", path.display()
+    )]
+    PositionUnit {
+        /// The log.
+        path: PathBuf,
+        /// The joint.
+        joint: String,
+        /// Lowest position in the log.
+        min: f64,
+        /// Highest position in the log.
+        max: f64,
+        /// Lower limit \[rad, m\].
+        lower: f64,
+        /// Upper limit \[rad, m\].
+        upper: f64,
+        /// Unit of the limits.
+        unit: &'static str,
+    },
     /// Nothing moves in what is held out.
     #[error(
         "{held_out}: no joint moves there, so nothing can be said of the model's error on motion held out; \
@@ -81,12 +131,66 @@ const STANDING_STILL: f64 = 1e-3;
 /// A travel below this many standard deviations of the position noise counts as standing still.
 const TRAVEL_TO_NOISE: f64 = 20.0;
 
+/// Rates at which robots are logged \[Hz\]; stamps in another unit than seconds give a rate outside, a thousand times too low or too high.
+const RATES_HZ: std::ops::Range<f64> = 2.0..50_000.0;
+/// Times beyond its limits that a joint's positions may run; drives read beyond their limits by a little, another unit by 57 or 1000.
+const BEYOND_LIMITS: f64 = 6.0;
+/// Distance of a factor from that of a change of units, as a share of it.
+const FACTOR_TOLERANCE: f64 = 0.05;
+
+fn check_time_unit(survey: &Survey) -> Result<(), InputError> {
+    let rate_hz = survey.rate_hz();
+    if RATES_HZ.contains(&rate_hz) {
+        return Ok(());
+    }
+    let plausible = |factor: f64| (10.0..20_000.0).contains(&(rate_hz * factor));
+    let mend = if plausible(1e3) {
+        "they look like milliseconds: divide them by 1000"
+    } else if plausible(1e6) {
+        "they look like microseconds: divide them by 1 000 000"
+    } else if plausible(1e9) {
+        "they look like nanoseconds: divide them by 1 000 000 000"
+    } else {
+        "write them in seconds"
+    };
+    Err(InputError::TimeUnit { path: survey.path.clone(), period: survey.period, rate_hz, mend })
+}
+
+/// A velocity column whose slope against the positions' derivative is that of another unit: either is wrong, and nobody can tell which.
+fn check_velocity_unit(survey: &Survey) -> Result<(), InputError> {
+    let degree = std::f64::consts::PI / 180.0;
+    let units = [
+        (degree, "qd is in degrees/s: multiply it by pi/180"),
+        (1.0 / degree, "q is in degrees: multiply it by pi/180"),
+        (1e-3, "t is in ms or qd in mm/s, while the other is not: convert it"),
+        (1e3, "t is a thousand times too small or q is in mm, while qd is not: convert it"),
+        (1e-6, "t is in microseconds: divide it by 1 000 000"),
+        (1e6, "t is a million times too small: it must be in seconds"),
+    ];
+    for joint in &survey.joints {
+        let Some(velocity) = &joint.velocity else { continue };
+        let near = |unit: f64| (velocity.agreement / unit - 1.0).abs() < FACTOR_TOLERANCE;
+        if let Some(&(_, mend)) = units.iter().find(|(unit, _)| near(*unit)) {
+            let factor = velocity.agreement;
+            return Err(InputError::VelocityUnit {
+                path: survey.path.clone(),
+                joint: joint.name.clone(),
+                factor,
+                mend,
+            });
+        }
+    }
+    Ok(())
+}
+
 /// Checks what only logs and robot together can tell: degrees for radians, torques that are missing.
 ///
 /// # Errors
 /// The first that is wrong, by log and joint.
 pub fn check_logs(tree: &Tree, train: &[Survey], validate: &[Survey]) -> Result<(), InputError> {
     for survey in train.iter().chain(validate) {
+        check_time_unit(survey)?;
+        check_velocity_unit(survey)?;
         for (index, joint) in survey.joints.iter().enumerate() {
             let body = tree.joint(index);
             let (lower, upper) = (body.limits.lower, body.limits.upper);
@@ -99,6 +203,19 @@ pub fn check_logs(tree: &Tree, train: &[Survey], validate: &[Survey]) -> Result<
                 let (path, joint_name) = (survey.path.clone(), joint.name.clone());
                 let (min, max) = (joint.q_min, joint.q_max);
                 return Err(InputError::Degrees { path, joint: joint_name, min, max, lower, upper });
+            }
+            let reach = upper - lower;
+            let outside = (lower - joint.q_min).max(joint.q_max - upper);
+            if reach.is_finite() && reach > 0.0 && outside > BEYOND_LIMITS * limit.max(reach) {
+                return Err(InputError::PositionUnit {
+                    path: survey.path.clone(),
+                    joint: joint.name.clone(),
+                    min: joint.q_min,
+                    max: joint.q_max,
+                    lower,
+                    upper,
+                    unit: if body.joint_type == JointType::Prismatic { "m" } else { "rad" },
+                });
             }
             if joint.torque.as_ref().is_some_and(|torque| torque.all_zero()) {
                 return Err(InputError::ZeroTorque { path: survey.path.clone(), joint: joint.name.clone() });

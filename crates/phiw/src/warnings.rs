@@ -62,6 +62,9 @@ fn twice_in_training(training: &[Survey]) -> Vec<String> {
     .collect()
 }
 
+/// Ignored columns that a warning names; a log can have thousands.
+const COLUMNS_NAMED: usize = 10;
+
 /// Skipped rows, jumps, short stretches, unknown columns.
 fn of_log(survey: &Survey) -> Vec<String> {
     let name = file_name(&survey.path);
@@ -85,9 +88,25 @@ fn of_log(survey: &Survey) -> Vec<String> {
         warnings
             .push(format!("{name}: {} stretches between gaps are too short to use", survey.short_segments));
     }
+    for joint in &survey.joints {
+        let contradicts = |column: &str, derivative: &Option<phiw_telemetry::DerivativeSurvey>| {
+            let derivative = derivative.filter(|derivative| !derivative.plausible())?;
+            Some(format!(
+                "{name}: {column}.{} contradicts the positions (their derivative is {:.3} times as large): it is not used, positions are differentiated",
+                joint.name, derivative.agreement
+            ))
+        };
+        warnings.extend(contradicts("qd", &joint.velocity));
+        warnings.extend(contradicts("qdd", &joint.acceleration));
+    }
     if !survey.ignored_columns.is_empty() {
-        let quoted: Vec<String> = survey.ignored_columns.iter().map(|column| format!("`{column}`")).collect();
-        let columns = if quoted.len() == 1 { "column is" } else { "columns are" };
+        let ignored = &survey.ignored_columns;
+        let mut quoted: Vec<String> =
+            ignored.iter().take(COLUMNS_NAMED).map(|column| format!("`{column}`")).collect();
+        if ignored.len() > COLUMNS_NAMED {
+            quoted.push(format!("and {} more", ignored.len() - COLUMNS_NAMED));
+        }
+        let columns = if ignored.len() == 1 { "column is" } else { "columns are" };
         warnings.push(format!("{name}: unknown {columns} ignored: {}", quoted.join(", ")));
     }
     warnings

@@ -196,3 +196,28 @@ fn options_that_make_no_sense() {
         &["file` is a file; name a folder"],
     );
 }
+
+/// Each of these gave a model, without a word.
+#[test]
+fn stamps_velocities_and_positions_in_other_units() {
+    let scaled_time = |factor: f64| move |log: &mut Recording| log.t.iter_mut().for_each(|t| *t *= factor);
+    check(|scene| scene.record(scaled_time(1e3)), &["train.csv: the time stamps", "look like milliseconds"]);
+    check(|scene| scene.record(scaled_time(1e6)), &["look like microseconds"]);
+    check(|scene| scene.record(scaled_time(1e9)), &["look like nanoseconds"]);
+    check(|scene| scene.record(scaled_time(1e-3)), &["not in seconds"]);
+    let large = |log: &mut Recording| log.q.iter_mut().for_each(|q| *q *= 1e3);
+    check(|scene| scene.record(large), &["q.joint_1 runs from", "another unit"]);
+    let velocity = |factor: f64| {
+        move |log: &mut Recording| {
+            let rows = log.t.len();
+            let slope = |row: usize, joint: usize| {
+                let (before, after) = (row.saturating_sub(1), (row + 1).min(rows - 1));
+                (log.q[3 * after + joint] - log.q[3 * before + joint]) / (log.t[after] - log.t[before])
+            };
+            let all = (0..rows).flat_map(|row| (0..3).map(move |joint| (row, joint)));
+            log.qd = Some(all.map(|(row, joint)| factor * slope(row, joint)).collect());
+        }
+    };
+    check(|scene| scene.record(velocity(180.0 / std::f64::consts::PI)), &["qd is in degrees/s"]);
+    check(|scene| scene.record(velocity(1e3)), &["dq/dt of `joint_1` is 0.001"]);
+}
