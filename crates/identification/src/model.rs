@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 
 /// Version of the file's form.
 const SCHEMA: u32 = 1;
+/// Beyond this magnitude a number of a model is none: its square times another's has no double.
+const LARGEST: f64 = 1e100;
 
 /// A fitted model, ready to be written, read, and used again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -175,6 +177,50 @@ impl Model {
         })
     }
 
+    /// Whether the numbers of a file can be a model's: finite, of a size that squares can be taken of, deviations positive, lengths that fit each other.
+    ///
+    /// # Errors
+    /// [`IdentificationError::Model`] with the first that cannot.
+    pub fn check(&self) -> Result<(), IdentificationError> {
+        let wrong = |what: String| {
+            Err(IdentificationError::Model(format!("the model's {what}; write it again with phiw")))
+        };
+        let usable = |value: &f64| value.abs() < LARGEST;
+        if self.schema != SCHEMA {
+            return wrong(format!("schema is {}, this phiw reads {SCHEMA}", self.schema));
+        }
+        let values =
+            self.base_parameters.iter().chain(self.effects.iter().flat_map(|effect| &effect.parameters));
+        if let Some(parameter) = values.into_iter().find(|parameter| !usable(&parameter.value)) {
+            return wrong(format!(
+                "parameter {} is {:e}, which is no parameter",
+                parameter.name, parameter.value
+            ));
+        }
+        if let Some(body) = self.bodies.iter().find(|body| !body.inertial.iter().all(usable)) {
+            return wrong(format!("body of {} has a number that is no inertial parameter", body.joint));
+        }
+        if self.residual_std.len() != self.joints.len() {
+            let (deviations, joints) = (self.residual_std.len(), self.joints.len());
+            return wrong(format!("residual_std has {deviations} numbers for {joints} joints"));
+        }
+        if let Some(std) = self.residual_std.iter().find(|std| !(**std > 0.0 && usable(std))) {
+            return wrong(format!("residual_std holds {std:e}, which is no standard deviation"));
+        }
+        let parameters = self.base_parameters.len()
+            + self.effects.iter().map(|effect| effect.parameters.len()).sum::<usize>();
+        if !self.factor.parameters.is_sorted_by(|a, b| a < b)
+            || self.factor.parameters.last().is_some_and(|&last| last >= parameters)
+        {
+            return wrong(format!("factor names parameters that are not among its {parameters}"));
+        }
+        let size = self.factor.parameters.len() + 1;
+        if self.factor.entries.len() != size * (size + 1) / 2 || !self.factor.entries.iter().all(usable) {
+            return wrong(format!("factor is no triangle of {size} finite columns"));
+        }
+        Ok(())
+    }
+
     /// The design and its parameters, on a tree that must be the same robot with the same joints held.
     ///
     /// # Errors
@@ -185,10 +231,7 @@ impl Model {
         catalogue: &dyn EffectCatalogue,
     ) -> Result<(Design, Vec<f64>), IdentificationError> {
         let joints: Vec<&str> = tree.joint_names().collect();
-        if self.schema != SCHEMA {
-            let message = format!("model.json has schema {}, this phiw reads {SCHEMA}", self.schema);
-            return Err(IdentificationError::Model(message));
-        }
+        self.check()?;
         if joints != self.joints {
             let message = format!(
                 "the model is of the joints {}, but the URDF with its held joints has {}: use the URDF and --hold that it was made with",

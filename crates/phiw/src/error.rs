@@ -58,6 +58,14 @@ pub enum Error {
         /// What the reader says.
         source: serde_json::Error,
     },
+    /// A model file whose numbers cannot be a model's.
+    #[error("{}: {source}", path.display())]
+    Model {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: IdentificationError,
+    },
     /// The robot's base floats.
     #[error("{}: the robot's base floats, and a log does not hold its motion; make its joint of type floating a fixed one", path.display())]
     FloatingBase {
@@ -236,6 +244,7 @@ impl Error {
             | Error::Urdf { .. }
             | Error::FloatingBase { .. }
             | Error::NotAModel { .. }
+            | Error::Model { .. }
             | Error::Map { .. }
             | Error::Robot { .. }
             | Error::Recording(_)

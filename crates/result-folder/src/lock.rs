@@ -3,9 +3,9 @@
 use crate::ResultError;
 use crate::error::unwritable;
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{Read, Write};
+use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// The right to write to one place, until it is dropped. The system takes it from a program that is killed.
 #[derive(Debug)]
@@ -41,12 +41,7 @@ impl Lock {
             match file.try_lock() {
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => {
-                    let mut holder = String::new();
-                    let _ = (&file).take(512).read_to_string(&mut holder);
-                    let holder = match holder.trim() {
-                        "" => "it has just begun".to_owned(),
-                        holder => holder.to_owned(),
-                    };
+                    let holder = holder(&file);
                     return Err(ResultError::Busy { target, holder });
                 }
                 Err(TryLockError::Error(source)) => return Err(unwritable(&path)(source)),
@@ -56,7 +51,7 @@ impl Lock {
                 continue;
             }
             let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
-            let text = format!("pid {}, `{command}`, since {}", std::process::id(), clock_time(seconds));
+            let text = format!("pid {}, `{command}`, since {}\n", std::process::id(), clock_time(seconds));
             let written = file.set_len(0).and_then(|()| file.write_all(text.as_bytes()));
             written.map_err(unwritable(&path))?;
             return Ok(Lock { target, path, _file: file });
@@ -75,6 +70,23 @@ impl Drop for Lock {
         let _ = std::fs::remove_file(&self.path);
     }
 }
+
+/// What the holder of a lock says of itself. It writes that right after it has taken the lock: whoever comes in between waits a moment.
+fn holder(mut file: &File) -> String {
+    for _ in 0..READS {
+        let mut text = String::new();
+        let read = file.rewind().and_then(|()| file.take(512).read_to_string(&mut text));
+        if read.is_ok() && text.ends_with('\n') {
+            return text.trim_end().to_owned();
+        }
+        std::thread::sleep(BETWEEN_READS);
+    }
+    "it has not said what it is".to_owned()
+}
+
+/// How often, and how far apart, the holder's words are looked for.
+const READS: usize = 200;
+const BETWEEN_READS: Duration = Duration::from_millis(1);
 
 /// The target with the symbolic links of the folders that exist followed; a file's own name may be a link to its generation, and stays.
 fn resolved(target: &Path) -> PathBuf {

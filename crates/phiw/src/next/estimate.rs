@@ -241,7 +241,10 @@ impl Logs {
 
 fn read_model(path: &std::path::Path) -> Result<Model, Error> {
     let text = crate::input::read_text(path, phiw_limits::Limits::default().model_bytes)?;
-    serde_json::from_str(&text).map_err(|source| Error::NotAModel { path: path.to_owned(), source })
+    let model: Model =
+        serde_json::from_str(&text).map_err(|source| Error::NotAModel { path: path.to_owned(), source })?;
+    model.check().map_err(|source| Error::Model { path: path.to_owned(), source })?;
+    Ok(model)
 }
 
 /// The declared columns when there is no log yet. Nothing can choose among an effect's constants then: the simplest stand for all.
