@@ -1,6 +1,8 @@
 //! Whether logs and a robot fit each other, before anything is computed.
 
+use crate::Design;
 use phiw_dynamics::{JointType, Tree};
+use phiw_limits::Limits;
 use phiw_telemetry::Survey;
 use std::path::PathBuf;
 
@@ -101,6 +103,21 @@ pub enum InputError {
         upper: f64,
         /// Unit of the limits.
         unit: &'static str,
+    },
+    /// A robot whose factors do not fit into memory.
+    #[error(
+        "{joints} joints with {parameters} parameters need {:.1} GB for their factors, more than {:.1} GB: \
+         hold joints that need not be identified together (--hold JOINT)", *bytes as f64 / 1e9, *most as f64 / 1e9
+    )]
+    TooLarge {
+        /// Joints that move.
+        joints: usize,
+        /// Parameters of the model.
+        parameters: usize,
+        /// Bytes needed.
+        bytes: u64,
+        /// The limit \[bytes\].
+        most: u64,
     },
     /// Nothing moves in what is held out.
     #[error(
@@ -223,6 +240,19 @@ pub fn check_logs(tree: &Tree, train: &[Survey], validate: &[Survey]) -> Result<
         }
     }
     Ok(())
+}
+
+/// Checks that the triangular factors of all torques fit into memory, for each fold and for each thread.
+///
+/// # Errors
+/// [`InputError::TooLarge`].
+pub fn check_size_of_factors(design: &Design, folds: usize, limits: &Limits) -> Result<(), InputError> {
+    let copies = (folds + rayon::current_num_threads()) as u64;
+    let of_row = |row: &crate::RowLayout| (row.range.len() as u64).pow(2) * size_of::<f64>() as u64;
+    let bytes = copies * design.rows().iter().map(of_row).sum::<u64>();
+    let most = limits.factor_bytes;
+    let (joints, parameters) = (design.rows().len(), design.parameter_count());
+    if bytes > most { Err(InputError::TooLarge { joints, parameters, bytes, most }) } else { Ok(()) }
 }
 
 /// Checks that every joint moves in some log: what stands still tells nothing of itself.

@@ -5,6 +5,7 @@ use crate::{
     fit, merge, torque_error,
 };
 use phiw_dynamics::Tree;
+use phiw_limits::Limits;
 use phiw_regressor::factor::FactorBuilder;
 use phiw_regressor::least_squares::{GroupedFactor, WeightedSolution, weighted_least_squares};
 use phiw_regressor::{BaseParameters, BaseParametersOptions, RegressorError};
@@ -61,6 +62,7 @@ pub fn identify(
     }
     let mut design = Design::new(tree.clone(), base.clone(), all).with_rest_speeds(rest_speeds.clone());
     let all_folds = [train.as_slice(), held_out].concat();
+    crate::check_size_of_factors(&design, all_folds.len(), &Limits::default())?;
     let mut folds = accumulate(&design, &all_folds, sources)?;
     if design.needs().of_reference() {
         // Columns made of the model's torque are zero, or the URDF's, before there is a model.

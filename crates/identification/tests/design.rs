@@ -57,3 +57,15 @@ fn keeping_effects_keeps_their_order_and_the_rest_rule() {
     row[kept.width() + 1] = 1.0;
     assert!(kept.counts(&row, 1));
 }
+
+/// 500 joints took 115 s and 11.9 GB before anything was said.
+#[test]
+fn factors_that_do_not_fit_into_memory_are_refused_before_the_work() {
+    let tree = synthetic::robot(4, 5);
+    let design = synthetic::design(&tree);
+    let mut limits = phiw_limits::Limits::default();
+    assert!(phiw_identification::check_size_of_factors(&design, 18, &limits).is_ok());
+    limits.factor_bytes = 1000;
+    let error = phiw_identification::check_size_of_factors(&design, 18, &limits).unwrap_err().to_string();
+    assert!(error.contains("4 joints") && error.contains("--hold"), "{error}");
+}

@@ -24,8 +24,6 @@ pub struct Limits {
     pub log_columns: usize,
     /// Bytes of a marker recording, which is held in memory.
     pub recording_bytes: u64,
-    /// Samples of a marker recording after resampling, all markers together.
-    pub recording_samples: u64,
     /// Bytes of a TOML file: marker map, support.
     pub toml_bytes: u64,
     /// Bytes of a `model.json`.
@@ -46,7 +44,6 @@ impl Default for Limits {
             log_line_bytes: 256 << 10,
             log_columns: 10_000,
             recording_bytes: 256 << 20,
-            recording_samples: 20_000_000,
             toml_bytes: 1 << 20,
             model_bytes: 64 << 20,
             factor_bytes: 2 << 30,
