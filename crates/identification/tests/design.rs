@@ -67,5 +67,5 @@ fn factors_that_do_not_fit_into_memory_are_refused_before_the_work() {
     assert!(phiw_identification::check_size_of_factors(&design, 18, &limits).is_ok());
     limits.factor_bytes = 1000;
     let error = phiw_identification::check_size_of_factors(&design, 18, &limits).unwrap_err().to_string();
-    assert!(error.contains("4 joints") && error.contains("--hold"), "{error}");
+    assert!(error.contains("5 joints") && error.contains("--hold"), "{error}");
 }
