@@ -187,7 +187,7 @@ impl Model {
         };
         let usable = |value: &f64| value.abs() < LARGEST;
         if self.schema != SCHEMA {
-            return wrong(format!("schema is {}, this phiw reads {SCHEMA}", self.schema));
+            return wrong(format!("schema {} is not {SCHEMA}, which this phiw reads", self.schema));
         }
         let values =
             self.base_parameters.iter().chain(self.effects.iter().flat_map(|effect| &effect.parameters));
@@ -231,7 +231,6 @@ impl Model {
         catalogue: &dyn EffectCatalogue,
     ) -> Result<(Design, Vec<f64>), IdentificationError> {
         let joints: Vec<&str> = tree.joint_names().collect();
-        self.check()?;
         if joints != self.joints {
             let message = format!(
                 "the model is of the joints {}, but the URDF with its held joints has {}: use the URDF and --hold that it was made with",
@@ -260,6 +259,7 @@ impl Model {
             let message = "an effect of the model has not the parameters that its kind has".to_owned();
             return Err(IdentificationError::Model(message));
         }
+        self.check()?;
         Ok((design, parameters))
     }
 

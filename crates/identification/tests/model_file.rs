@@ -89,12 +89,12 @@ fn numbers_that_no_model_has_are_refused() {
     assert!(good.check().is_ok());
     type Spoil = fn(&mut Model);
     let cases: [(Spoil, &str); 9] = [
-        (|model| model.schema = 7, "schema is 7"),
+        (|model| model.schema = 7, "schema 7"),
         (|model| model.base_parameters[1].value = 1e160, "which is no parameter"),
         (|model| model.bodies[0].inertial[3] = f64::NAN, "no inertial parameter"),
         (|model| model.residual_std[0] = 0.0, "no standard deviation"),
         (|model| model.residual_std[0] = -1.0, "no standard deviation"),
-        (|model| model.residual_std.truncate(3), "residual_std has 3 numbers for 4 joints"),
+        (|model| model.residual_std.truncate(3), "residual_std has 3 numbers for 5 joints"),
         (|model| model.factor.parameters[0] = 10_000, "not among its"),
         (|model| model.factor.entries.truncate(5), "no triangle"),
         (|model| model.factor.entries[0] = f64::INFINITY, "no triangle"),
