@@ -64,7 +64,7 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
-        source: IdentificationError,
+        source: Box<IdentificationError>,
     },
     /// The robot's base floats.
     #[error("{}: the robot's base floats, and a log does not hold its motion; make its joint of type floating a fixed one", path.display())]

@@ -147,7 +147,7 @@ fn start(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Re
     let text = read_text(path, Limits::default().model_bytes)?;
     let model: Model =
         serde_json::from_str(&text).map_err(|source| Error::NotAModel { path: path.clone(), source })?;
-    model.check().map_err(|source| Error::Model { path: path.clone(), source })?;
+    model.check().map_err(|source| Error::Model { path: path.clone(), source: Box::new(source) })?;
     let (design, parameters) = model.design(&session.tree, &session.catalogue)?;
     let held = HeldModel {
         factor: model.factor.factor()?,

@@ -243,7 +243,7 @@ fn read_model(path: &std::path::Path) -> Result<Model, Error> {
     let text = crate::input::read_text(path, phiw_limits::Limits::default().model_bytes)?;
     let model: Model =
         serde_json::from_str(&text).map_err(|source| Error::NotAModel { path: path.to_owned(), source })?;
-    model.check().map_err(|source| Error::Model { path: path.to_owned(), source })?;
+    model.check().map_err(|source| Error::Model { path: path.to_owned(), source: Box::new(source) })?;
     Ok(model)
 }
 
