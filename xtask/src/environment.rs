@@ -1,8 +1,8 @@
 //! Where the workspace is, where it is built, and the cargo that runs this task.
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use std::path::PathBuf;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 /// The folder of the workspace.
 ///
@@ -30,4 +30,23 @@ pub fn cargo() -> anyhow::Result<Command> {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(workspace_root()?);
     Ok(command)
+}
+
+/// Builds the command `phiw` with the release profile, and gives its path.
+///
+/// # Errors
+/// As [`workspace_root`], or it does not build.
+pub fn release_binary() -> anyhow::Result<PathBuf> {
+    let build = cargo()?
+        .args(["build", "--release", "--package", "phiw", "--message-format", "json-render-diagnostics"])
+        .stderr(Stdio::inherit())
+        .output()
+        .context("cargo")?;
+    ensure!(build.status.success(), "phiw does not build");
+    let messages = String::from_utf8_lossy(&build.stdout);
+    let executable = messages.lines().rev().find_map(|line| {
+        let message: serde_json::Value = serde_json::from_str(line).ok()?;
+        message.get("executable")?.as_str().map(PathBuf::from)
+    });
+    executable.context("cargo built phiw but named no executable")
 }

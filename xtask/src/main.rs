@@ -8,6 +8,7 @@ mod plant_experiment;
 mod retarget;
 mod run;
 mod test;
+mod torture;
 mod undeclared;
 
 use clap::{Parser, Subcommand};
@@ -30,6 +31,8 @@ enum Task {
     Retarget(retarget::Arguments),
     /// All checks of the workspace, and the count of tests.
     Test(test::Arguments),
+    /// Hostile inputs on the release binary: a table of what came of each class.
+    Torture(torture::Arguments),
     /// Fetch MuJoCo's library into the user's cache folder, with Python's pip.
     Mujoco(mujoco::Arguments),
     /// Compare with Pinocchio, installed from PyPI into a private environment.
@@ -48,6 +51,7 @@ fn main() -> anyhow::Result<ExitCode> {
         Task::SyntheticLog(arguments) => run::synthetic_log::command(&arguments),
         Task::Retarget(arguments) => retarget::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Test(arguments) => test::command(&arguments),
+        Task::Torture(arguments) => torture::command(&arguments),
         Task::Mujoco(arguments) => mujoco::command(&arguments),
         Task::Oracle(arguments) => oracle::command(&arguments),
         Task::Paper(arguments) => paper::command(&arguments).map(|()| ExitCode::SUCCESS),

@@ -78,6 +78,19 @@ fn of_log(survey: &Survey) -> Vec<String> {
             GapReason::TimeJump => {
                 format!("{name}: time jumps {count} times, first at line {line}; the log is split there")
             }
+            GapReason::Spike => {
+                let columns: Vec<String> = survey
+                    .spikes
+                    .iter()
+                    .map(|spike| {
+                        format!("{} ({} first at line {})", spike.column, spike.samples, spike.first_line)
+                    })
+                    .collect();
+                format!(
+                    "{name}: {count} {rows} with a spike left out: {}; the log is split there",
+                    columns.join(", ")
+                )
+            }
             reason => format!(
                 "{name}: {count} {rows} skipped ({reason}), first at line {line}; the log is split there"
             ),

@@ -55,6 +55,31 @@ impl Layout {
         1 + self.joints
     }
 
+    /// Name of the column at `place`, of these joints.
+    pub fn name(&self, place: usize, joints: &[String]) -> String {
+        let joint =
+            |prefix: &str, joint: usize| format!("{prefix}{}", joints.get(joint).map_or("", String::as_str));
+        if place == 0 {
+            return "t".to_owned();
+        }
+        if place <= self.joints {
+            return joint("q.", place - 1);
+        }
+        if self.torque && place <= 2 * self.joints {
+            return joint("tau.", place - 1 - self.joints);
+        }
+        let optional = [
+            (Optional::Velocity, &self.qd),
+            (Optional::Acceleration, &self.qdd),
+            (Optional::Temperature, &self.temp),
+        ];
+        let found = optional.iter().find_map(|(signal, places)| {
+            let index = places.iter().position(|candidate| *candidate == Some(place))?;
+            Some(joint(signal.prefix(), index))
+        });
+        found.unwrap_or_default()
+    }
+
     /// Whether a missing value at `place` leaves the sample usable. A temperature changes slowly and is often
     /// logged at a lower rate.
     pub fn may_be_missing(&self, place: usize) -> bool {

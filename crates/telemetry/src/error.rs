@@ -115,6 +115,16 @@ pub enum LogError {
         /// The stamp, in seconds.
         stamp: f64,
     },
+    /// The log is not what it was when it was surveyed.
+    #[error("{}: the file changed while it was read: {before} rows before, {now} now; run again when nothing writes to it", path.display())]
+    Changed {
+        /// The log.
+        path: PathBuf,
+        /// Rows when it was surveyed.
+        before: u64,
+        /// Rows now.
+        now: u64,
+    },
     /// Every row is a gap.
     #[error("{}: no usable row of {rows}{reasons}", path.display())]
     NoUsableRows {

@@ -13,6 +13,8 @@ pub enum GapReason {
     NotFinite,
     /// A magnitude above 1e100: memory that nobody wrote to, not a measurement.
     Huge,
+    /// A position, velocity or torque that leaves where the signal is and comes back within a few samples.
+    Spike,
     /// The time stamp of the row before, once more.
     DuplicateStamp,
     /// The last row is cut short, or may be since its line feed is missing.
@@ -22,10 +24,11 @@ pub enum GapReason {
 }
 
 impl GapReason {
-    pub(crate) const ALL: [GapReason; 6] = [
+    pub(crate) const ALL: [GapReason; 7] = [
         GapReason::EmptyCell,
         GapReason::NotFinite,
         GapReason::Huge,
+        GapReason::Spike,
         GapReason::DuplicateStamp,
         GapReason::TruncatedLastRow,
         GapReason::TimeJump,
@@ -38,6 +41,7 @@ impl fmt::Display for GapReason {
             GapReason::EmptyCell => "empty cell",
             GapReason::NotFinite => "NaN or infinity",
             GapReason::Huge => "value beyond 1e100",
+            GapReason::Spike => "spike",
             GapReason::DuplicateStamp => "duplicate time stamp",
             GapReason::TruncatedLastRow => "truncated last row",
             GapReason::TimeJump => "jump in time",
@@ -53,6 +57,17 @@ pub struct GapCount {
     /// Rows skipped for it; for [`GapReason::TimeJump`], which skips no row, the number of jumps.
     pub count: u64,
     /// The first line of the file where it happened, counted from 1.
+    pub first_line: u64,
+}
+
+/// Spikes of one column.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SpikeCount {
+    /// The column, such as `q.joint_1`.
+    pub column: String,
+    /// Samples that are spikes.
+    pub samples: u64,
+    /// The line of the first, counted from 1.
     pub first_line: u64,
 }
 

@@ -4,6 +4,7 @@ use crate::blocks::BlockMaker;
 use crate::clock::Resampler;
 use crate::reader::{LogReader, Rows};
 use crate::segments::{SegmentSink, split};
+use crate::spike::WithoutSpikes;
 use crate::{Block, Conditioning, LogError, LogPlan, Segment, Survey};
 use std::ops::ControlFlow;
 
@@ -40,12 +41,12 @@ pub fn stream(
     sink: &mut dyn FnMut(Block) -> ControlFlow<()>,
 ) -> Result<StreamSummary, LogError> {
     let joints: Vec<String> = survey.joints.iter().map(|joint| joint.name.clone()).collect();
-    let mut rows = LogReader::open(&survey.path, &joints, survey.torque)?;
-    stream_rows(&mut rows, survey, conditioning, progress, sink)
+    let rows = LogReader::open(&survey.path, &joints, survey.torque)?;
+    stream_rows(rows, survey, conditioning, progress, sink)
 }
 
 pub(crate) fn stream_rows(
-    rows: &mut dyn Rows,
+    rows: impl Rows,
     survey: &Survey,
     conditioning: &Conditioning,
     progress: &mut dyn FnMut(u64, u64),
@@ -60,7 +61,13 @@ pub(crate) fn stream_rows(
         progress,
         longest: 0,
     };
-    split(rows, survey.longest_step, &mut streamer)?;
+    let counts = match survey.spike_bounds.as_slice() {
+        [] => split(&mut { rows }, survey.longest_step, &mut streamer)?,
+        bounds => split(&mut WithoutSpikes::new(rows, bounds.to_vec()), survey.longest_step, &mut streamer)?,
+    };
+    if !streamer.outlet.summary.stopped && (counts.rows, counts.used) != (survey.rows, survey.used_rows) {
+        return Err(LogError::Changed { path: survey.path.clone(), before: survey.rows, now: counts.rows });
+    }
     let summary = streamer.outlet.summary;
     if summary.segments == 0 && !summary.stopped {
         return Err(LogError::NoLongSegment {

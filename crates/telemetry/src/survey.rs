@@ -5,8 +5,9 @@ use crate::columns::{Layout, TorqueColumns};
 use crate::histogram::Histogram;
 use crate::joint_survey::{Five, JointCollector};
 use crate::reader::{LogReader, Row, Rows};
-use crate::segments::{RowCounts, SegmentSink, split};
+use crate::segments::{RowCounts, SegmentSink, SpikeCount, split};
 use crate::spectrum::SpectrumEstimator;
+use crate::spike::{SpikeFinder, SpikeSettings, WINDOW, WithoutSpikes};
 use crate::{GapCount, JointSurvey, LogError, Segment, Spectrum};
 use std::path::{Path, PathBuf};
 
@@ -29,6 +30,13 @@ pub struct Survey {
     pub short_segments: u64,
     /// Why rows were skipped and segments split, in the order of first occurrence.
     pub gaps: Vec<GapCount>,
+    /// Columns with spikes; their rows are counted as gaps, too.
+    pub spikes: Vec<SpikeCount>,
+    /// The largest excursion of each column `q.<joint>`, `tau.<joint>`, … of a row, as a multiple of what is usual in it, see
+    /// [`SpikeSettings::multiple`](crate::SpikeSettings::multiple); without spikes that were left out.
+    pub excursions: Vec<f64>,
+    /// What an excursion must exceed to be a spike, by place in a row; empty where the log has none.
+    pub(crate) spike_bounds: Vec<f64>,
     /// Columns in the header that are not used.
     pub ignored_columns: Vec<String>,
     /// Median distance of consecutive stamps, in seconds; exact over the first 65536, checked against a
@@ -146,13 +154,25 @@ pub(crate) fn survey_rows<R: Rows>(
         collector = Collector::new(rows.layout(), all, progress);
         counts = split(&mut rows, all.longest(), &mut collector)?;
     }
+    let (mut spikes, mut spike_bounds) = (Vec::new(), Vec::new());
+    if let Some(bounds) = collector.spikes.bounds(rows.layout(), SpikeSettings::default()) {
+        // They would bend every number of the survey: once more, without them.
+        let steps = collector.steps;
+        let mut without = WithoutSpikes::new(open()?, bounds.clone());
+        collector = Collector::new(without.layout(), steps, progress);
+        counts = split(&mut without, steps.longest(), &mut collector)?;
+        spikes = without.counts(joints);
+        spike_bounds = bounds;
+        rows = without.into_inner();
+    }
     if counts.used == 0 {
         return Err(match counts.rows {
             0 => LogError::Empty { path: rows.path().into() },
             n => LogError::NoUsableRows { path: rows.path().into(), rows: n, reasons: counts.reasons() },
         });
     }
-    Ok((collector.finish(rows.path(), joints, counts), rows))
+    let survey = collector.finish(rows.path(), joints, counts);
+    Ok((Survey { spikes, spike_bounds, ..survey }, rows))
 }
 
 /// How far apart the stamps are.
@@ -207,6 +227,7 @@ struct Collector<'a> {
     steps: Steps,
     joints: Vec<JointCollector>,
     spectrum: SpectrumEstimator,
+    spikes: SpikeFinder,
     segments: Vec<Segment>,
     short_segments: u64,
     /// The five latest samples of the segment, oldest first, flat.
@@ -229,10 +250,11 @@ impl<'a> Collector<'a> {
         Collector {
             joints: (0..layout.joints).map(joint).collect(),
             spectrum: SpectrumEstimator::new(layout, steps.median),
+            spikes: SpikeFinder::new(layout),
             steps,
             segments: Vec::new(),
             short_segments: 0,
-            recent: vec![0.0; 5 * layout.width],
+            recent: vec![0.0; WINDOW * layout.width],
             in_segment: 0,
             last_stamp: None,
             step_histogram: Histogram::new(),
@@ -277,6 +299,9 @@ impl<'a> Collector<'a> {
             segments: self.segments,
             short_segments: self.short_segments,
             gaps: counts.gaps,
+            spikes: Vec::new(),
+            spike_bounds: Vec::new(),
+            excursions: self.spikes.multiples(),
             ignored_columns: Vec::new(),
             median_period: self.steps.median,
             period,
@@ -318,7 +343,11 @@ impl SegmentSink for Collector<'_> {
             let torque = torques.get(i).copied().unwrap_or(f64::NAN);
             joint.push(values[q + i], torque, optional(self.layout.qd[i]), optional(self.layout.qdd[i]));
         }
-        if self.in_segment >= 5 {
+        if self.in_segment >= WINDOW {
+            for place in 1..width {
+                let window = self.five(Some(place));
+                self.spikes.push(place, window, self.in_segment == WINDOW);
+            }
             let t = self.five(Some(0));
             let uneven = uniform_misfit(t).abs() > UNEVEN * self.steps.median;
             for i in 0..n {
@@ -335,6 +364,12 @@ impl SegmentSink for Collector<'_> {
         match segment.rows {
             rows if rows < Survey::SHORTEST_KEPT => self.short_segments += 1,
             _ => self.segments.push(segment),
+        }
+        if self.in_segment >= WINDOW {
+            for place in 1..self.layout.width {
+                let window = self.five(Some(place));
+                self.spikes.end(place, window);
+            }
         }
         self.in_segment = 0;
         self.spectrum.end_segment();

@@ -3,6 +3,7 @@
 use super::case::Case;
 use super::report_file::Report;
 use super::write::write_visible;
+use crate::environment;
 use anyhow::{Context, bail};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -77,7 +78,7 @@ impl Tracer {
     pub fn find(path: Option<&Path>, threads: usize) -> anyhow::Result<Self> {
         let program = match path {
             Some(path) => path.canonicalize().with_context(|| path.display().to_string())?,
-            None => build()?,
+            None => environment::release_binary()?,
         };
         Ok(Tracer { program, threads })
     }
@@ -97,22 +98,4 @@ fn run(mut command: Command) -> anyhow::Result<()> {
         bail!("`phiw {}` ended with {}: {}", arguments.join(" "), output.status, message.trim());
     }
     Ok(())
-}
-
-fn build() -> anyhow::Result<PathBuf> {
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let build = Command::new(cargo)
-        .args(["build", "--release", "--package", "phiw", "--message-format", "json-render-diagnostics"])
-        .stderr(std::process::Stdio::inherit())
-        .output()
-        .context("cargo")?;
-    if !build.status.success() {
-        bail!("phiw does not build");
-    }
-    let messages = String::from_utf8_lossy(&build.stdout);
-    let executable = messages.lines().rev().find_map(|line| {
-        let message: serde_json::Value = serde_json::from_str(line).ok()?;
-        message.get("executable")?.as_str().map(PathBuf::from)
-    });
-    executable.context("cargo built phiw but named no executable")
 }
