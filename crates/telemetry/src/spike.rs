@@ -10,8 +10,8 @@ use std::path::Path;
 
 /// The most samples in a row that are taken for one spike.
 const LONGEST: usize = 3;
-/// Samples that a spike is judged by: one before, [`LONGEST`] of it, one behind.
-pub(crate) const WINDOW: usize = LONGEST + 2;
+/// Samples that a spike is judged by. Where a segment begins with one there are more behind it than another can have.
+pub(crate) const WINDOW: usize = 2 * LONGEST + 1;
 /// Fewer samples that differ from the mean of their neighbours than this say nothing of what is usual in a column.
 const FEWEST: u64 = 16;
 
@@ -32,7 +32,7 @@ impl Default for SpikeSettings {
     }
 }
 
-/// By how much the samples 1… of a window (of three to [`WINDOW`]) leave the line between sample 0 and the sample behind them, less what that line rises: for one, two
+/// By how much the samples 1… of a window (of three or more) leave the line between sample 0 and the sample behind them, less what that line rises: for one, two
 /// or three samples, with the number of samples for which it is most. A step gives less than nothing, since it does not come back.
 fn excursion(window: &[f64]) -> (f64, usize) {
     let before = window[0];
@@ -80,7 +80,7 @@ impl SpikeFinder {
         SpikeFinder { columns: (0..layout.width).map(|_| (Histogram::new(), f64::NEG_INFINITY)).collect() }
     }
 
-    /// The five latest samples of a column, oldest first; `first` if they begin a segment.
+    /// The latest samples of a column, oldest first; `first` if they begin a segment.
     pub fn push(&mut self, place: usize, window: [f64; WINDOW], first: bool) {
         let (usual, most) = &mut self.columns[place];
         let bend = window[2] - 0.5 * (window[1] + window[3]);
@@ -93,11 +93,13 @@ impl SpikeFinder {
         }
     }
 
-    /// The last five samples of a segment.
+    /// The last samples of a segment.
     pub fn end(&mut self, place: usize, mut window: [f64; WINDOW]) {
         let most = &mut self.columns[place].1;
         // What the samples behind them are too few for in `push`.
-        *most = most.max(excursion(&window[1..]).0).max(excursion(&window[2..]).0);
+        for start in 1..WINDOW - 2 {
+            *most = most.max(excursion(&window[start..]).0);
+        }
         window.reverse();
         *most = most.max(excursion_at_edge(&window).0);
     }
@@ -318,9 +320,7 @@ mod tests {
             q[at..end].iter_mut().for_each(|x| *x += size);
             let survey = recording(q).survey().unwrap();
             let [found] = survey.spikes.as_slice() else { panic!("{:?}", survey.spikes) };
-            // Of the two samples before a spike at the very beginning nobody knows that they are not the spike.
-            prop_assert!((0..=2).contains(&(found.samples as usize - (end - at))), "{:?}", found);
-            prop_assert!(found.first_line as usize <= at + 2 && found.first_line as usize + 2 >= at + 2);
+            prop_assert_eq!((found.samples as usize, found.first_line as usize), (end - at, at + 2));
             prop_assert!(survey.joints[0].q_max < 1.01 && survey.joints[0].q_min > -1.01);
         }
 

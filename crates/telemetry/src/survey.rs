@@ -230,7 +230,7 @@ struct Collector<'a> {
     spikes: SpikeFinder,
     segments: Vec<Segment>,
     short_segments: u64,
-    /// The five latest samples of the segment, oldest first, flat.
+    /// The [`WINDOW`] latest samples of the segment, oldest first, flat.
     recent: Vec<f64>,
     in_segment: usize,
     last_stamp: Option<f64>,
@@ -280,7 +280,14 @@ impl<'a> Collector<'a> {
     }
 
     fn five(&self, place: Option<usize>) -> Five {
-        std::array::from_fn(|i| place.map_or(f64::NAN, |place| self.recent[i * self.layout.width + place]))
+        let first = WINDOW - 5;
+        std::array::from_fn(|i| {
+            place.map_or(f64::NAN, |place| self.recent[(first + i) * self.layout.width + place])
+        })
+    }
+
+    fn window(&self, place: usize) -> [f64; WINDOW] {
+        std::array::from_fn(|i| self.recent[i * self.layout.width + place])
     }
 
     fn finish(self, path: &Path, joints: &[String], counts: RowCounts) -> Survey {
@@ -329,10 +336,10 @@ impl SegmentSink for Collector<'_> {
             self.step_histogram.push(values[0] - last);
         }
         if self.in_segment > 0 {
-            self.step(values[0] - self.recent[4 * width]);
+            self.step(values[0] - self.recent[(WINDOW - 1) * width]);
         }
         self.recent.copy_within(width.., 0);
-        self.recent[4 * width..].copy_from_slice(values);
+        self.recent[(WINDOW - 1) * width..].copy_from_slice(values);
         self.in_segment += 1;
 
         let (q, tau) = (self.layout.q(), self.layout.tau());
@@ -345,9 +352,11 @@ impl SegmentSink for Collector<'_> {
         }
         if self.in_segment >= WINDOW {
             for place in 1..width {
-                let window = self.five(Some(place));
+                let window = self.window(place);
                 self.spikes.push(place, window, self.in_segment == WINDOW);
             }
+        }
+        if self.in_segment >= 5 {
             let t = self.five(Some(0));
             let uneven = uniform_misfit(t).abs() > UNEVEN * self.steps.median;
             for i in 0..n {
@@ -367,7 +376,7 @@ impl SegmentSink for Collector<'_> {
         }
         if self.in_segment >= WINDOW {
             for place in 1..self.layout.width {
-                let window = self.five(Some(place));
+                let window = self.window(place);
                 self.spikes.end(place, window);
             }
         }

@@ -272,8 +272,10 @@ fn peak_of(process: u32) -> u64 {
     line.and_then(|line| line.trim().trim_end_matches(" kB").trim().parse::<u64>().ok()).unwrap_or(0) * 1024
 }
 
-/// Result files by path; and what no run may leave: temporary files, locks, changed inputs.
-fn collect(folder: &Path, inputs: &[String]) -> io::Result<(BTreeMap<String, Vec<u8>>, Vec<String>)> {
+type ResultFiles = BTreeMap<String, Vec<u8>>;
+
+/// Result files by path; and what no run may leave: temporary files, locks.
+fn collect(folder: &Path, inputs: &[String]) -> io::Result<(ResultFiles, Vec<String>)> {
     let (mut results, mut left_over) = (BTreeMap::new(), Vec::new());
     let mut linked = Vec::new();
     for entry in std::fs::read_dir(folder)? {
