@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![warn(missing_docs)]
 
+mod artefacts;
 pub mod bspline;
 pub mod c3d;
 pub mod embedded;
@@ -20,6 +21,7 @@ pub mod solver;
 mod start;
 mod weights;
 
+pub use artefacts::{Artefact, ArtefactKind, marker_spikes};
 pub use finite_difference::backward_differences;
 pub use point_csv::read_point_csv;
 pub use problem::Problem;

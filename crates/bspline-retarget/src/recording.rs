@@ -73,24 +73,21 @@ pub fn read_recording(path: &Path, units: Option<&str>) -> Result<MarkerRecordin
     } else {
         crate::c3d::read_c3d_file(path, units)?
     };
-    check_distances(path, &recording)?;
+    check_extent(path, &recording)?;
     Ok(recording)
 }
 
-/// A marker farther from the origin than any capture volume is broken, or in another unit \[m\].
-const FARTHEST_M: f64 = 100.0;
+/// How large the box around a person's markers is, from corner to corner \[m\]: those of one arm alone, and of the tallest with arms stretched.
+const PERSON_M: std::ops::RangeInclusive<f64> = 0.2..=4.0;
 
-fn check_distances(path: &Path, recording: &MarkerRecording) -> Result<(), RecordingError> {
-    let far = |position: &[f64; 3]| position.iter().any(|x| x.abs() > FARTHEST_M);
-    let Some(place) = recording.positions_m.iter().position(far) else { return Ok(()) };
-    let markers = recording.labels.len().max(1);
-    let distance_m = recording.positions_m[place].iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-    Err(RecordingError::Far {
-        path: path.to_owned(),
-        marker: recording.labels.get(place % markers).cloned().unwrap_or_default(),
-        frame: place / markers + 1,
-        distance_m,
-    })
+/// A box around all markers that is no person's: the numbers are in another unit, or no positions.
+fn check_extent(path: &Path, recording: &MarkerRecording) -> Result<(), RecordingError> {
+    match recording.extent_m() {
+        Some(extent_m) if !PERSON_M.contains(&extent_m) => {
+            Err(RecordingError::Extent { path: path.to_owned(), extent_m })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Why a recording can not be read.
@@ -117,20 +114,16 @@ pub enum RecordingError {
         /// What is wrong with it.
         source: C3dError,
     },
-    /// A marker is farther away than any capture volume reaches.
+    /// The markers are no person's.
     #[error(
-        "{}: marker `{marker}` is {distance_m:.3e} m from the origin in frame {frame}: the unit is another (set `units` in the map), \
-         or the sample is broken: delete it", path.display()
+        "{}: the markers span {extent_m:.3e} m, a person's 0.2 to 4 m: the unit is another; set `units` in the map{}",
+        path.display(), fitting_unit(*extent_m)
     )]
-    Far {
+    Extent {
         /// The file.
         path: PathBuf,
-        /// The marker.
-        marker: String,
-        /// The frame, counted from 1.
-        frame: usize,
-        /// Its largest coordinate \[m\].
-        distance_m: f64,
+        /// The box around all markers, from corner to corner, median over the frames \[m\].
+        extent_m: f64,
     },
     /// It is no table of points.
     #[error("{}: {what}", path.display())]
@@ -140,4 +133,11 @@ pub enum RecordingError {
         /// What is wrong, where, and the mend.
         what: String,
     },
+}
+
+/// The unit in which the numbers would be a person's, in words.
+fn fitting_unit(extent_m: f64) -> String {
+    let factors = [(1000.0, "m, not mm"), (0.001, "mm, not m"), (100.0, "m, not cm"), (0.01, "cm, not m")];
+    let fits = |(factor, _): &&(f64, &str)| PERSON_M.contains(&(extent_m * factor));
+    factors.iter().find(fits).map_or_else(String::new, |(_, words)| format!(" (as if they were in {words})"))
 }

@@ -204,7 +204,7 @@ impl Model {
             let (deviations, joints) = (self.residual_std.len(), self.joints.len());
             return wrong(format!("residual_std has {deviations} numbers for {joints} joints"));
         }
-        if let Some(std) = self.residual_std.iter().find(|std| !(**std > 0.0 && usable(std))) {
+        if let Some(std) = self.residual_std.iter().find(|std| !(**std > LARGEST.recip() && usable(std))) {
             return wrong(format!("residual_std holds {std:e}, which is no standard deviation"));
         }
         let parameters = self.base_parameters.len()

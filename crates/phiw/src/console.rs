@@ -3,10 +3,17 @@
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::Write;
 
+/// Characters of a message that are shown; a name in a broken file can fill screens.
+const LONGEST_MESSAGE: usize = 1000;
+
 /// One message on standard error, of one line. Where nobody listens any more, nothing is lost but the message.
 pub fn say(prefix: &str, message: &str) {
     let mut line = String::from(prefix);
-    message.chars().for_each(|c| push_visible(&mut line, c));
+    message.chars().take(LONGEST_MESSAGE).for_each(|c| push_visible(&mut line, c));
+    let left = message.chars().skip(LONGEST_MESSAGE).count();
+    if left > 0 {
+        line.push_str(&format!("… ({left} more characters)"));
+    }
     line.push('\n');
     let _ = std::io::stderr().write_all(line.as_bytes());
 }

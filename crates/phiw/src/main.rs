@@ -61,7 +61,7 @@ fn told(command: &Command, console: &Console) -> Result<Told, Error> {
         Command::Retarget(arguments) => {
             let outcome = phiw::retarget::retarget(arguments, console)?;
             let failures = outcome.failures.iter().map(|failure| failure.reason.to_string()).collect();
-            Told { summary: outcome.summary, warnings: Vec::new(), failures }
+            Told { summary: outcome.summary, warnings: outcome.warnings, failures }
         }
         Command::Next(arguments) => {
             let outcome = phiw::next::next(arguments, console)?;

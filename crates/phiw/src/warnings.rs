@@ -104,9 +104,13 @@ fn of_log(survey: &Survey) -> Vec<String> {
     for joint in &survey.joints {
         let contradicts = |column: &str, derivative: &Option<phiw_telemetry::DerivativeSurvey>| {
             let derivative = derivative.filter(|derivative| !derivative.plausible())?;
+            let how = match derivative.agreement.is_finite() && derivative.min < derivative.max {
+                true => format!("their derivative is {:.3} times as large", derivative.agreement),
+                false => "it is constant".to_owned(),
+            };
             Some(format!(
-                "{name}: {column}.{} contradicts the positions (their derivative is {:.3} times as large): it is not used, positions are differentiated",
-                joint.name, derivative.agreement
+                "{name}: {column}.{} contradicts the positions ({how}): it is not used, positions are differentiated",
+                joint.name
             ))
         };
         warnings.extend(contradicts("qd", &joint.velocity));

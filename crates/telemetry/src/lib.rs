@@ -37,7 +37,6 @@ pub use reader::looks_like;
 pub use recording::Recording;
 pub use segments::{GapCount, GapReason, Segment, SpikeCount};
 pub use spectrum::Spectrum;
-pub use spike::SpikeSettings;
 pub use stream::{StreamSummary, stream};
 pub use survey::{Session, Survey, arrange_session, survey};
 pub use writer::{LogColumns, LogWriter};

@@ -1,74 +1,13 @@
-//! Spikes: a few samples far off, after which the signal goes on where it was. A broken encoder reading, a torn message.
+//! Spikes in a log, found in the survey's pass and left out in the passes that follow.
 
 use crate::columns::Layout;
 use crate::histogram::Histogram;
 use crate::reader::{Row, Rows};
 use crate::segments::GapReason;
 use crate::{LogError, SpikeCount};
+use phiw_spikes::{FEWEST, SpikeSettings, WINDOW, bend, excursion, excursion_at_edge, spike_length};
 use std::collections::VecDeque;
 use std::path::Path;
-
-/// The most samples in a row that are taken for one spike.
-const LONGEST: usize = 3;
-/// Samples that a spike is judged by. Where a segment begins with one there are more behind it than another can have.
-pub(crate) const WINDOW: usize = 2 * LONGEST + 1;
-/// Fewer samples that differ from the mean of their neighbours than this say nothing of what is usual in a column.
-const FEWEST: u64 = 16;
-
-/// When a sample is a spike.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SpikeSettings {
-    /// How far a signal must leave the line between the samples before and behind, and come back to it, to be a spike: a multiple of what 98 %
-    /// of the samples that differ from the mean of their neighbours differ from it by.
-    ///
-    /// On six sets of real logs the largest multiple is 8.4 for a position, 7.3 for a velocity, 9.2 for a torque (`cargo test -p phiw-telemetry
-    /// real_logs -- --nocapture` prints them); normal noise reaches 2.5 in 10⁷ samples.
-    pub multiple: f64,
-}
-
-impl Default for SpikeSettings {
-    fn default() -> Self {
-        SpikeSettings { multiple: 25.0 }
-    }
-}
-
-/// By how much the samples 1… of a window (of three or more) leave the line between sample 0 and the sample behind them, less what that line rises: for one, two
-/// or three samples, with the number of samples for which it is most. A step gives less than nothing, since it does not come back.
-fn excursion(window: &[f64]) -> (f64, usize) {
-    let before = window[0];
-    let mut most = (f64::NEG_INFINITY, 1);
-    for length in 1..=LONGEST.min(window.len() - 2) {
-        let behind = window[length + 1];
-        let mut least = f64::INFINITY;
-        for (place, &sample) in window[1..=length].iter().enumerate() {
-            let share = (place + 1) as f64 / (length + 1) as f64;
-            least = least.min((sample - before - share * (behind - before)).abs());
-        }
-        let excess = least - (behind - before).abs();
-        if excess > most.0 {
-            most = (excess, length);
-        }
-    }
-    most
-}
-
-/// The same for samples 0… of a window, where a segment begins (or, backwards, ends): by how much they are off all samples behind
-/// them, less what the signal can have moved meanwhile at its fastest step there.
-fn excursion_at_edge(window: &[f64]) -> (f64, usize) {
-    let mut most = (f64::NEG_INFINITY, 1);
-    for length in 1..=LONGEST.min(window.len() - 2) {
-        let (off, behind) = window.split_at(length);
-        let distance =
-            |sample: &f64| behind.iter().fold(f64::INFINITY, |least, x| least.min((sample - x).abs()));
-        let least = off.iter().map(distance).fold(f64::INFINITY, f64::min);
-        let fastest = behind.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
-        let excess = least - WINDOW as f64 * fastest;
-        if excess > most.0 {
-            most = (excess, length);
-        }
-    }
-    most
-}
 
 /// What is usual in each column of a log, and the largest excursion: whether there are spikes.
 pub(crate) struct SpikeFinder {
@@ -83,7 +22,7 @@ impl SpikeFinder {
     /// The latest samples of a column, oldest first; `first` if they begin a segment.
     pub fn push(&mut self, place: usize, window: [f64; WINDOW], first: bool) {
         let (usual, most) = &mut self.columns[place];
-        let bend = window[2] - 0.5 * (window[1] + window[3]);
+        let bend = bend([window[1], window[2], window[3]]);
         if bend != 0.0 {
             usual.push(bend);
         }
@@ -110,8 +49,10 @@ impl SpikeFinder {
             // Stamps are judged by the segments; a temperature is no part of the fit.
             0 => f64::INFINITY,
             place if layout.may_be_missing(place) => f64::INFINITY,
-            _ if usual.total() < FEWEST => 0.0,
-            _ => settings.multiple * usual.quantile(0.98),
+            _ if usual.total() < FEWEST as u64 => settings.smallest,
+            _ => settings
+                .smallest
+                .max(settings.multiple * usual.quantile(settings.share_of(usual.total() as usize))),
         };
         let bounds: Vec<f64> =
             self.columns.iter().enumerate().map(|(place, column)| bound(place, column)).collect();
@@ -119,10 +60,10 @@ impl SpikeFinder {
     }
 
     /// The largest excursion of each column but the time, as a multiple of what is usual; 0 where that is not known.
-    pub fn multiples(&self) -> Vec<f64> {
-        let multiple = |(usual, most): &(Histogram, f64)| match usual.total() {
-            FEWEST.. => most.max(0.0) / usual.quantile(0.98),
-            _ => 0.0,
+    pub fn multiples(&self, settings: SpikeSettings) -> Vec<f64> {
+        let multiple = |(usual, most): &(Histogram, f64)| match usual.total() >= FEWEST as u64 {
+            true => most.max(0.0) / usual.quantile(settings.share_of(usual.total() as usize)),
+            false => 0.0,
         };
         self.columns.iter().skip(1).map(multiple).collect()
     }
@@ -217,33 +158,12 @@ impl<R: Rows> WithoutSpikes<R> {
 impl<R: Rows> WithoutSpikes<R> {
     /// How many of the `samples` read ahead are a spike of that place, from the oldest on.
     fn spike(&self, place: usize, samples: usize) -> usize {
-        let mut window = [0.0; WINDOW];
-        let sample = |index: usize| self.ahead[index].values[place];
-        let over = |(most, length): (f64, usize)| if most > self.bounds[place] { length } else { 0 };
-        match &self.before {
-            [Some(before), earlier] => {
-                window[0] = before[place];
-                let size = WINDOW.min(samples + 1);
-                (1..size).for_each(|index| window[index] = sample(index - 1));
-                let inside = if size > 2 { over(excursion(&window[..size])) } else { 0 };
-                match earlier {
-                    // The segment ends within the window: all that is left of it may be off.
-                    Some(earlier) if inside == 0 && samples <= LONGEST => {
-                        (0..samples).for_each(|index| window[index] = sample(samples - 1 - index));
-                        window[samples] = before[place];
-                        window[samples + 1] = earlier[place];
-                        let length = over(excursion_at_edge(&window[..samples + 2]));
-                        if length == samples { length } else { 0 }
-                    }
-                    _ => inside,
-                }
-            }
-            [None, _] if samples >= WINDOW => {
-                (0..WINDOW).for_each(|index| window[index] = sample(index));
-                over(excursion_at_edge(&window))
-            }
-            [None, _] => 0,
+        let mut ahead = [0.0; WINDOW];
+        for (sample, place_ahead) in self.ahead.iter().zip(&mut ahead[..samples]) {
+            *place_ahead = sample.values[place];
         }
+        let before = self.before.each_ref().map(|values| values.as_ref().map(|values| values[place]));
+        spike_length(before, &ahead[..samples], self.bounds[place])
     }
 }
 
@@ -293,7 +213,8 @@ impl<R: Rows> Rows for WithoutSpikes<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Recording, TorqueColumns};
+    use crate::{Conditioning, ConditioningOptions, Recording, TorqueColumns};
+    use phiw_spikes::LONGEST;
     use proptest::prelude::*;
     use std::path::PathBuf;
 
@@ -310,26 +231,19 @@ mod tests {
 
     proptest! {
         #[test]
-        fn spikes_are_found_wherever_they_are(
-            at in 0_usize..1000,
-            length in 1_usize..=LONGEST,
-            size in prop_oneof![0.1..1e6, -1e6..-0.1],
-        ) {
+        fn the_survey_and_the_blocks_are_without_spikes(at in 0_usize..1000, length in 1_usize..=LONGEST, size in 0.1..1e6_f64) {
             let mut q: Vec<f64> = (0..1000).map(swing).collect();
             let end = (at + length).min(1000);
             q[at..end].iter_mut().for_each(|x| *x += size);
-            let survey = recording(q).survey().unwrap();
-            let [found] = survey.spikes.as_slice() else { panic!("{:?}", survey.spikes) };
-            prop_assert_eq!((found.samples as usize, found.first_line as usize), (end - at, at + 2));
+            let recording = recording(q);
+            let survey = recording.survey().unwrap();
+            let expected = SpikeCount { column: "q.a".to_owned(), samples: (end - at) as u64, first_line: at as u64 + 2 };
+            prop_assert_eq!(&survey.spikes, &[expected]);
             prop_assert!(survey.joints[0].q_max < 1.01 && survey.joints[0].q_min > -1.01);
-        }
-
-        #[test]
-        fn steps_and_coarse_readings_are_no_spikes(step in 1e-3..1.0_f64, at in 5_usize..995, size in -1e3..1e3_f64) {
-            let coarse: Vec<f64> = (0..1000).map(|sample| (swing(sample) / step).round() * step).collect();
-            prop_assert!(recording(coarse).survey().unwrap().spikes.is_empty());
-            let stepped = (0..1000).map(|sample| swing(sample) + if sample < at { 0.0 } else { size }).collect();
-            prop_assert!(recording(stepped).survey().unwrap().spikes.is_empty());
+            let conditioning = Conditioning::choose(&[survey], &ConditioningOptions::default()).unwrap();
+            for block in recording.blocks(&conditioning).unwrap() {
+                prop_assert!(block.q.iter().all(|q| q.abs() < 1.01));
+            }
         }
     }
 

@@ -7,8 +7,9 @@ use crate::joint_survey::{Five, JointCollector};
 use crate::reader::{LogReader, Row, Rows};
 use crate::segments::{RowCounts, SegmentSink, SpikeCount, split};
 use crate::spectrum::SpectrumEstimator;
-use crate::spike::{SpikeFinder, SpikeSettings, WINDOW, WithoutSpikes};
+use crate::spike::{SpikeFinder, WithoutSpikes};
 use crate::{GapCount, JointSurvey, LogError, Segment, Spectrum};
+use phiw_spikes::{SpikeSettings, WINDOW};
 use std::path::{Path, PathBuf};
 
 /// What is in a log: the result of [`survey`], and what [`stream`](crate::stream) needs to read it again.
@@ -33,7 +34,7 @@ pub struct Survey {
     /// Columns with spikes; their rows are counted as gaps, too.
     pub spikes: Vec<SpikeCount>,
     /// The largest excursion of each column `q.<joint>`, `tau.<joint>`, … of a row, as a multiple of what is usual in it, see
-    /// [`SpikeSettings::multiple`](crate::SpikeSettings::multiple); without spikes that were left out.
+    /// [`SpikeSettings::multiple`]; without spikes that were left out.
     pub excursions: Vec<f64>,
     /// What an excursion must exceed to be a spike, by place in a row; empty where the log has none.
     pub(crate) spike_bounds: Vec<f64>,
@@ -308,7 +309,7 @@ impl<'a> Collector<'a> {
             gaps: counts.gaps,
             spikes: Vec::new(),
             spike_bounds: Vec::new(),
-            excursions: self.spikes.multiples(),
+            excursions: self.spikes.multiples(SpikeSettings::default()),
             ignored_columns: Vec::new(),
             median_period: self.steps.median,
             period,

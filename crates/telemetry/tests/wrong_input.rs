@@ -143,7 +143,10 @@ fn gaps_are_counted_and_split() {
     check_middle("0.59,1,1,1,1\n", &[(DuplicateStamp, 1, 62)]);
     check_middle("", &[(TimeJump, 1, 62)]);
     // Blank lines and blanks are nothing.
-    check_gaps(&format!("{HEADER}{before}\n 0.6 , 1 ,1,1,1\n{}", rows(61, 50)), 1, &[]);
+    let blanks = rows(60, 1).replace(',', " , ");
+    check_gaps(&format!("{HEADER}{before}\n {blanks}{}", rows(61, 50)), 1, &[]);
+    // A reading far off, on a motion that goes on.
+    check_gaps(&format!("{HEADER}{before}0.6,1,9,1,1\n{}", rows(61, 50)), 2, &[(Spike, 1, 62)]);
     // A last row that is cut, or may be.
     check_gaps(&format!("{HEADER}{before}0.6,1,1\n"), 1, &[(TruncatedLastRow, 1, 62)]);
     check_gaps(&format!("{HEADER}{before}0.6,1,1"), 1, &[(TruncatedLastRow, 1, 62)]);

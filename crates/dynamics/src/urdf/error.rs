@@ -185,8 +185,8 @@ pub enum UrdfError {
         /// The joint.
         joint: String,
     },
-    /// NaN or infinity.
-    #[error("{kind} `{name}`: {field} is not a finite number")]
+    /// NaN, infinity, or a number beyond any robot.
+    #[error("{kind} `{name}`: {field} is not a finite number that a robot can have")]
     NotFinite {
         /// `link` or `joint`.
         kind: &'static str,
@@ -224,6 +224,13 @@ fn did_you_mean(nearest: &Option<String>) -> String {
     nearest.as_ref().map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
 }
 
+/// Names in a message; a broken file can have thousands.
+const NAMED: usize = 10;
+
 fn quoted(names: &[String]) -> String {
-    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+    let mut words: Vec<String> = names.iter().take(NAMED).map(|name| format!("`{name}`")).collect();
+    if names.len() > NAMED {
+        words.push(format!("and {} more", names.len() - NAMED));
+    }
+    words.join(", ")
 }

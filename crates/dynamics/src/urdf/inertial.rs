@@ -1,6 +1,6 @@
 //! `<inertial>`: to standard parameters, and whether a real body can have it.
 
-use super::joint::{is_finite, pose};
+use super::joint::{is_usable, is_usable_pose, pose};
 use super::{Finding, UrdfError};
 use crate::{Inertia, Mat3, Placement};
 use urdf_rs::Link;
@@ -8,13 +8,13 @@ use urdf_rs::Link;
 /// Share of the trace by which rounding in the file may break positivity or the triangle inequality.
 const ROUNDING: f64 = 1e-6;
 
-/// An error if any number of the link's inertial is NaN or infinite.
+/// An error if any number of the link's inertial is NaN, infinite or larger than any robot's.
 pub(super) fn check_finite(link: &Link) -> Result<(), UrdfError> {
     let i = &link.inertial.inertia;
     let fields = [
-        ("its mass", link.inertial.mass.value.is_finite()),
-        ("its inertia", [i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz].iter().all(|x| x.is_finite())),
-        ("the origin of its inertial", is_finite(&link.inertial.origin)),
+        ("its mass", is_usable(link.inertial.mass.value)),
+        ("its inertia", [i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz].iter().all(|&x| is_usable(x))),
+        ("the origin of its inertial", is_usable_pose(&link.inertial.origin)),
     ];
     match fields.into_iter().find(|(_, fine)| !fine) {
         Some((field, _)) => Err(UrdfError::NotFinite { kind: "link", name: link.name.clone(), field }),

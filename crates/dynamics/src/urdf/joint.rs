@@ -7,9 +7,17 @@ use urdf_rs::{Joint, JointType, Pose};
 /// How far a declared axis may be from unit length before it is reported.
 const AXIS_ROUNDING: f64 = 1e-6;
 
-/// Whether all numbers of the placement are finite.
-pub(super) fn is_finite(pose: &Pose) -> bool {
-    pose.xyz.0.iter().chain(&pose.rpy.0).all(|x| x.is_finite())
+/// No number of a robot is as large, in any unit; the square of a product of two is still finite.
+const LARGEST: f64 = 1e50;
+
+/// Whether a number can be one of a robot: finite, and not so large that a product with others is infinite.
+pub(super) fn is_usable(number: f64) -> bool {
+    number.abs() < LARGEST
+}
+
+/// The same of all numbers of a placement.
+pub(super) fn is_usable_pose(pose: &Pose) -> bool {
+    pose.xyz.0.iter().chain(&pose.rpy.0).all(|&x| is_usable(x))
 }
 
 /// The placement of a frame.
@@ -26,22 +34,22 @@ pub(super) fn pose(pose: &Pose) -> Placement<f64> {
     Placement { rotation, translation: Vec3(pose.xyz.0) }
 }
 
-/// An error if any number of the joint is NaN, or infinite where that means nothing.
+/// An error if any number of the joint is NaN, or too large where that means nothing.
 pub(super) fn check_finite(joint: &Joint) -> Result<(), UrdfError> {
     let fields = [
-        ("its origin", is_finite(&joint.origin)),
-        ("its axis", joint.axis.xyz.0.iter().all(|x| x.is_finite())),
+        ("its origin", is_usable_pose(&joint.origin)),
+        ("its axis", joint.axis.xyz.0.iter().all(|&x| is_usable(x))),
         ("its lower limit", !joint.limit.lower.is_nan() && joint.limit.lower < f64::INFINITY),
         ("its upper limit", !joint.limit.upper.is_nan() && joint.limit.upper > f64::NEG_INFINITY),
         ("its velocity limit", !joint.limit.velocity.is_nan()),
         ("its effort limit", !joint.limit.effort.is_nan()),
-        ("its damping", joint.dynamics.as_ref().is_none_or(|d| d.damping.is_finite())),
-        ("its friction", joint.dynamics.as_ref().is_none_or(|d| d.friction.is_finite())),
+        ("its damping", joint.dynamics.as_ref().is_none_or(|d| is_usable(d.damping))),
+        ("its friction", joint.dynamics.as_ref().is_none_or(|d| is_usable(d.friction))),
         (
             "the multiplier of its mimic",
-            joint.mimic.as_ref().and_then(|m| m.multiplier).is_none_or(f64::is_finite),
+            joint.mimic.as_ref().and_then(|m| m.multiplier).is_none_or(is_usable),
         ),
-        ("the offset of its mimic", joint.mimic.as_ref().and_then(|m| m.offset).is_none_or(f64::is_finite)),
+        ("the offset of its mimic", joint.mimic.as_ref().and_then(|m| m.offset).is_none_or(is_usable)),
     ];
     match fields.into_iter().find(|(_, fine)| !fine) {
         Some((field, _)) => Err(UrdfError::NotFinite { kind: "joint", name: joint.name.clone(), field }),

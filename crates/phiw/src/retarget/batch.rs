@@ -6,7 +6,7 @@ use crate::Error;
 use crate::arguments::RetargetArguments;
 use crate::console::Console;
 use phiw_bspline_retarget::{
-    Calibration, Quality, RecordingError, RetargetError, Retargeter, read_recording,
+    Artefact, Calibration, Quality, RecordingError, RetargetError, Retargeter, marker_spikes, read_recording,
 };
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -19,6 +19,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub struct RetargetOutcome {
     /// What was done, as text for a terminal.
     pub summary: String,
+    /// What was taken out of the recordings.
+    pub warnings: Vec<String>,
     /// Recordings that could not be retargeted.
     pub failures: Vec<Failure>,
 }
@@ -34,7 +36,8 @@ pub struct Failure {
 
 /// What became of one recording.
 enum Done {
-    Retargeted(Box<Quality>, f64),
+    /// Its quality, its duration \[s\], and what was taken out of the recording.
+    Retargeted(Box<Quality>, f64, Vec<Artefact>),
     Kept,
 }
 
@@ -62,10 +65,11 @@ pub fn run(
     console.finish();
 
     let (mut qualities, mut kept, mut seconds) = (Vec::new(), 0, 0.0);
-    let mut failures = Vec::new();
+    let (mut failures, mut warnings) = (Vec::new(), Vec::new());
     for (file, outcome) in motions.iter().zip(outcomes) {
         match outcome {
-            Ok(Done::Retargeted(quality, duration_s)) => {
+            Ok(Done::Retargeted(quality, duration_s, artefacts)) => {
+                warnings.extend(artefacts.iter().map(|artefact| format!("{}: {artefact}", file.display())));
                 seconds += duration_s;
                 qualities.push(quality);
             }
@@ -108,7 +112,7 @@ pub fn run(
             most(&|q| q.limit_excess)
         );
     }
-    Ok(RetargetOutcome { summary, failures })
+    Ok(RetargetOutcome { summary, warnings, failures })
 }
 
 type Calibrations = BTreeMap<PathBuf, Result<Calibration, String>>;
@@ -121,7 +125,8 @@ fn calibrations(retargeter: &Retargeter, motions: &[&PathBuf], suffix: Option<&s
     files.dedup();
     let calibrate = |file: PathBuf| {
         let recording = read_recording(&file, retargeter.map().units.as_deref()).map_err(|e| e.to_string());
-        let calibration = recording.and_then(|recording| {
+        let calibration = recording.and_then(|mut recording| {
+            recording.remove_artefacts(marker_spikes());
             retargeter.calibrate(&recording).map_err(|error| format!("{}: {error}", file.display()))
         });
         (file, calibration)
@@ -148,6 +153,8 @@ fn one(
     suffix: Option<&str>,
 ) -> Result<Done, Error> {
     let trial = suffix.and_then(|suffix| static_trial(file, suffix));
+    let mut recording = read_recording(file, retargeter.map().units.as_deref()).map_err(Error::Recording)?;
+    let artefacts = recording.remove_artefacts(marker_spikes());
     let content = std::fs::read(file)
         .map_err(|source| Error::Recording(RecordingError::Unreadable { path: file.to_owned(), source }))?;
     let settings = Settings::new(arguments, urdf, retargeter, &content, trial.as_deref());
@@ -155,7 +162,6 @@ fn one(
     if output.holds(&settings) {
         return Ok(Done::Kept);
     }
-    let recording = read_recording(file, retargeter.map().units.as_deref()).map_err(Error::Recording)?;
     let calibration = match trial.as_ref().and_then(|trial| calibrations.get(trial)) {
         Some(Ok(calibration)) => Some(calibration),
         Some(Err(reason)) => {
@@ -165,8 +171,8 @@ fn one(
     };
     let wrong = |source: RetargetError| Error::Retarget { path: file.to_owned(), source };
     let motion = retargeter.retarget(&recording, calibration).map_err(wrong)?;
-    output.write(&motion, retargeter, &settings, arguments)?;
-    Ok(Done::Retargeted(Box::new(motion.quality), recording.duration_s()))
+    output.write(&motion, &artefacts, retargeter, &settings, arguments)?;
+    Ok(Done::Retargeted(Box::new(motion.quality), recording.duration_s(), artefacts))
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

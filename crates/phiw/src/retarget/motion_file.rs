@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::arguments::{Derivatives, RetargetArguments};
-use phiw_bspline_retarget::{Retargeted, Retargeter, backward_differences};
+use phiw_bspline_retarget::{Artefact, Retargeted, Retargeter, backward_differences};
 use phiw_result_folder::{Disk, ResultError, replace_file};
 use phiw_telemetry::{LogColumns, LogWriter};
 use serde_json::json;
@@ -58,12 +58,13 @@ impl MotionFile {
     pub fn write(
         &self,
         motion: &Retargeted,
+        artefacts: &[Artefact],
         retargeter: &Retargeter,
         settings: &Settings,
         arguments: &RetargetArguments,
     ) -> Result<(), Error> {
         let log = log(motion, retargeter, arguments.derivatives).map_err(unwritable(&self.log))?;
-        let mut facts = facts(motion, retargeter, settings).to_string();
+        let mut facts = facts(motion, artefacts, retargeter, settings).to_string();
         facts.push('\n');
         if let Some(folder) = self.log.parent() {
             fs::create_dir_all(folder).map_err(unwritable(folder))?;
@@ -110,7 +111,12 @@ fn log(motion: &Retargeted, retargeter: &Retargeter, derivatives: Derivatives) -
     writer.finish()
 }
 
-fn facts(motion: &Retargeted, retargeter: &Retargeter, settings: &Settings) -> serde_json::Value {
+fn facts(
+    motion: &Retargeted,
+    artefacts: &[Artefact],
+    retargeter: &Retargeter,
+    settings: &Settings,
+) -> serde_json::Value {
     let (quality, options) = (&motion.quality, retargeter.options());
     let torso = if options.torso_from_reach { "from_reach" } else { "from_recording" };
     json!({
@@ -119,6 +125,7 @@ fn facts(motion: &Retargeted, retargeter: &Retargeter, settings: &Settings) -> s
         "torso_and_head": torso,
         "rate_hz": motion.rate_hz,
         "frames": motion.frames,
+        "artefacts": artefacts.iter().map(Artefact::to_string).collect::<Vec<_>>(),
         "marker_rms_m": quality.marker_rms_m,
         "elbow_rms_m": quality.elbow_rms_m,
         "hand_rms_m": quality.hand_rms_m,

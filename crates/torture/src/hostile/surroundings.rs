@@ -82,7 +82,7 @@ fn command_lines(ground: &Ground, random: &mut ChaCha8Rng) -> Case {
         "--validate=robot.urdf",
         "--train=/dev/zero",
     ];
-    let mut case = any_run(ground, Expectation::Orderly, random);
+    let mut case = any_run(ground, Expectation::Starved, random);
     let odd = (*ODD.choose(random).unwrap_or(&"")).to_owned();
     let at = random.random_range(0..=case.words.len());
     case.story += &match random.random_range(0..3) {

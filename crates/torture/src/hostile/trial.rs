@@ -181,7 +181,8 @@ impl Trial {
         if lengthy && !usage {
             return Some(format!("a message of {} characters", self.stderr.chars().count()));
         }
-        if !self.results.is_empty() {
+        // `retarget` does what can be done, and says with 1 that something could not.
+        if !self.results.is_empty() && status == 2 {
             let names: Vec<&str> = self.results.keys().map(String::as_str).collect();
             return Some(format!("refused, but has written {}", names.join(", ")));
         }
