@@ -6,6 +6,7 @@ use phiw_dynamics::{DimensionError, PARAMETERS_PER_BODY, Tree};
 use phiw_regressor::{BaseParameters, JointTorqueRegressor, RegressorScratch};
 use phiw_telemetry::Block;
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The columns of one torque, in the order of its row.
 #[derive(Clone, Debug)]
@@ -39,6 +40,10 @@ pub struct Design {
     needs: Needs,
     reference: Option<ReferenceModel>,
     rest_speeds: Vec<f64>,
+    /// Effects from this one on are candidates.
+    candidates_from: usize,
+    /// Whether a candidate's columns held a number that is not finite. Set while blocks are evaluated, in parallel.
+    not_finite: Vec<AtomicBool>,
 }
 
 /// Working memory to evaluate a design over one block.
@@ -102,6 +107,8 @@ impl Design {
         }
         let needs = effects.iter().fold(Needs::default(), |needs, effect| needs.union(effect.needs()));
         Design {
+            candidates_from: effects.len(),
+            not_finite: effects.iter().map(|_| AtomicBool::new(false)).collect(),
             tree,
             base,
             regressor,
@@ -123,6 +130,18 @@ impl Design {
     pub fn with_rest_speeds(mut self, rest_speeds: Vec<f64>) -> Self {
         self.rest_speeds = rest_speeds;
         self
+    }
+
+    /// The same with the effects from `first` on as candidates: where one's columns are not finite on the logs, they count as zero and
+    /// [`not_finite`](Design::not_finite) says so, instead of an error. `first` is at most the number of effects.
+    pub fn with_candidates_from(mut self, first: usize) -> Self {
+        self.candidates_from = first;
+        self
+    }
+
+    /// Candidates whose columns were not finite somewhere in the blocks that were evaluated so far.
+    pub fn not_finite(&self) -> Vec<usize> {
+        (0..self.effects.len()).filter(|&effect| self.not_finite[effect].load(Ordering::Relaxed)).collect()
     }
 
     /// Numbers that [`DesignScratch::evaluate`] writes: all rows, then for each torque one while its joint moves and zero while it rests.
@@ -283,8 +302,15 @@ impl DesignScratch<'_> {
             regressor: &self.pairs,
             statics: &self.statics,
         };
-        for (evaluator, range) in self.evaluators.iter_mut().zip(&self.design.effect_columns) {
-            evaluator.evaluate(&sample, &mut self.columns[range.clone()]);
+        for (effect, (evaluator, range)) in
+            self.evaluators.iter_mut().zip(&self.design.effect_columns).enumerate()
+        {
+            let columns = &mut self.columns[range.clone()];
+            evaluator.evaluate(&sample, columns);
+            if effect >= self.design.candidates_from && columns.iter().any(|value| !value.is_finite()) {
+                columns.fill(0.0);
+                self.design.not_finite[effect].store(true, Ordering::Relaxed);
+            }
         }
     }
 }

@@ -60,6 +60,9 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
     let data = session.data(&sources);
     let mut analysis = Analysis::new(&session, &data, &tracing.model)?;
     analysis.noise_floor = floor;
+    analysis.warnings.extend(tracing.not_judged.iter().map(|(kind, joints)| {
+        format!("{kind} of {} could not be judged on these logs (its columns are not finite): not all of it was sought", joints.join(", "))
+    }));
     let declared_design = start.design(&session.tree, &session.catalogue)?;
     let mut page = explain_page::page(&analysis, &tracing, declared_design, &data)?;
     page.command_line = command_line(arguments);

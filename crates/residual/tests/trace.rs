@@ -3,7 +3,10 @@
 use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Tree, Workspace};
-use phiw_identification::{BlockSource, Data, Fold, Model, Variants, identify};
+use phiw_identification::{
+    BlockSource, Data, Design, EffectCatalogue, EffectSpec, Fold, Model, Variants, accumulate, identify,
+};
+use phiw_regressor::BaseParameters;
 use phiw_residual::trace::{HeldModel, TraceInput, TraceOptions, Tracing, Verdict, noise_floor, trace};
 use phiw_residual::{Catalogue, SignalRanges};
 use phiw_telemetry::{Conditioning, ConditioningOptions, Recording};
@@ -380,4 +383,37 @@ fn friction_that_comes_and_goes_around_the_turn_is_not_sufficient() {
         tracing.verdict,
         named(&tracing)
     );
+}
+
+/// A candidate whose columns were not finite ended the whole trace: a Stribeck velocity of zero, where steps of the encoder hide the speed.
+#[test]
+fn a_candidate_that_cannot_be_judged_does_not_end_the_trace() {
+    let tree = read_urdf(URDF, &UrdfOptions::default()).unwrap().tree;
+    let log = record(&tree, 3, &|_, _| ());
+    let surveys = [log.survey().unwrap()];
+    let conditioning = Conditioning::choose(&surveys, &ConditioningOptions::default()).unwrap();
+    let blocks = log.blocks(&conditioning).unwrap();
+    let base = BaseParameters::of_tree(&tree, Default::default()).unwrap();
+    let spec = EffectSpec {
+        kind: "stribeck_friction".to_owned(),
+        joints: vec!["elbow".to_owned()],
+        constants: [
+            ("stribeck_velocity".to_owned(), f64::NAN),
+            ("exponent".to_owned(), 2.0),
+            ("sign_width".to_owned(), 0.0),
+        ]
+        .into(),
+    };
+    let design = || {
+        let effect = Catalogue::default().build(&spec, &tree).unwrap();
+        Design::new(tree.clone(), base.clone(), vec![effect])
+    };
+    let (train, _) = folds();
+    assert!(
+        accumulate(&design(), &train, &[&blocks]).is_err(),
+        "the columns are finite: this test tests nothing"
+    );
+    let design = design().with_candidates_from(0);
+    accumulate(&design, &train, &[&blocks]).unwrap();
+    assert_eq!(design.not_finite(), [0]);
 }

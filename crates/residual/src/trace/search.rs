@@ -14,6 +14,7 @@ use phiw_identification::{
 use phiw_regressor::factor::Factor;
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_regressor::{BaseParameters, RegressorError};
+use std::sync::Mutex;
 
 /// Traces the residual of the declared (or held) model.
 ///
@@ -35,7 +36,14 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         known: input.parameters.len(),
         weights: held.residual_std.iter().map(|std| 1.0 / std.max(f64::MIN_POSITIVE)).collect(),
     });
-    let fixed = Fixed { tree: input.tree, base, catalogue: input.catalogue, data: input.data, prior };
+    let fixed = Fixed {
+        tree: input.tree,
+        base,
+        catalogue: input.catalogue,
+        data: input.data,
+        prior,
+        not_judged: Mutex::default(),
+    };
     Search {
         fixed: &fixed,
         specs: input.declared.clone(),

@@ -11,6 +11,8 @@ use phiw_regressor::factor::{Factor, FactorBuilder};
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_regressor::{BaseParameters, RegressorError};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::sync::Mutex;
 
 /// What stays the same over all passes of a trace.
 pub(super) struct Fixed<'a> {
@@ -20,6 +22,8 @@ pub(super) struct Fixed<'a> {
     pub data: &'a Data<'a>,
     /// What was known before, over the parameters of the held model that its logs determined.
     pub prior: Option<Prior>,
+    /// Hypotheses that could not be judged.
+    pub not_judged: Mutex<BTreeSet<(String, Vec<String>)>>,
 }
 
 /// A held model's factor, and the parameters that its columns stand for.
@@ -102,13 +106,23 @@ impl<'a> Fixed<'a> {
         effects.extend(candidates.effects);
         let design = Design::new(self.tree.clone(), self.base.clone(), effects)
             .with_rest_speeds(self.data.rest_speeds.clone())
+            .with_candidates_from(model_effects)
             .with_reference(reference);
         let all = [self.data.train.as_slice(), &self.data.held_out].concat();
         let folds = accumulate(&design, &all, &self.data.sources)?;
+        let not_finite = design.not_finite();
+        let (fit, unfit): (Vec<Candidate>, Vec<Candidate>) =
+            candidates.list.into_iter().partition(|candidate| {
+                !candidate.effects.clone().any(|effect| not_finite.contains(&(model_effects + effect)))
+            });
+        if let Ok(mut not_judged) = self.not_judged.lock() {
+            let specs = unfit.into_iter().flat_map(|candidate| candidate.specs);
+            not_judged.extend(specs.map(|spec| (spec.kind, spec.joints)));
+        }
         let (train, held_out) = folds.split_at(self.data.train.len());
         Ok(Stage {
             model_effects,
-            candidates: candidates.list,
+            candidates: fit,
             train: merge(train)?,
             held_out: merge(held_out)?,
             folds,

@@ -86,4 +86,6 @@ pub struct Tracing {
     pub effects: Vec<FoundEffect>,
     /// What is left.
     pub remaining: Remaining,
+    /// Kinds and joints of which some constants could not be judged, since their columns are not finite on these logs.
+    pub not_judged: Vec<(String, Vec<String>)>,
 }

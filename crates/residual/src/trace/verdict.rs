@@ -104,7 +104,9 @@ impl Search<'_> {
             train_folds,
             held_out_folds,
         };
-        Ok(Tracing { verdict, specs: self.specs, model, before, effects: found, remaining })
+        let not_judged = self.fixed.not_judged.lock().map(|hypotheses| hypotheses.iter().cloned().collect());
+        let not_judged = not_judged.unwrap_or_default();
+        Ok(Tracing { verdict, specs: self.specs, model, before, effects: found, remaining, not_judged })
     }
 
     /// Torques on which effects that were found act, and those of the joints next to them.
