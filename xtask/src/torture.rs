@@ -1,21 +1,31 @@
-//! `cargo xtask torture`: hostile inputs on the release binary, and a table of what came of them.
+//! `cargo xtask torture`: hostile inputs, kills and concurrent runs on the release binary, and tables of what came of them.
 
 use crate::environment;
 use anyhow::{Context, ensure};
 use phiw_torture::hostile::{self, ClassScore, Ground, Judgement};
-use std::path::PathBuf;
+use phiw_torture::interrupted::{kill, pair, subjects};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Command line of `cargo xtask torture`.
 #[derive(clap::Args)]
 pub struct Arguments {
+    /// What is done; everything by default.
+    #[arg(value_enum)]
+    part: Option<Part>,
+    /// Runs that are killed, over all commands.
+    #[arg(long, default_value_t = 1000)]
+    kills: usize,
+    /// Pairs of runs at the same time, over all commands.
+    #[arg(long, default_value_t = 500)]
+    pairs: usize,
     /// The share of each class's cases that is run.
     #[arg(long, default_value_t = 1.0)]
     share: f64,
     /// Seed of the cases.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Only classes whose name contains this.
+    /// Only classes, or commands, whose name contains this.
     #[arg(long, default_value = "")]
     only: String,
     /// How many failures of a class are printed.
@@ -26,7 +36,18 @@ pub struct Arguments {
     phiw: Option<PathBuf>,
 }
 
-/// Prints a line for each class; fails if anything was not as it has to be.
+/// A part of the torture.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Part {
+    /// Spoiled inputs and bad surroundings.
+    Inputs,
+    /// Runs that are killed, half of them while they commit.
+    Kills,
+    /// Two runs into one folder at the same time.
+    Pairs,
+}
+
+/// Prints tables; fails if anything was not as it has to be.
 ///
 /// # Errors
 /// The program can't be built or started, or fails on the good inputs.
@@ -35,7 +56,57 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         Some(phiw) => phiw.canonicalize().with_context(|| phiw.display().to_string())?,
         None => environment::release_binary()?,
     };
-    let ground = Ground::new(&phiw, arguments.seed)?;
+    let asked = |part| arguments.part.is_none_or(|only| only == part);
+    let inputs = !asked(Part::Inputs) || inputs(arguments, &phiw)?;
+    let interrupted = !(asked(Part::Kills) || asked(Part::Pairs)) || interrupted(arguments, &phiw)?;
+    Ok(if inputs && interrupted { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Whether results were whole whatever came between.
+fn interrupted(arguments: &Arguments, phiw: &Path) -> anyhow::Result<bool> {
+    let subjects = subjects(phiw, &std::env::current_exe()?, arguments.seed)?;
+    let mut whole = true;
+    if arguments.part != Some(Part::Pairs) {
+        println!("kill -9      tried  killed  committing    old    new  undone   mixed  left");
+        for subject in subjects.iter().filter(|subject| subject.name.contains(&arguments.only)) {
+            let score = kill(subject, arguments.kills.div_ceil(subjects.len()), arguments.seed)?;
+            println!(
+                "{:<12}{:>6}{:>8}{:>12}{:>7}{:>7}{:>8}{:>8}{:>6}",
+                subject.name,
+                score.tried,
+                score.killed,
+                score.committing,
+                score.old,
+                score.new,
+                score.undone,
+                score.mixed,
+                score.leftovers
+            );
+            if let Some(story) = score.first_mixed {
+                println!("    mixed: {story}");
+            }
+            whole &= score.mixed == 0 && score.leftovers == 0;
+        }
+    }
+    if arguments.part != Some(Part::Kills) {
+        println!("two at once  tried  one refused  both one after the other   bad");
+        let of_phiw = subjects.iter().filter(|subject| subject.name != "paper");
+        let count = of_phiw.clone().count();
+        for subject in of_phiw {
+            let score = pair(subject, arguments.pairs.div_ceil(count))?;
+            println!(
+                "{:<12}{:>6}{:>13}{:>26}{:>6}",
+                subject.name, score.tried, score.refused, score.both, score.bad
+            );
+            whole &= score.bad == 0;
+        }
+    }
+    Ok(whole)
+}
+
+/// Whether every hostile input ended as it has to.
+fn inputs(arguments: &Arguments, phiw: &Path) -> anyhow::Result<bool> {
+    let ground = Ground::new(phiw, arguments.seed)?;
     let classes: Vec<_> =
         hostile::classes().into_iter().filter(|class| class.name.contains(&arguments.only)).collect();
     ensure!(!classes.is_empty(), "no class has `{}` in its name", arguments.only);
@@ -77,5 +148,5 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         scores.iter().map(|score| score.largest_refusal_bytes).max().unwrap_or(0) / 1_000_000,
         arguments.seed,
     );
-    Ok(if failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(failed == 0)
 }

@@ -14,7 +14,7 @@ use phiw_bspline_retarget::human::{MapError, MarkerMap};
 use phiw_bspline_retarget::{MarkerRecording, RetargetOptions, Retargeter, read_recording};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_limits::Limits;
-use phiw_result_folder::{Lock, check_inputs};
+use phiw_result_folder::{Disk, Lock, check_inputs, remove_partial_files};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -34,6 +34,7 @@ pub fn retarget(arguments: &RetargetArguments, console: &Console) -> Result<Reta
         arguments.c3d.iter().flat_map(|file| [result(file, "csv"), result(file, "json")]).collect();
     check_inputs(&inputs, &outputs)?;
     let _place = Lock::acquire(&arguments.out, "phiw retarget")?;
+    remove_partial_files(&Disk, &arguments.out);
     let limits = Limits::default();
     let urdf = read_text(&arguments.urdf, limits.urdf_bytes)?;
     let options = UrdfOptions { floating_base: false, held: arguments.hold.clone() };

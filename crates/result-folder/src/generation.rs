@@ -33,22 +33,97 @@ pub fn replace_files(
     outcome
 }
 
-/// Replaces one file.
+/// Replaces one file. Nobody else writes it at the same time.
 ///
 /// # Errors
 /// [`ResultError::Unwritable`]; then the file is as it was.
 pub fn replace_file(system: &dyn FileSystem, path: &Path, content: &[u8]) -> Result<(), ResultError> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let aside = path.with_file_name(format!(".{name}.{}.partial", unique()));
-    let written = system.create_file(&aside, content).and_then(|()| system.rename(&aside, path));
-    if written.is_err() {
-        let _ = system.remove(&aside);
+    let aside = Aside::write(system, path, content)?;
+    aside.rename(path)?;
+    sync_folder_of(system, path);
+    Ok(())
+}
+
+/// Replaces a file, and another that vouches for it: as long as the second is there, it belongs to the first. The caller is the only one who
+/// writes them.
+///
+/// # Errors
+/// [`ResultError::Unwritable`]; the second file may be gone then, if there was one.
+pub fn replace_vouched(
+    system: &dyn FileSystem,
+    (path, content): (&Path, &[u8]),
+    (voucher, facts): (&Path, &[u8]),
+) -> Result<(), ResultError> {
+    let new = Aside::write(system, path, content)?;
+    let new_facts = Aside::write(system, voucher, facts)?;
+    // What vouches for the old file must not vouch for the new one.
+    if voucher.exists() {
+        system.remove(voucher).map_err(unwritable(voucher))?;
     }
-    written.map_err(unwritable(path))?;
+    new.rename(path)?;
+    new_facts.rename(voucher)?;
+    sync_folder_of(system, path);
+    Ok(())
+}
+
+/// Removes the partial files that killed runs of [`replace_file`] and [`replace_vouched`] have left in a folder; the caller holds its lock.
+pub fn remove_partial_files(system: &dyn FileSystem, folder: &Path) {
+    for entry in folder.read_dir().into_iter().flatten().flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if name.starts_with('.') && name.ends_with(PARTIAL) {
+            let _ = system.remove(&entry.path());
+        }
+    }
+}
+
+/// How names of partial files end.
+const PARTIAL: &str = ".partial";
+
+/// A file under a name of its own, until it takes its place.
+struct Aside<'a> {
+    system: &'a dyn FileSystem,
+    path: PathBuf,
+    renamed: bool,
+}
+
+impl<'a> Aside<'a> {
+    /// Writes what is to become the file at `target`. What killed runs have left of it goes.
+    fn write(system: &'a dyn FileSystem, target: &Path, content: &[u8]) -> Result<Self, ResultError> {
+        let name = target.file_name().unwrap_or_default().to_string_lossy();
+        let prefix = format!(".{name}.");
+        let folder =
+            target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        for entry in folder.read_dir().into_iter().flatten().flatten() {
+            let other = entry.file_name().to_string_lossy().into_owned();
+            if other.starts_with(&prefix) && other.ends_with(PARTIAL) {
+                let _ = system.remove(&entry.path());
+            }
+        }
+        let path = target.with_file_name(format!("{prefix}{}{PARTIAL}", unique()));
+        let aside = Aside { system, path, renamed: false };
+        system.create_file(&aside.path, content).map_err(unwritable(target))?;
+        Ok(aside)
+    }
+
+    fn rename(mut self, target: &Path) -> Result<(), ResultError> {
+        self.system.rename(&self.path, target).map_err(unwritable(target))?;
+        self.renamed = true;
+        Ok(())
+    }
+}
+
+impl Drop for Aside<'_> {
+    fn drop(&mut self) {
+        if !self.renamed {
+            let _ = self.system.remove(&self.path);
+        }
+    }
+}
+
+fn sync_folder_of(system: &dyn FileSystem, path: &Path) {
     if let Some(folder) = path.parent() {
         let _ = system.sync_folder(if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
     }
-    Ok(())
 }
 
 struct Generations<'a> {

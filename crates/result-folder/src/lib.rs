@@ -10,7 +10,7 @@ mod lock;
 pub use error::ResultError;
 pub use exchange::replace_folder;
 pub use file_system::{Disk, FileSystem};
-pub use generation::{replace_file, replace_files};
+pub use generation::{remove_partial_files, replace_file, replace_files, replace_vouched};
 pub use inputs::check_inputs;
 pub use lock::Lock;
 

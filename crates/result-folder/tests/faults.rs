@@ -2,7 +2,7 @@
 
 use phiw_result_folder::{
     Disk, FileSystem, Lock, ResultError, ResultFile, check_inputs, replace_file, replace_files,
-    replace_folder,
+    replace_folder, replace_vouched,
 };
 use std::cell::Cell;
 use std::fs;
@@ -215,5 +215,28 @@ fn one_file_is_whole_old_or_whole_new() {
             let now = fs::read_to_string(&path).unwrap();
             assert_eq!(now, if outcome.is_ok() { "new" } else { "old" });
         }
+    }
+}
+
+/// A run that was killed left its partial file for ever.
+#[test]
+fn what_vouches_for_a_file_belongs_to_it_and_killed_runs_leave_nothing() {
+    for (killed, operation) in [false, true].into_iter().flat_map(|killed| (1..20).map(move |n| (killed, n)))
+    {
+        let folder = TempDir::new().unwrap();
+        let (log, facts) = (folder.path().join("a.csv"), folder.path().join("a.json"));
+        let write = |system: &dyn FileSystem, content: &str| {
+            replace_vouched(system, (&log, content.as_bytes()), (&facts, content.as_bytes()))
+        };
+        write(&Disk, "old").unwrap();
+        let faulty = Faulty { left: Cell::new(operation), killed, no_exchange: false };
+        let _ = write(&faulty, "new");
+        if let Ok(vouched) = fs::read_to_string(&facts) {
+            assert_eq!(vouched, fs::read_to_string(&log).unwrap(), "operation {operation}");
+        }
+        assert!(log.is_file(), "operation {operation}");
+        write(&Disk, "newer").unwrap();
+        assert_eq!(entries(folder.path()), ["a.csv", "a.json"], "operation {operation}");
+        assert_eq!(fs::read_to_string(&log).unwrap(), "newer");
     }
 }

@@ -4,3 +4,4 @@
 //! status alone.
 
 pub mod hostile;
+pub mod interrupted;

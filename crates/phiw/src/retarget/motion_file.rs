@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::arguments::{Derivatives, RetargetArguments};
 use phiw_bspline_retarget::{Artefact, Retargeted, Retargeter, backward_differences};
-use phiw_result_folder::{Disk, ResultError, replace_file};
+use phiw_result_folder::{Disk, ResultError, replace_vouched};
 use phiw_telemetry::{LogColumns, LogWriter};
 use serde_json::json;
 use sha2::{Digest, Sha256};
@@ -54,7 +54,7 @@ impl MotionFile {
         self.log.is_file() && facts.is_some_and(|facts| facts["settings"] == settings.0)
     }
 
-    /// Writes both under other names, then renames them, the facts last: whoever finds them finds a whole log.
+    /// Writes both, the facts last: whoever finds them finds the log that they are about.
     pub fn write(
         &self,
         motion: &Retargeted,
@@ -69,12 +69,7 @@ impl MotionFile {
         if let Some(folder) = self.log.parent() {
             fs::create_dir_all(folder).map_err(unwritable(folder))?;
         }
-        // What is there from other settings must not vouch for the new log.
-        if self.facts.exists() {
-            fs::remove_file(&self.facts).map_err(unwritable(&self.facts))?;
-        }
-        replace_file(&Disk, &self.log, &log)?;
-        replace_file(&Disk, &self.facts, &facts.into_bytes())?;
+        replace_vouched(&Disk, (&self.log, &log), (&self.facts, facts.as_bytes()))?;
         Ok(())
     }
 }

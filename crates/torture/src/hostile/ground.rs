@@ -111,6 +111,11 @@ impl Ground {
         self.files.get(name).map_or(&[], Vec::as_slice)
     }
 
+    /// All good files by name.
+    pub fn files(&self) -> impl Iterator<Item = (&str, &[u8])> {
+        self.files.iter().map(|(name, content)| (name.as_str(), content.as_slice()))
+    }
+
     /// A good file's text.
     pub fn text(&self, name: &str) -> String {
         String::from_utf8_lossy(self.file(name)).into_owned()
