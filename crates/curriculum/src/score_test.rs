@@ -4,8 +4,8 @@ use crate::growth::{Found, Growth};
 use crate::{
     CurriculumError, Estimator, Evidence, Gain, Measured, MotionLikelihood, Robot, RobotModel, RowsAt,
 };
+use phiw_effects::{Constants, JointRange, SignalRanges};
 use phiw_identification::{EffectCatalogue, EffectSpec};
-use phiw_residual::catalogue::{Constants, JointRange, SignalRanges};
 
 /// Asks of every effect of the catalogue what it would save of −log L ([`MotionLikelihood::gains`]), fits the few best in full, adds the simplest
 /// of those that explain alike if it is worth its price, and asks again.

@@ -1,6 +1,6 @@
 //! What an effect is to a fit: some columns beside the inertial ones.
 //!
-//! This crate knows no effect by name. A catalogue (`phiw-residual` has one) or a user brings them.
+//! This crate knows no effect by name. A catalogue (`phiw-effects` is one) or a user brings them.
 
 use crate::{Needs, Sample};
 use phiw_dynamics::Tree;

@@ -2,6 +2,7 @@
 
 use crate::analysis::Analysis;
 use crate::{Error, page as identified_page};
+use phiw_effects::sentence;
 use phiw_identification::{Data, Design, predict};
 use phiw_report::IdentificationPage;
 use phiw_report::json::{CannotBeToldJson, Verdict};
@@ -10,7 +11,6 @@ use phiw_report::page::{
     CandidateRow, CannotBeTold, EffectParameter, EffectSection, Picture, Remaining, Rival,
 };
 use phiw_report::plot::{Line, ResidualAgainstSignal, residual_against_signal};
-use phiw_residual::catalogue::sentence;
 use phiw_residual::trace::{self, FoundEffect, Ranked, Tracing};
 
 /// Points of a scatter; more would only blacken it.

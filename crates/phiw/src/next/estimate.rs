@@ -6,13 +6,13 @@ use crate::arguments::NextArguments;
 use crate::session::{Session, declared};
 use phiw_curriculum::{CurriculumError, KnownEffect, RobotModel};
 use phiw_dynamics::Tree;
+use phiw_effects::Catalogue;
 use phiw_identification::{
     Design, EffectCatalogue, EffectSpec, Fit, Identified, Model, Progress, fit, identify, merge, with_masses,
 };
 use phiw_regressor::factor::{Factor, FactorBuilder};
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_regressor::{BaseParameters, RegressorError};
-use phiw_residual::Catalogue;
 use phiw_telemetry::Survey;
 use serde::Serialize;
 

@@ -1,7 +1,7 @@
 //! What could be missing: every kind, site and constant that the logs may be asked about.
 
-use crate::catalogue::{Catalogue, Constants, EffectKind, SignalRanges};
 use phiw_dynamics::Tree;
+use phiw_effects::{Catalogue, Constants, EffectKind, SignalRanges};
 use phiw_identification::{Effect, EffectSpec};
 use std::ops::Range;
 

@@ -1,22 +1,7 @@
-//! The catalogue of effects. One file for each physical cause; [`Catalogue`] finds them by name.
+//! The catalogue finds kinds of effects by name, declares them for a robot, and builds them from a model's file.
 
-mod columns;
-mod coupling;
-mod drift;
-mod drive;
-mod elasticity;
-mod external;
-mod friction;
-mod hysteresis;
-mod kind;
-mod position;
-mod sensing;
-mod sentence;
-
-pub use columns::{Formula, OwnTorque, ParameterKind, smooth_sign};
-pub use kind::{Constants, EffectKind, JointRange, SignalRanges};
-pub use sentence::sentence;
-
+use crate::{Constants, EffectKind, SignalRanges};
+use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, EffectCatalogue, EffectError, EffectSpec, Variants};
 

@@ -1,6 +1,6 @@
 //! What acts from outside or has been added: a payload, a force, gravity from another direction.
 
-use super::kind::{Constants, EffectKind};
+use crate::kind::{Constants, EffectKind};
 use phiw_dynamics::{PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree};
 use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
 use phiw_regressor::JointTorqueRegressor;

@@ -1,7 +1,7 @@
 //! Friction with memory: presliding and backlash.
 
-use super::columns::{Formula, OwnTorque, ParameterKind};
-use super::kind::{Constants, EffectKind, SignalRanges, around, constant, values};
+use crate::columns::{Formula, OwnTorque, ParameterKind};
+use crate::kind::{Constants, EffectKind, SignalRanges, around, constant, values};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, Sample};
 

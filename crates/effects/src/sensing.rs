@@ -1,7 +1,7 @@
 //! What stands between the torque that acts and the numbers in the log: delay, encoder offset, saturation.
 
-use super::columns::{OwnTorque, ParameterKind};
-use super::kind::{Constants, EffectKind, SignalRanges, constant, values};
+use crate::columns::{OwnTorque, ParameterKind};
+use crate::kind::{Constants, EffectKind, SignalRanges, constant, values};
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
 use phiw_telemetry::Block;

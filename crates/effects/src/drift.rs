@@ -1,8 +1,8 @@
 //! Friction that changes with time or temperature.
 
-use super::columns::{OwnTorque, ParameterKind, smooth_sign};
-use super::friction::WIDTH;
-use super::kind::{Constants, EffectKind, SignalRanges, around, constant, values};
+use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
+use crate::friction::WIDTH;
+use crate::kind::{Constants, EffectKind, SignalRanges, around, constant, values};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, Sample};
 

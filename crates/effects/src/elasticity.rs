@@ -1,6 +1,6 @@
 //! A flexible transmission between motor and link.
 
-use super::kind::{Constants, EffectKind, constant};
+use crate::kind::{Constants, EffectKind, constant};
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
 

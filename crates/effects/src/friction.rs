@@ -1,15 +1,15 @@
 //! Friction that depends on the velocity alone, or on the load.
 
-use super::columns::{OwnTorque, ParameterKind, smooth_sign};
-use super::kind::{Constants, EffectKind, SignalRanges, around, constant, product, values};
+use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
+use crate::kind::{Constants, EffectKind, SignalRanges, around, constant, product, values};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, Needs, Sample};
 
 /// The constant of every smoothed sign: the speed over which it turns \[rad/s, m/s\].
-pub(super) const WIDTH: &str = "sign_width";
+pub(crate) const WIDTH: &str = "sign_width";
 
 /// Speeds over which a sign may turn: the plain sign, then up to 0.064 rad/s (m/s), but no more than half of the joint's RMS speed.
-pub(super) fn sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
+pub(crate) fn sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
     let largest = 0.5 * ranges.joints[joint].velocity_rms;
     let widths =
         (0..15).map(|step| 0.0005 * 2.0_f64.powf(0.5 * f64::from(step))).filter(|&width| width <= largest);
@@ -17,7 +17,7 @@ pub(super) fn sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants>
 }
 
 /// A few of them, for effects that are not themselves about the sign.
-pub(super) fn few_sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
+pub(crate) fn few_sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
     sign_widths(joint, ranges).into_iter().step_by(5).collect()
 }
 

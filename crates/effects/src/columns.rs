@@ -1,6 +1,6 @@
 //! What most effects are built of: a formula for some columns in one joint's own torque.
 
-use super::Constants;
+use crate::Constants;
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
 
@@ -135,7 +135,7 @@ impl<F: Formula> Effect for OwnTorque<F> {
 }
 
 /// Runs a formula with its memory.
-pub(super) struct FormulaEvaluator<'a, F: Formula> {
+pub(crate) struct FormulaEvaluator<'a, F: Formula> {
     pub formula: &'a F,
     pub memory: F::Memory,
 }

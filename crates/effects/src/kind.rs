@@ -124,18 +124,18 @@ impl SignalRanges {
 }
 
 /// One set for each value of one constant.
-pub(super) fn values(name: &str, values: impl IntoIterator<Item = f64>) -> Vec<Constants> {
+pub(crate) fn values(name: &str, values: impl IntoIterator<Item = f64>) -> Vec<Constants> {
     values.into_iter().map(|value| Constants::from([(name.to_owned(), value)])).collect()
 }
 
 /// Every pair of a set of each.
-pub(super) fn product(left: &[Constants], right: &[Constants]) -> Vec<Constants> {
+pub(crate) fn product(left: &[Constants], right: &[Constants]) -> Vec<Constants> {
     let join = |a: &Constants, b: &Constants| a.clone().into_iter().chain(b.clone()).collect();
     left.iter().flat_map(|a| right.iter().map(move |b| join(a, b))).collect()
 }
 
 /// `found` with one constant times each factor, `spread` shrinking with every step.
-pub(super) fn around(found: &Constants, name: &str, step: usize) -> Vec<Constants> {
+pub(crate) fn around(found: &Constants, name: &str, step: usize) -> Vec<Constants> {
     let Some(&value) = found.get(name) else { return Vec::new() };
     let spread = 1.5_f64.powf(0.5_f64.powi(step as i32));
     [1.0 / spread, spread]
@@ -148,6 +148,6 @@ pub(super) fn around(found: &Constants, name: &str, step: usize) -> Vec<Constant
 }
 
 /// A constant, or its default.
-pub(super) fn constant(constants: &Constants, name: &str, default: f64) -> f64 {
+pub(crate) fn constant(constants: &Constants, name: &str, default: f64) -> f64 {
     constants.get(name).copied().unwrap_or(default)
 }

@@ -1,7 +1,7 @@
 //! Torques that depend on the position alone: springs, balancers, ripple, end stops.
 
-use super::columns::{OwnTorque, ParameterKind};
-use super::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
+use crate::columns::{OwnTorque, ParameterKind};
+use crate::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::{Effect, Sample};
 

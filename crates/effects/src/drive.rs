@@ -1,7 +1,7 @@
 //! What the motor and its measurement add: rotor inertia, offset, gain.
 
-use super::columns::{OwnTorque, ParameterKind};
-use super::kind::{Constants, EffectKind};
+use crate::columns::{OwnTorque, ParameterKind};
+use crate::kind::{Constants, EffectKind};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, Needs, Sample};
 

@@ -1,8 +1,8 @@
 //! Two joints behind one transmission: each feels the other's motion, or their sum (differential wrists).
 
-use super::columns::{ParameterKind, smooth_sign};
-use super::friction::WIDTH;
-use super::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
+use crate::columns::{ParameterKind, smooth_sign};
+use crate::friction::WIDTH;
+use crate::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Sample};
 
@@ -123,7 +123,7 @@ impl EffectKind for TransmissionCoupling {
         if constant(found, TERMS_CONSTANT, 0.0) as u32 & 0b1100_1100 == 0 {
             return Vec::new();
         }
-        super::kind::around(found, WIDTH, step)
+        crate::kind::around(found, WIDTH, step)
     }
     fn telling_motion(&self) -> &'static str {
         "each of the two joints moving alone, then both together"
