@@ -1,9 +1,9 @@
 //! The catalogue finds kinds of effects by name, declares them for a robot, and builds them from a model's file.
 
-use crate::{Constants, EffectKind, SignalRanges};
+use crate::{Constants, EffectKind, FittedEffect, SignalRanges};
 use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, EffectCatalogue, EffectError, EffectSpec, Variants};
+use phiw_identification::{Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Variants};
 
 /// Kinds of effects by name, in the order of simplicity: of two that explain alike, the earlier is preferred.
 pub struct Catalogue {
@@ -66,6 +66,12 @@ impl Catalogue {
             let nearest = known.iter().min_by_key(distance).filter(|other| distance(other) <= 5).cloned();
             EffectError::UnknownKind { kind: name.to_owned(), nearest, known }
         })
+    }
+
+    /// What an effect means, with its fitted values; a kind that is unknown here gets its name and numbers.
+    pub fn sentence(&self, spec: &EffectSpec, parameters: &[EffectParameter], fitted: &[f64]) -> String {
+        let found = FittedEffect::new(spec, parameters, fitted);
+        self.kind(&spec.kind).map_or_else(|_| found.plainly(), |kind| kind.sentence(&found))
     }
 
     /// A kind on every joint of the robot, each with the constants that the data may choose from.

@@ -1,7 +1,8 @@
 //! Friction that depends on the velocity alone, or on the load.
 
 use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
-use crate::kind::{Constants, EffectKind, SignalRanges, around, constant, product, values};
+use crate::fitted::FittedEffect;
+use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, product, values};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, Needs, Sample};
 
@@ -38,6 +39,9 @@ impl EffectKind for Viscous {
     fn telling_motion(&self) -> &'static str {
         "a motion at several constant speeds"
     }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!("{} has viscous friction of {}.", found.joints(), found.quantity(0))
+    }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = sample.qd()[joint];
@@ -64,6 +68,9 @@ impl EffectKind for Coulomb {
     }
     fn telling_motion(&self) -> &'static str {
         "a motion that reverses often, at low and at high speed"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!("{} has Coulomb friction of {}.", found.joints(), found.quantity(0))
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));
@@ -95,6 +102,11 @@ impl EffectKind for Asymmetric {
     }
     fn telling_motion(&self) -> &'static str {
         "the same path forth and back at several speeds, with rests"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let halves: Vec<String> = found.quantities().map(|(_, half)| half).collect();
+        let (joint, halves) = (found.joints(), halves.join(" and "));
+        format!("{joint} rubs differently in its two directions: half the difference is {halves}.")
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));
@@ -129,6 +141,10 @@ impl EffectKind for Quadratic {
     }
     fn telling_motion(&self) -> &'static str {
         "a fast motion beside a slow one"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, coefficient) = (found.joints(), found.quantity(0));
+        format!("The friction of {joint} bends with the square of the speed: {coefficient}.")
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
@@ -169,6 +185,14 @@ impl EffectKind for Stribeck {
     fn telling_motion(&self) -> &'static str {
         "a slow motion, well below the speed at which friction is lowest"
     }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!(
+            "{} sticks at low speed: {} on top of Coulomb friction, gone above {:.3} rad/s or m/s (Stribeck).",
+            found.joints(),
+            found.quantity(0),
+            found.constant(STRIBECK_VELOCITY)
+        )
+    }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));
         let speed = constant(constants, STRIBECK_VELOCITY, 0.1);
@@ -206,6 +230,13 @@ impl EffectKind for LoadDependent {
     }
     fn telling_motion(&self) -> &'static str {
         "the same motion with the arm stretched out and folded, or with a load"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, share) = (found.joints(), found.value(0));
+        format!("The friction of {joint} grows with its load: {share:.3} of the torque that it carries.")
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Torque
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));

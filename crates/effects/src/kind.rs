@@ -1,5 +1,6 @@
 //! What the catalogue knows of a kind of effect.
 
+use crate::FittedEffect;
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
 use phiw_telemetry::Survey;
@@ -7,6 +8,21 @@ use std::collections::BTreeMap;
 
 /// Non-linear constants of an effect by name, SI units.
 pub type Constants = BTreeMap<String, f64>;
+
+/// A signal that an effect's torque can be plotted against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Signal {
+    /// The joint's position \[rad, m\].
+    Position,
+    /// The joint's velocity \[rad/s, m/s\].
+    Velocity,
+    /// The joint's acceleration \[rad/s², m/s²\].
+    Acceleration,
+    /// The joint's measured torque \[N·m, N\].
+    Torque,
+    /// Time \[s\].
+    Time,
+}
 
 /// A kind of effect: where it can act, which constants to try, and how to build it.
 ///
@@ -57,6 +73,16 @@ pub trait EffectKind: Send + Sync {
 
     /// The motion, or the signal, that would tell it from its rivals.
     fn telling_motion(&self) -> &'static str;
+
+    /// What it means when it was found, with its fitted values, in one sentence to a user: its name and numbers by default.
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        found.plainly()
+    }
+
+    /// The signal that its torque is best seen against.
+    fn seen_against(&self) -> Signal {
+        Signal::Velocity
+    }
 
     /// Builds it. `site` is one that it accepts; constants that are missing take their defaults.
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect>;

@@ -7,14 +7,14 @@ mod drift;
 mod drive;
 mod elasticity;
 mod external;
+mod fitted;
 mod friction;
 mod hysteresis;
 mod kind;
 mod position;
 mod sensing;
-mod sentence;
 
 pub use catalogue::Catalogue;
 pub use columns::{Formula, OwnTorque, ParameterKind, smooth_sign};
-pub use kind::{Constants, EffectKind, JointRange, SignalRanges};
-pub use sentence::sentence;
+pub use fitted::{FittedEffect, sentence};
+pub use kind::{Constants, EffectKind, JointRange, Signal, SignalRanges};
