@@ -1,0 +1,215 @@
+//! A weighted fit of some parameters, from products.
+
+use super::problem::Problem;
+
+/// A column of the model with less than this share of its squared norm left beside those before it is undetermined.
+const DEPENDENT: f64 = 1e-10;
+/// The same for a candidate's column: what is left of it is rounding, or the model's own error.
+pub(super) const ABSORBED: f64 = 4e-6;
+/// Times that the weights are renewed from the residual.
+const ITERATIONS: usize = 4;
+/// Weights that change by less are settled.
+const SETTLED: f64 = 1e-3;
+
+/// The least-squares fit with each torque weighted by its effective rows over its residual: the smallest Σ n_e·log(rss).
+#[derive(Clone, Debug)]
+pub(crate) struct Fit {
+    /// The parameters that are fitted, in the order of the system.
+    pub active: Vec<usize>,
+    /// For each parameter its place in `active`.
+    pub place: Vec<Option<usize>>,
+    /// Whether the rows determine it beside those before it.
+    pub heard: Vec<bool>,
+    /// L of the system's Cholesky factor, row-major.
+    triangle: Vec<f64>,
+    /// L⁻¹ of the right-hand side.
+    pub half: Vec<f64>,
+    /// The value of every parameter: those that are not in the fit are absent.
+    pub values: Vec<f64>,
+    /// Residual sum of squares of each torque.
+    pub rss: Vec<f64>,
+    /// Weight of each torque's squares.
+    pub weights: Vec<f64>,
+    /// What the prior's squares are multiplied by: the share of its rows that is independent.
+    pub prior_weight: f64,
+}
+
+impl Fit {
+    /// Fits `active` parameters, of which the first `model` are the model's; the others may be absorbed. `rows` are the effective rows of each torque.
+    pub fn new(problem: &Problem, active: Vec<usize>, rows: &[f64], start: Option<&Fit>) -> Self {
+        let mut place = vec![None; problem.parameters];
+        active.iter().enumerate().for_each(|(at, &parameter)| place[parameter] = Some(at));
+        let all_rows: f64 = problem.torques.iter().map(|torque| torque.whole.rows()).sum();
+        let mut fit = Fit {
+            heard: vec![true; active.len()],
+            active,
+            place,
+            triangle: Vec::new(),
+            half: Vec::new(),
+            values: problem.absent.clone(),
+            rss: match start {
+                Some(start) => start.rss.clone(),
+                None => problem.torques.iter().map(|torque| torque.whole.right_hand_side()).collect(),
+            },
+            weights: Vec::new(),
+            prior_weight: rows.iter().sum::<f64>() / all_rows.max(1.0),
+        };
+        for _ in 0..ITERATIONS {
+            fit.weights = rows.iter().zip(&fit.rss).map(|(rows, rss)| rows / rss.max(f64::MIN_POSITIVE)).collect();
+            fit.solve(problem);
+            let rss: Vec<f64> = (0..problem.torques.len()).map(|torque| fit.residual(problem, torque)).collect();
+            let change = rss.iter().zip(&fit.rss).map(|(new, old)| (new / old - 1.0).abs()).fold(0.0, f64::max);
+            fit.rss = rss;
+            if change < SETTLED {
+                break;
+            }
+        }
+        fit
+    }
+
+    /// (column, value) of all parameters with a value in a torque.
+    pub fn columns(&self, problem: &Problem, torque: usize) -> Vec<(usize, f64)> {
+        let parameters = problem.torques[torque].parameters.iter().enumerate();
+        let valued = parameters.map(|(column, &parameter)| (column, self.values[parameter]));
+        valued.filter(|(_, value)| *value != 0.0).collect()
+    }
+
+    fn residual(&self, problem: &Problem, torque: usize) -> f64 {
+        problem.torques[torque].whole.residual(&self.columns(problem, torque))
+    }
+
+    /// Products of a parameter's columns with those of the active ones, and with the right-hand side less what is absent.
+    pub fn products(&self, problem: &Problem, parameter: usize, torques: &[usize], out: &mut [f64]) -> (f64, f64) {
+        out.fill(0.0);
+        let (mut own, mut right) = (0.0, 0.0);
+        for &torque in torques {
+            let rows = &problem.torques[torque];
+            let Some(column) = rows.column(parameter) else { continue };
+            let weight = self.weights[torque];
+            let products = rows.whole.column(column);
+            own += weight * products[column];
+            right += weight * products[rows.parameters.len()];
+            for (product, &other) in products.iter().zip(&rows.parameters) {
+                match self.place[other] {
+                    Some(at) => out[at] += weight * product,
+                    None if problem.absent[other] != 0.0 && other != parameter => {
+                        right -= weight * product * problem.absent[other];
+                    }
+                    None => {}
+                }
+            }
+        }
+        (own, right)
+    }
+
+    fn solve(&mut self, problem: &Problem) {
+        let size = self.active.len();
+        let mut system = vec![0.0; size * size];
+        let mut right = vec![0.0; size];
+        let torques: Vec<usize> = (0..problem.torques.len()).collect();
+        for at in 0..size {
+            let row = &mut system[at * size..(at + 1) * size];
+            let (_, value) = self.products(problem, self.active[at], &torques, row);
+            right[at] = value;
+        }
+        if let Some(prior) = &problem.prior {
+            let last = prior.parameters.len();
+            for (a, &parameter) in prior.parameters.iter().enumerate() {
+                let Some(at) = self.place[parameter] else { continue };
+                let products = prior.products.column(a);
+                right[at] += self.prior_weight * products[last];
+                for (b, other) in prior.parameters.iter().enumerate() {
+                    if let Some(other) = self.place[*other] {
+                        system[at * size + other] += self.prior_weight * products[b];
+                    }
+                }
+            }
+        }
+        self.factor(system, problem.model.len());
+        self.half = self.forward(&right);
+        let solution = self.backward(self.half.clone());
+        self.values.clone_from(&problem.absent);
+        for ((&parameter, value), heard) in self.active.iter().zip(&solution).zip(&self.heard) {
+            self.values[parameter] = if *heard { *value } else { problem.absent[parameter] };
+        }
+    }
+
+    /// Cholesky's factor of the system; columns of which nothing is left are passed over.
+    fn factor(&mut self, mut system: Vec<f64>, model: usize) {
+        let size = self.active.len();
+        for row in 0..size {
+            let (before, rest) = system.split_at_mut(row * size);
+            let own = &mut rest[..size];
+            let norm = own[row];
+            for column in 0..row {
+                own[column] = match self.heard[column] {
+                    true => {
+                        let other = &before[column * size..column * size + column + 1];
+                        (own[column] - dot(&own[..column], &other[..column])) / other[column]
+                    }
+                    false => 0.0,
+                };
+            }
+            let left = norm - dot(&own[..row], &own[..row]);
+            let least = if row < model { DEPENDENT } else { ABSORBED };
+            self.heard[row] = left > least * norm && left > 0.0;
+            if self.heard[row] {
+                own[row] = left.sqrt();
+            } else {
+                own[..row].fill(0.0);
+                own[row] = 1.0;
+            }
+        }
+        self.triangle = system;
+    }
+
+    /// L⁻¹·x.
+    pub fn forward(&self, x: &[f64]) -> Vec<f64> {
+        let size = self.active.len();
+        let mut y = vec![0.0; size];
+        for row in 0..size {
+            if self.heard[row] {
+                let own = &self.triangle[row * size..row * size + row + 1];
+                y[row] = (x[row] - dot(&own[..row], &y[..row])) / own[row];
+            }
+        }
+        y
+    }
+
+    /// L⁻ᵀ·y.
+    pub fn backward(&self, mut y: Vec<f64>) -> Vec<f64> {
+        let size = self.active.len();
+        for row in (0..size).rev() {
+            if !self.heard[row] {
+                y[row] = 0.0;
+                continue;
+            }
+            let own = &self.triangle[row * size..row * size + row + 1];
+            y[row] /= own[row];
+            let value = y[row];
+            y[..row].iter_mut().zip(own).for_each(|(y, entry)| *y -= entry * value);
+        }
+        y
+    }
+
+    /// What the prior says against the values: its weighted squares.
+    pub fn prior_squares(&self, problem: &Problem) -> f64 {
+        let Some(prior) = &problem.prior else { return 0.0 };
+        let values: Vec<(usize, f64)> =
+            prior.parameters.iter().enumerate().map(|(at, &parameter)| (at, self.values[parameter])).collect();
+        self.prior_weight * prior.products.residual(&values)
+    }
+}
+
+pub(super) fn dot(left: &[f64], right: &[f64]) -> f64 {
+    // Four sums, so that the additions do not wait for each other.
+    let mut sums = [0.0; 4];
+    let (left_fours, right_fours) = (left.chunks_exact(4), right.chunks_exact(4));
+    let rest: f64 = left_fours.remainder().iter().zip(right_fours.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in left_fours.zip(right_fours) {
+        for lane in 0..4 {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}

@@ -1,0 +1,387 @@
+//! Forward to the end, then prune, then swap, until nothing is better.
+
+use super::criterion::{choices, criterion, price};
+use super::design_effect::effective_rows;
+use super::fit::Fit;
+use super::problem::{Member, Problem};
+use super::screening::{Beside, Screened, gain_of, screen, silent};
+use super::wald::{Certainty, certainty};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// How the search goes about, and when it believes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Policy {
+    /// Hypotheses that are fitted in full at each step, after the quick look at all.
+    pub finalists: usize,
+    /// Probability at which a member stays in the model, if it were not there.
+    pub keep_tail: f64,
+    /// Members at most beside what was declared.
+    pub most_members: usize,
+}
+
+/// What could stand in the place of a member.
+#[derive(Clone, Debug)]
+pub(crate) struct Alternative {
+    pub member: Member,
+    /// By how much the criterion is larger with it.
+    pub excess: f64,
+}
+
+/// The model at which the criterion is smallest.
+pub(crate) struct Outcome {
+    /// Its members, the declared first.
+    pub members: Vec<Member>,
+    pub fit: Fit,
+    /// Effective rows of each torque.
+    pub rows: Vec<f64>,
+    /// How sure each member is.
+    pub certainties: Vec<Certainty>,
+    /// For each member what could stand in its place, best first.
+    pub alternatives: Vec<Vec<Alternative>>,
+    /// Hypotheses of which the model leaves nothing.
+    pub silent: Vec<usize>,
+    /// The best hypotheses that did not enter.
+    pub next: Vec<Member>,
+}
+
+/// A model on its way.
+#[derive(Clone)]
+struct Model {
+    members: Vec<Member>,
+    fit: Fit,
+    value: f64,
+}
+
+struct Search<'a> {
+    problem: &'a Problem,
+    policy: Policy,
+    /// Hypotheses that were in and were not sure.
+    closed: Vec<bool>,
+    rows: Vec<f64>,
+    model: Model,
+}
+
+/// Sweeps of swaps; each accepts whatever is better.
+const SWEEPS: usize = 4;
+/// Times that forward, prune and swap follow each other.
+const ROUNDS: usize = 6;
+/// The criterion must fall by this much for a step: less is rounding.
+const LEAST_STEP: f64 = 1e-3;
+/// Hypotheses of a torque whose pairs are looked at.
+const PAIRED: usize = 6;
+
+/// The set of members at which the criterion is smallest, from `start`.
+pub(crate) fn select(problem: &Problem, start: Vec<Member>, policy: Policy) -> Outcome {
+    let rows: Vec<f64> = problem
+        .torques
+        .iter()
+        .map(|torque| (torque.whole.rows() / problem.rows_per_independent).max(2.0))
+        .collect();
+    let fit = Fit::new(problem, problem.active(&start), &rows, None);
+    let model = Model { members: start, fit, value: 0.0 };
+    let mut search = Search { problem, policy, closed: vec![false; problem.hypotheses.len()], rows, model };
+    search.renew();
+    search.run();
+    search.outcome()
+}
+
+impl Search<'_> {
+    fn run(&mut self) {
+        for _ in 0..ROUNDS {
+            let before = self.model.members.clone();
+            while self.forward() {}
+            while self.prune() {}
+            for _ in 0..SWEEPS {
+                if !self.swap() {
+                    break;
+                }
+            }
+            while self.prune() {}
+            self.doubt();
+            if self.model.members == before {
+                break;
+            }
+        }
+    }
+
+    /// The effective rows as the present residual tells them, and the criterion with them.
+    fn renew(&mut self) {
+        self.rows = effective_rows(self.problem, &self.model.fit);
+        let members = std::mem::take(&mut self.model.members);
+        self.model = self.evaluate(members, &self.model.fit);
+    }
+
+    fn is_declared(&self, member: &Member) -> bool {
+        self.problem.hypotheses[member.hypothesis].declared
+    }
+
+    /// A model fitted; members that break their bounds, or say nothing, are left out.
+    fn evaluate(&self, mut members: Vec<Member>, start: &Fit) -> Model {
+        loop {
+            let fit = Fit::new(self.problem, self.problem.active(&members), &self.rows, Some(start));
+            let stays = |member: &Member| self.is_declared(member) || self.is_within_bounds(&fit, member);
+            if members.iter().all(stays) {
+                let value = criterion(self.problem, &members, &fit, &self.rows);
+                return Model { members, fit, value };
+            }
+            members.retain(stays);
+        }
+    }
+
+    fn is_within_bounds(&self, fit: &Fit, member: &Member) -> bool {
+        let variant = self.problem.variant(*member);
+        let heard = |parameter: usize| fit.place[parameter].is_some_and(|place| fit.heard[place]);
+        let within = |(&parameter, (low, high)): (&usize, &(f64, f64))| {
+            let value = fit.values[parameter];
+            !heard(parameter) || (*low <= value && value <= *high)
+        };
+        variant.parameters.iter().any(|&parameter| heard(parameter))
+            && variant.parameters.iter().zip(&variant.bounds).all(within)
+    }
+
+    fn is_in(&self, hypothesis: usize) -> bool {
+        self.model.members.iter().any(|member| member.hypothesis == hypothesis)
+    }
+
+    fn open(&self) -> Vec<usize> {
+        (0..self.problem.hypotheses.len())
+            .filter(|&hypothesis| !self.closed[hypothesis] && !self.is_in(hypothesis))
+            .collect()
+    }
+
+    fn accept(&mut self, model: Model) {
+        self.model = model;
+        self.renew();
+    }
+
+    /// Takes the best of all models that have more in them, if it is better.
+    fn forward(&mut self) -> bool {
+        if self.model.members.len() >= self.policy.most_members {
+            return false;
+        }
+        let screened = screen(self.problem, &self.model.fit, &self.rows, &self.open());
+        let moves = self.moves(&screened);
+        let models: Vec<Model> = moves
+            .into_par_iter()
+            .map(|added| {
+                let members = self.model.members.iter().copied().chain(added).collect();
+                self.evaluate(members, &self.model.fit)
+            })
+            .collect();
+        let best = models.into_iter().min_by(|a, b| a.value.total_cmp(&b.value));
+        match best {
+            Some(best) if best.value < self.model.value - LEAST_STEP && best.members != self.model.members => {
+                self.accept(best);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// What may be added in one step: one hypothesis, two that act on one torque, and either on all torques where it says something.
+    fn moves(&self, screened: &[Screened]) -> Vec<Vec<Member>> {
+        let now = choices(self.problem, &self.model.members);
+        let worth = |added: &[Member], gain: f64| {
+            let members: Vec<Member> = self.model.members.iter().chain(added).copied().collect();
+            gain - (choices(self.problem, &members) - now)
+        };
+        let mut moves: Vec<(f64, Vec<Member>)> = Vec::new();
+        let mut families: BTreeMap<Vec<usize>, (f64, Vec<Member>)> = BTreeMap::new();
+        let mut join = |kinds: Vec<usize>, gain: f64, members: &[Member]| {
+            let family = families.entry(kinds).or_default();
+            family.0 += gain;
+            for member in members {
+                if !family.1.iter().any(|other| other.hypothesis == member.hypothesis) {
+                    family.1.push(*member);
+                }
+            }
+        };
+        let of = |screened: &Screened| &self.problem.hypotheses[screened.member.hypothesis];
+        for screened in screened {
+            moves.push((worth(&[screened.member], screened.gain), vec![screened.member]));
+            if of(screened).familiar {
+                join(vec![of(screened).kind], screened.gain, &[screened.member]);
+            }
+        }
+        for (gain, pair) in self.pairs(screened) {
+            moves.push((worth(&pair, gain), pair.to_vec()));
+            let kinds = pair.map(|member| self.problem.hypotheses[member.hypothesis].kind);
+            join(kinds.to_vec(), gain, &pair);
+        }
+        moves.sort_by(|a, b| b.0.total_cmp(&a.0));
+        moves.truncate(self.policy.finalists);
+        let mut families: Vec<(f64, Vec<Member>)> = families
+            .into_values()
+            .filter(|(_, members)| members.len() > 1)
+            .map(|(gain, members)| (worth(&members, gain), members))
+            .collect();
+        families.sort_by(|a, b| b.0.total_cmp(&a.0));
+        families.truncate(self.policy.finalists);
+        moves.into_iter().chain(families).map(|(_, members)| members).collect()
+    }
+
+    /// On each torque the best pair of each two kinds among the best few hypotheses, where the two say more than either.
+    fn pairs(&self, screened: &[Screened]) -> Vec<(f64, [Member; 2])> {
+        let of_torque = |torque: usize| -> Vec<(f64, [Member; 2])> {
+            let hypothesis = |screened: &&Screened| &self.problem.hypotheses[screened.member.hypothesis];
+            let own = screened.iter().filter(|screened| {
+                hypothesis(screened).torques == [torque] && hypothesis(screened).familiar
+            });
+            let own: Vec<&Screened> = own.take(PAIRED).collect();
+            let mut pairs = Vec::new();
+            for (place, first) in own.iter().enumerate() {
+                for second in &own[place + 1..] {
+                    let members = [first.member, second.member];
+                    let parameters: Vec<usize> = members
+                        .iter()
+                        .flat_map(|&member| self.problem.variant(member).parameters.iter().copied())
+                        .collect();
+                    let beside = Beside::new(self.problem, &self.model.fit, &parameters, &[torque]);
+                    let (squares, values) = beside.solve(&self.model.fit);
+                    let bounds = members.iter().flat_map(|&member| &self.problem.variant(member).bounds);
+                    let within = values
+                        .iter()
+                        .zip(bounds)
+                        .all(|(value, (low, high))| value.is_none_or(|value| *low <= value && value <= *high));
+                    let prices: f64 =
+                        members.iter().map(|&member| price(self.problem, member, None, &self.rows)).sum();
+                    let gain = gain_of(squares, self.rows[torque]) - prices;
+                    if within && gain > first.gain && gain > second.gain {
+                        let mut members = members;
+                        members.sort_by_key(|member| self.problem.hypotheses[member.hypothesis].kind);
+                        pairs.push((gain, members));
+                    }
+                }
+            }
+            pairs
+        };
+        (0..self.problem.torques.len()).into_par_iter().flat_map_iter(of_torque).collect()
+    }
+
+    /// Leaves out what the criterion is better without: one member, or all of a kind.
+    fn prune(&mut self) -> bool {
+        let removable: Vec<Member> =
+            self.model.members.iter().filter(|member| !self.is_declared(member)).copied().collect();
+        let mut kinds: BTreeMap<usize, Vec<Member>> = BTreeMap::new();
+        for member in &removable {
+            let hypothesis = &self.problem.hypotheses[member.hypothesis];
+            if hypothesis.familiar {
+                kinds.entry(hypothesis.kind).or_default().push(*member);
+            }
+        }
+        let families = kinds.into_values().filter(|members| members.len() > 1);
+        let moves: Vec<Vec<Member>> = removable.iter().map(|member| vec![*member]).chain(families).collect();
+        let models: Vec<Model> = moves
+            .into_par_iter()
+            .map(|removed| {
+                let members =
+                    self.model.members.iter().filter(|member| !removed.contains(member)).copied().collect();
+                self.evaluate(members, &self.model.fit)
+            })
+            .collect();
+        match models.into_iter().min_by(|a, b| a.value.total_cmp(&b.value)) {
+            Some(best) if best.value <= self.model.value => {
+                self.accept(best);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Puts in the place of each member what the criterion is smaller with.
+    fn swap(&mut self) -> bool {
+        let mut swapped = false;
+        let mut place = 0;
+        while place < self.model.members.len() {
+            let best = self.in_place_of(place).into_iter().next();
+            if let Some((model, _)) = best
+                && model.value < self.model.value - LEAST_STEP
+            {
+                self.accept(model);
+                swapped = true;
+            }
+            place += 1;
+        }
+        swapped
+    }
+
+    /// Models with something else in the place of a member, best first.
+    fn in_place_of(&self, place: usize) -> Vec<(Model, Member)> {
+        let member = self.model.members[place];
+        let own = &self.problem.hypotheses[member.hypothesis];
+        let others: Vec<Member> =
+            self.model.members.iter().filter(|other| **other != member).copied().collect();
+        let without = Fit::new(self.problem, self.problem.active(&others), &self.rows, Some(&self.model.fit));
+        let mut open: Vec<usize> = match own.declared {
+            true => Vec::new(),
+            false => self.open(),
+        };
+        open.retain(|&other| {
+            self.problem.hypotheses[other].torques.iter().any(|torque| own.torques.contains(torque))
+        });
+        if own.variants.len() > 1 {
+            open.push(member.hypothesis);
+        }
+        let screened = screen(self.problem, &without, &self.rows, &open);
+        let mut models: Vec<(Model, Member)> = screened
+            .into_par_iter()
+            .take(self.policy.finalists / 2)
+            .filter(|screened| screened.member != member)
+            .map(|screened| {
+                let mut members = self.model.members.clone();
+                members[place] = screened.member;
+                (self.evaluate(members, &self.model.fit), screened.member)
+            })
+            .collect();
+        models.retain(|(model, _)| model.members.len() >= self.model.members.len());
+        models.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
+        models
+    }
+
+    /// Leaves out what is not sure, the least sure first.
+    fn doubt(&mut self) {
+        loop {
+            let tails = self.model.members.par_iter().enumerate().filter(|(_, member)| !self.is_declared(member));
+            let worst = tails
+                .map(|(place, member)| (certainty(self.problem, &self.model.fit, *member).tail, place))
+                .max_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((tail, place)) = worst else { return };
+            if tail <= self.policy.keep_tail {
+                return;
+            }
+            let mut members = self.model.members.clone();
+            self.closed[members.remove(place).hypothesis] = true;
+            let model = self.evaluate(members, &self.model.fit);
+            self.accept(model);
+        }
+    }
+
+    fn outcome(self) -> Outcome {
+        let certainties: Vec<Certainty> = self
+            .model
+            .members
+            .par_iter()
+            .map(|member| certainty(self.problem, &self.model.fit, *member))
+            .collect();
+        let alternatives = (0..self.model.members.len())
+            .map(|place| {
+                let models = self.in_place_of(place).into_iter();
+                models
+                    .filter(|(_, member)| member.hypothesis != self.model.members[place].hypothesis)
+                    .map(|(model, member)| Alternative { member, excess: model.value - self.model.value })
+                    .collect()
+            })
+            .collect();
+        let screened = screen(self.problem, &self.model.fit, &self.rows, &self.open());
+        Outcome {
+            certainties,
+            alternatives,
+            silent: silent(self.problem, &self.model.fit, &self.open()),
+            next: screened.into_iter().take(self.policy.finalists).map(|screened| screened.member).collect(),
+            members: self.model.members,
+            fit: self.model.fit,
+            rows: self.rows,
+        }
+    }
+}
