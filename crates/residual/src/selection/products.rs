@@ -34,11 +34,6 @@ impl Products {
         self.rows += other.rows;
     }
 
-    /// Number of columns, the right-hand side included.
-    pub fn size(&self) -> usize {
-        self.size
-    }
-
     /// Rows that it stands for.
     pub fn rows(&self) -> f64 {
         self.rows

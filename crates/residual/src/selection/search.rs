@@ -5,7 +5,7 @@ use super::design_effect::effective_rows;
 use super::fit::Fit;
 use super::problem::{Member, Problem};
 use super::screening::{Beside, Screened, gain_of, screen, silent};
-use super::wald::{Certainty, certainty};
+use super::wald::certainty;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -35,14 +35,16 @@ pub(crate) struct Outcome {
     pub fit: Fit,
     /// Effective rows of each torque.
     pub rows: Vec<f64>,
-    /// How sure each member is.
-    pub certainties: Vec<Certainty>,
     /// For each member what could stand in its place, best first.
     pub alternatives: Vec<Vec<Alternative>>,
     /// Hypotheses of which the model leaves nothing.
     pub silent: Vec<usize>,
-    /// The best hypotheses that did not enter.
-    pub next: Vec<Member>,
+}
+
+/// Members with their variants chosen.
+pub(crate) struct Variants {
+    pub members: Vec<Member>,
+    pub fit: Fit,
 }
 
 /// A model on its way.
@@ -73,30 +75,46 @@ const PAIRED: usize = 6;
 
 /// The set of members at which the criterion is smallest, from `start`.
 pub(crate) fn select(problem: &Problem, start: Vec<Member>, policy: Policy) -> Outcome {
-    let rows: Vec<f64> = problem
-        .torques
-        .iter()
-        .map(|torque| (torque.whole.rows() / problem.rows_per_independent).max(2.0))
-        .collect();
-    let fit = Fit::new(problem, problem.active(&start), &rows, None);
-    let model = Model { members: start, fit, value: 0.0 };
-    let mut search = Search { problem, policy, closed: vec![false; problem.hypotheses.len()], rows, model };
-    search.renew();
+    let mut search = Search::new(problem, start, policy);
     search.run();
     search.outcome()
 }
 
-impl Search<'_> {
+/// The variants of the members of `start` at which the criterion is smallest.
+pub(crate) fn choose_variants(problem: &Problem, start: Vec<Member>, policy: Policy) -> Variants {
+    let mut search = Search::new(problem, start, policy);
+    search.sweep();
+    Variants { members: search.model.members, fit: search.model.fit }
+}
+
+impl<'a> Search<'a> {
+    fn new(problem: &'a Problem, start: Vec<Member>, policy: Policy) -> Self {
+        let rows: Vec<f64> = problem
+            .torques
+            .iter()
+            .map(|torque| (torque.whole.rows() / problem.rows_per_independent).max(2.0))
+            .collect();
+        let fit = Fit::new(problem, problem.active(&start), &rows, None);
+        let model = Model { members: start, fit, value: 0.0 };
+        let mut search = Search { problem, policy, closed: vec![false; problem.hypotheses.len()], rows, model };
+        search.renew();
+        search
+    }
+
+    fn sweep(&mut self) {
+        for _ in 0..SWEEPS {
+            if !self.swap() {
+                break;
+            }
+        }
+    }
+
     fn run(&mut self) {
         for _ in 0..ROUNDS {
             let before = self.model.members.clone();
             while self.forward() {}
             while self.prune() {}
-            for _ in 0..SWEEPS {
-                if !self.swap() {
-                    break;
-                }
-            }
+            self.sweep();
             while self.prune() {}
             self.doubt();
             if self.model.members == before {
@@ -310,6 +328,9 @@ impl Search<'_> {
     fn in_place_of(&self, place: usize) -> Vec<(Model, Member)> {
         let member = self.model.members[place];
         let own = &self.problem.hypotheses[member.hypothesis];
+        if own.declared && own.variants.len() == 1 {
+            return Vec::new();
+        }
         let others: Vec<Member> =
             self.model.members.iter().filter(|other| **other != member).copied().collect();
         let without = Fit::new(self.problem, self.problem.active(&others), &self.rows, Some(&self.model.fit));
@@ -318,7 +339,8 @@ impl Search<'_> {
             false => self.open(),
         };
         open.retain(|&other| {
-            self.problem.hypotheses[other].torques.iter().any(|torque| own.torques.contains(torque))
+            let other = &self.problem.hypotheses[other];
+            !other.made_of_model && other.torques.iter().any(|torque| own.torques.contains(torque))
         });
         if own.variants.len() > 1 {
             open.push(member.hypothesis);
@@ -358,12 +380,6 @@ impl Search<'_> {
     }
 
     fn outcome(self) -> Outcome {
-        let certainties: Vec<Certainty> = self
-            .model
-            .members
-            .par_iter()
-            .map(|member| certainty(self.problem, &self.model.fit, *member))
-            .collect();
         let alternatives = (0..self.model.members.len())
             .map(|place| {
                 let models = self.in_place_of(place).into_iter();
@@ -373,12 +389,9 @@ impl Search<'_> {
                     .collect()
             })
             .collect();
-        let screened = screen(self.problem, &self.model.fit, &self.rows, &self.open());
         Outcome {
-            certainties,
             alternatives,
             silent: silent(self.problem, &self.model.fit, &self.open()),
-            next: screened.into_iter().take(self.policy.finalists).map(|screened| screened.member).collect(),
             members: self.model.members,
             fit: self.model.fit,
             rows: self.rows,

@@ -1,6 +1,6 @@
 //! Tables of small cases.
 
-use super::{Hypothesis, Member, Policy, Problem, Products, Torque, Variant, select};
+use super::{Hypothesis, Member, Policy, Problem, Products, Torque, Variant, certainty, select};
 use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_regressor::factor::Factor;
 
@@ -44,6 +44,7 @@ fn problem(random: &mut RandomNumbers, torques: usize, kinds: usize, truth: &[(u
                 familiar: true,
                 torques: vec![torque],
                 variants: vec![variant],
+                made_of_model: false,
                 declared: false,
             });
         }
@@ -101,7 +102,8 @@ fn nothing_is_named_in_noise_of_any_colour() {
             let problem = problem(&mut random, 3, 8, &[], colour);
             let outcome = select(&problem, Vec::new(), POLICY);
             let limit = 0.01 / problem.hypotheses.len() as f64;
-            named += outcome.certainties.iter().filter(|certainty| certainty.tail < limit).count();
+            let certain = |member: &&Member| certainty(&problem, &outcome.fit, **member).tail < limit;
+            named += outcome.members.iter().filter(certain).count();
         }
         assert!(named <= 2, "{named} names in noise of correlation {colour}");
     }

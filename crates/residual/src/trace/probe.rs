@@ -1,7 +1,5 @@
 //! What a residual follows, without a name: shapes over each signal, fitted on some folds, judged on the others.
 
-use super::candidate::{Candidate, Candidates};
-use super::evidence::paired_t;
 use super::signal_shapes::{Shape, neighbours, other_shapes, own_shapes};
 use super::stage::{Fixed, Stage};
 use phiw_effects::SignalRanges;
@@ -88,27 +86,20 @@ fn probes(
     if rows.is_empty() {
         return Ok(Vec::new());
     }
-    let mut candidates = Candidates::none();
-    let mut signals = Vec::new();
+    let (mut effects, mut signals) = (Vec::new(), Vec::new());
     for &row in rows {
         for (signal, effect) in shapes(row) {
-            let first = candidates.effects.len();
-            candidates.list.push(Candidate {
-                specs: vec![EffectSpec::new("shape", &[])],
-                rank: 0,
-                effects: first..first + 1,
-                constants: 0,
-            });
-            candidates.effects.push(effect);
+            effects.push(effect);
             signals.push((row, signal));
         }
     }
     let Fit { fixed, specs, parameters, .. } = fit;
-    let stage = fixed.pass(specs, candidates, fixed.reference(specs, parameters)?)?;
+    let folds = [fixed.data.train.as_slice(), &fixed.data.held_out].concat();
+    let stage = fixed.pass(specs, effects, fixed.reference(specs, parameters)?, &folds)?;
     // A held model's parameters do not give way.
     let free = if fixed.prior.is_some() { 0 } else { stage.model_size() };
     let mut parameters = parameters.to_vec();
-    parameters.resize(stage.train.parameter_count(), 0.0);
+    parameters.resize(stage.design.parameter_count(), 0.0);
     let of_row = |&row: &usize| {
         let own = signals.iter().enumerate().filter(|(_, (of, _))| *of == row);
         let own: Vec<(usize, &String)> = own.map(|(candidate, (_, signal))| (candidate, signal)).collect();
@@ -116,7 +107,8 @@ fn probes(
         let alone = residual.left_over(&[])?;
         let mut found = Vec::new();
         for (candidate, signal) in own {
-            let after = residual.left_over(&stage.parameters(candidate))?;
+            let shape = stage.design.effect_parameters(stage.model_effects + candidate);
+            let after = residual.left_over(&shape.collect::<Vec<usize>>())?;
             let share = 1.0 - after.iter().sum::<f64>() / alone.iter().sum::<f64>().max(f64::MIN_POSITIVE);
             let logarithms = |squares: &[f64]| -> Vec<f64> {
                 squares.iter().map(|square| square.max(f64::MIN_POSITIVE).ln()).collect()
@@ -203,4 +195,13 @@ fn drawn_to_nothing(factor: &Factor, added: usize) -> Result<Vec<f64>, Regressor
         builder.push_row(&row)?;
     }
     Ok(builder.factor().solve()?.parameters)
+}
+
+/// Mean of paired differences over their standard error.
+fn paired_t(left: &[f64], right: &[f64]) -> f64 {
+    let count = left.len() as f64;
+    let differences: Vec<f64> = left.iter().zip(right).map(|(a, b)| a - b).collect();
+    let mean = differences.iter().sum::<f64>() / count;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    if variance > 0.0 { mean / (variance / count).sqrt() } else { 0.0 }
 }

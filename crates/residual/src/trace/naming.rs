@@ -1,0 +1,281 @@
+//! What of the chosen effects has a name, what only refines the model, and what motion held out speaks against.
+
+use super::hypotheses::{Candidates, Present};
+use super::search::Search;
+use super::stage::Stage;
+use super::tracing::{FoundEffect, RivalEffect};
+use crate::selection::{Fit, Member, Problem, Products, certainty};
+use phiw_identification::{EffectSpec, IdentificationError};
+use phiw_regressor::least_squares::GroupedFactor;
+
+/// A rival that is less probable is none.
+pub const LEAST_RIVAL: f64 = 0.05;
+/// Share of its torque that an effect must be where the other parameters have taken up most of it, over the least size.
+const ABSORBED_SIZE: f64 = 3.0;
+/// Times the residual that a held model left when it was fitted.
+const AS_IT_WAS: f64 = 1.1;
+
+/// The chosen model, fitted to the training motion, and motion held out to judge it.
+pub(super) struct Trial {
+    problem: Problem,
+    members: Vec<Member>,
+    rows: Vec<f64>,
+    fit: Fit,
+    held_out: Vec<Products>,
+    /// The place of each member among the model's effects.
+    places: Vec<usize>,
+}
+
+/// What leaving out an effect does.
+struct Judged {
+    /// Place among the model's effects.
+    place: usize,
+    significance: f64,
+    /// What the logarithms of the errors held out gain with it: Σ rows·log(without/with).
+    gain: f64,
+    /// Share of the stretches of training motion that it makes better.
+    folds: f64,
+    named: bool,
+}
+
+impl Search<'_> {
+    /// The effects that were found, in the order in which they count: those that have a name, then those that refine. `self.specs` are put in that order.
+    ///
+    /// What makes the error on motion held out larger is left out.
+    pub(super) fn name(&mut self) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
+        loop {
+            let trial = self.trial()?;
+            let judged = self.judge(&trial)?;
+            let harmful = judged.iter().filter(|judged| judged.gain <= 0.0);
+            match harmful.min_by(|a, b| a.gain.total_cmp(&b.gain)) {
+                Some(harmful) => {
+                    let place = harmful.place;
+                    self.leave_out(place)?;
+                }
+                None => return self.in_order(&trial, judged),
+            }
+        }
+    }
+
+    fn leave_out(&mut self, place: usize) -> Result<(), IdentificationError> {
+        let design = self.design()?;
+        self.parameters.drain(design.effect_parameters(place));
+        self.specs.remove(place);
+        self.chosen.alternatives.remove(place - self.declared);
+        self.refine()
+    }
+
+    fn trial(&self) -> Result<Trial, IdentificationError> {
+        let present = Present { specs: &self.specs, declared: self.declared };
+        let mut candidates = Candidates::of_model(self.fixed, present);
+        let folds: Vec<_> = self.folds.iter().chain(&self.fixed.data.held_out).copied().collect();
+        let reference = self.fixed.reference(&self.specs, &self.parameters)?;
+        let mut stage = self.fixed.pass(&self.specs, Vec::new(), reference, &folds)?;
+        let held_out = stage.folds.split_off(self.folds.len());
+        let problem = self.fixed.problem(&stage, &mut candidates)?;
+        let fit = Fit::new(&problem, problem.active(&candidates.present), &self.chosen.rows, None);
+        Ok(Trial {
+            held_out: products(&stage, &held_out),
+            places: candidates.list.iter().map(|candidate| candidate.effects[0]).collect(),
+            rows: self.chosen.rows.clone(),
+            members: candidates.present,
+            problem,
+            fit,
+        })
+    }
+
+    fn judge(&self, trial: &Trial) -> Result<Vec<Judged>, IdentificationError> {
+        let limit = self.options.false_name_probability / self.chosen.hypotheses.max(1) as f64;
+        let nothing = trial.fit_with(|place| place < self.declared);
+        let initial = trial.held_out_squares(&nothing);
+        let with = trial.held_out_squares(&trial.fit);
+        let mut judged = Vec::new();
+        for (index, &member) in trial.members.iter().enumerate() {
+            let place = trial.places[index];
+            if place < self.declared {
+                continue;
+            }
+            let without_fit = trial.fit_with(|other| other != place);
+            let without = trial.held_out_squares(&without_fit);
+            let certainty = certainty(&trial.problem, &trial.fit, member);
+            let gain: f64 = (0..with.len())
+                .map(|torque| trial.held_out[torque].rows() * (without[torque] / with[torque]).ln())
+                .sum();
+            let material = self.is_material(trial, member, &initial, &without, &with);
+            judged.push(Judged {
+                place,
+                significance: certainty.significance,
+                gain,
+                folds: trial.better_folds(&without_fit),
+                named: certainty.tail <= limit && material,
+            });
+        }
+        Ok(judged)
+    }
+
+    /// Whether what an effect takes away on motion held out is worth a name.
+    ///
+    /// It must take away a share of the residual of a torque that it acts on, and be a share of that torque. Where the other parameters have taken up most of it,
+    /// it is to be seen on any torque, and must be a share of its torque by itself.
+    fn is_material(
+        &self,
+        trial: &Trial,
+        member: Member,
+        initial: &[f64],
+        without: &[f64],
+        with: &[f64],
+    ) -> bool {
+        let options = self.options;
+        let hypothesis = &trial.problem.hypotheses[member.hypothesis];
+        let (mut largest_share, mut size): (f64, f64) = (0.0, 0.0);
+        let mut seen = false;
+        for (torque, held_out) in trial.held_out.iter().enumerate() {
+            let (before, after) = (without[torque], with[torque]);
+            let as_it_was = self.input.held.as_ref().is_some_and(|held| {
+                (before / held_out.rows().max(1.0)).sqrt() <= AS_IT_WAS * held.residual_std[torque]
+            });
+            if as_it_was || held_out.rows() == 0.0 {
+                continue;
+            }
+            let whole = held_out.right_hand_side().max(f64::MIN_POSITIVE);
+            let taken = (before - after).max(0.0);
+            let share = taken / before;
+            largest_share = largest_share.max(share);
+            let by_others = (initial[torque] - before).max(0.0);
+            seen |= hypothesis.torques.contains(&torque)
+                && share >= options.least_share
+                && taken >= options.least_of_others * by_others
+                && (taken / whole).sqrt() >= options.least_size;
+            size = size.max((held_out.size_of(&trial.values_of(member, torque)) / whole).sqrt());
+        }
+        seen || largest_share >= options.least_share && size >= ABSORBED_SIZE * options.least_size
+    }
+
+    /// Puts the effects into the order in which they count, and says what each has explained.
+    fn in_order(
+        &mut self,
+        trial: &Trial,
+        mut judged: Vec<Judged>,
+    ) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
+        judged.sort_by(|a, b| b.named.cmp(&a.named).then(b.gain.total_cmp(&a.gain)));
+        let named = judged.iter().filter(|judged| judged.named).count();
+        let declared = self.declared;
+        let mut found: Vec<FoundEffect> = Vec::new();
+        let mut inside: Vec<usize> = Vec::new();
+        let account = |inside: &[usize]| {
+            let fit = trial.fit_with(|place| place < declared || inside.contains(&place));
+            let squares = trial.held_out_squares(&fit);
+            let torque: f64 = trial.held_out.iter().map(Products::right_hand_side).sum();
+            let excess: f64 = squares
+                .iter()
+                .zip(&trial.held_out)
+                .zip(&self.input.noise_floor)
+                .map(|((squares, held_out), floor)| (squares - held_out.rows() * floor * floor).max(0.0))
+                .sum();
+            ((squares.iter().sum::<f64>() / torque).sqrt(), excess)
+        };
+        let mut before = account(&inside);
+        for judged in &judged {
+            inside.push(judged.place);
+            let after = account(&inside);
+            let (confidence, rivals) = odds(&self.chosen.alternatives[judged.place - declared]);
+            found.push(FoundEffect {
+                spec: self.specs[judged.place].clone(),
+                relative: after.0,
+                relative_before: before.0,
+                explains: match before.1 > 0.0 {
+                    true => (1.0 - after.1 / before.1).clamp(0.0, 1.0),
+                    false => 0.0,
+                },
+                confidence,
+                stability: judged.folds,
+                significance: judged.significance,
+                rivals,
+                ranking: Vec::new(),
+            });
+            before = after;
+        }
+        let order: Vec<usize> = (0..declared).chain(judged.iter().map(|judged| judged.place)).collect();
+        self.reorder(&order)?;
+        Ok((found, named))
+    }
+
+    /// Puts the effects, with their parameters, into another order.
+    fn reorder(&mut self, order: &[usize]) -> Result<(), IdentificationError> {
+        let design = self.design()?;
+        let of_effects = order.iter().flat_map(|&place| design.effect_parameters(place));
+        self.parameters =
+            (0..self.fixed.base.count()).chain(of_effects).map(|parameter| self.parameters[parameter]).collect();
+        self.specs = order.iter().map(|&place| self.specs[place].clone()).collect();
+        Ok(())
+    }
+}
+
+impl Trial {
+    /// The fit with the declared members and those found that `stays` keeps, by their place among the model's effects.
+    fn fit_with(&self, stays: impl Fn(usize) -> bool) -> Fit {
+        let members: Vec<Member> = self
+            .members
+            .iter()
+            .zip(&self.places)
+            .filter(|(member, place)| {
+                self.problem.hypotheses[member.hypothesis].declared || stays(**place)
+            })
+            .map(|(member, _)| *member)
+            .collect();
+        Fit::new(&self.problem, self.problem.active(&members), &self.rows, Some(&self.fit))
+    }
+
+    fn held_out_squares(&self, fit: &Fit) -> Vec<f64> {
+        let of_torque = |(torque, held_out): (usize, &Products)| match held_out.rows() > 0.0 {
+            true => held_out.residual(&fit.columns(&self.problem, torque)),
+            false => 1.0,
+        };
+        self.held_out.iter().enumerate().map(of_torque).collect()
+    }
+
+    /// What a member adds to a torque, as (column, value) pairs.
+    fn values_of(&self, member: Member, torque: usize) -> Vec<(usize, f64)> {
+        let rows = &self.problem.torques[torque];
+        let value = |parameter: usize| self.fit.values[parameter] - self.problem.absent[parameter];
+        let parameters = &self.problem.variant(member).parameters;
+        parameters.iter().filter_map(|&parameter| Some((rows.column(parameter)?, value(parameter)))).collect()
+    }
+
+    /// Share of the stretches of training motion in which the error of `without` is larger than the model's.
+    fn better_folds(&self, without: &Fit) -> f64 {
+        let count = self.problem.torques.first().map_or(0, |torque| torque.folds.len());
+        let loss = |fit: &Fit, fold: usize| -> f64 {
+            (0..self.problem.torques.len())
+                .map(|torque| {
+                    let rows = &self.problem.torques[torque].folds[fold];
+                    let squares = rows.residual(&fit.columns(&self.problem, torque));
+                    self.fit.weights[torque] * squares
+                })
+                .sum()
+        };
+        let better = (0..count).filter(|&fold| loss(&self.fit, fold) < loss(without, fold)).count();
+        better as f64 / count.max(1) as f64
+    }
+}
+
+fn products(stage: &Stage, folds: &[GroupedFactor]) -> Vec<Products> {
+    let of_torque = |torque: usize| {
+        let mut sum = Products::zero(stage.design.rows()[torque].parameters.len() + 1);
+        folds.iter().for_each(|fold| sum.add(&Products::of_factor(&fold.groups()[torque].factor)));
+        sum
+    };
+    (0..stage.design.rows().len()).map(of_torque).collect()
+}
+
+/// The probability of the chosen one, and the rivals with theirs: e^(−excess/2), the criterion being twice a negative log-likelihood.
+fn odds(alternatives: &[(EffectSpec, f64)]) -> (f64, Vec<RivalEffect>) {
+    let weigh = |excess: f64| (-0.5 * excess.max(0.0)).exp();
+    let sum: f64 = 1.0 + alternatives.iter().map(|(_, excess)| weigh(*excess)).sum::<f64>();
+    let rival = |(spec, excess): &(EffectSpec, f64)| RivalEffect {
+        spec: spec.clone(),
+        confidence: weigh(*excess) / sum,
+    };
+    let rivals = alternatives.iter().map(rival).filter(|rival| rival.confidence >= LEAST_RIVAL).collect();
+    (1.0 / sum, rivals)
+}
