@@ -23,7 +23,7 @@ pub struct Artefact {
 pub enum ArtefactKind {
     /// Exactly 0, 0, 0: what software writes where a marker was not seen.
     Zero,
-    /// Far off for at most three frames.
+    /// Far off for a few frames.
     Spike,
     /// The marker never moves by a bit, while others do.
     Frozen,
