@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::arguments::{Derivatives, RetargetArguments};
-use phiw_bspline_retarget::{Artefact, Retargeted, Retargeter, backward_differences};
+use phiw_bspline_retarget::{Retargeted, Retargeter, backward_differences};
 use phiw_result_folder::{Disk, ResultError, replace_vouched};
 use phiw_telemetry::{LogColumns, LogWriter};
 use serde_json::json;
@@ -58,7 +58,7 @@ impl MotionFile {
     pub fn write(
         &self,
         motion: &Retargeted,
-        artefacts: &[Artefact],
+        artefacts: &[String],
         retargeter: &Retargeter,
         settings: &Settings,
         arguments: &RetargetArguments,
@@ -108,7 +108,7 @@ fn log(motion: &Retargeted, retargeter: &Retargeter, derivatives: Derivatives) -
 
 fn facts(
     motion: &Retargeted,
-    artefacts: &[Artefact],
+    artefacts: &[String],
     retargeter: &Retargeter,
     settings: &Settings,
 ) -> serde_json::Value {
@@ -120,7 +120,7 @@ fn facts(
         "torso_and_head": torso,
         "rate_hz": motion.rate_hz,
         "frames": motion.frames,
-        "artefacts": artefacts.iter().map(Artefact::to_string).collect::<Vec<_>>(),
+        "artefacts": artefacts,
         "marker_rms_m": quality.marker_rms_m,
         "elbow_rms_m": quality.elbow_rms_m,
         "hand_rms_m": quality.hand_rms_m,
