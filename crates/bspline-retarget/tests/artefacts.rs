@@ -203,21 +203,6 @@ fn control_points_had_no_bound() {
     }
 }
 
-/// What a motion depends on is written down beside it as the options are printed.
-#[test]
-fn settings_of_the_markers_were_not_among_the_options() {
-    let print = |change: &dyn Fn(&mut MarkerSettings)| {
-        let mut options = RetargetOptions::default();
-        change(&mut options.markers);
-        format!("{options:?}")
-    };
-    let usual = print(&|_| ());
-    assert_ne!(print(&|markers| markers.spikes.smallest = 0.1), usual);
-    assert_ne!(print(&|markers| markers.frozen_share = 0.8), usual);
-    assert_ne!(print(&|markers| markers.still_share = 0.8), usual);
-    assert_ne!(print(&|markers| markers.person_m = 0.1..=9.0), usual);
-}
-
 /// The C3D files of the folders of real recordings.
 fn real_files() -> Vec<PathBuf> {
     let motions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/motions");

@@ -126,7 +126,7 @@ fn a_table_in_millimetres_could_not_be_retargeted() {
     }
     let file = folder.path().join("table.csv");
     std::fs::write(&file, text).unwrap();
-    let (status, _, errors) = run(&folder, &[file.clone()], &[]);
+    let (status, _, errors) = run(&folder, std::slice::from_ref(&file), &[]);
     assert_eq!(status, 2, "{errors}");
     assert!(errors.contains("set `units` in the map (as if they were in mm, not m)"), "{errors}");
     let map = map(&folder, "units = \"mm\"");

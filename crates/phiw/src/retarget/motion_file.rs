@@ -140,3 +140,42 @@ fn facts(
         "settings": settings.0,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use phiw_bspline_retarget::human::MarkerMap;
+    use phiw_bspline_retarget::{MarkerSettings, RetargetOptions};
+    use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+
+    /// A motion made with other bounds of what a spike is was kept as if it were the same.
+    #[test]
+    fn settings_of_the_markers_were_not_part_of_what_a_motion_depends_on() {
+        let urdf = include_str!("../../../../models/upper_body18.urdf");
+        let arguments = RetargetArguments {
+            urdf: PathBuf::new(),
+            c3d: Vec::new(),
+            map: None,
+            hold: Vec::new(),
+            torso_from_reach: false,
+            velocity_limits: false,
+            interval: 0.2,
+            derivatives: Derivatives::Analytic,
+            out: PathBuf::new(),
+            quiet: true,
+        };
+        let settings = |markers: MarkerSettings| {
+            let tree = read_urdf(urdf, &UrdfOptions::default()).unwrap().tree;
+            let options = RetargetOptions { markers, ..RetargetOptions::default() };
+            let retargeter = Retargeter::new(tree, MarkerMap::embedded().unwrap(), options).unwrap();
+            Settings::new(&arguments, urdf, &retargeter, &[], None).0
+        };
+        let usual = settings(MarkerSettings::default());
+        assert_eq!(settings(MarkerSettings::default()), usual);
+        let mut spikes = MarkerSettings::default();
+        spikes.spikes.smallest = 0.1;
+        assert_ne!(settings(spikes), usual);
+        assert_ne!(settings(MarkerSettings { person_m: 0.1..=9.0, ..MarkerSettings::default() }), usual);
+        assert_ne!(settings(MarkerSettings { frozen_share: 0.8, ..MarkerSettings::default() }), usual);
+    }
+}
