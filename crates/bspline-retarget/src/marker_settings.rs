@@ -10,7 +10,7 @@ pub struct MarkerSettings {
     /// there, and do no harm: only what is off by more than 50 mm counts.
     pub spikes: SpikeSettings,
     /// A marker is frozen if it is at one and the same place, to the last bit, in more than this share of the frames that show it (0.5 to 1). The
-    /// rest may be spikes. No marker of 148 real recordings is at one place in half of its frames; most of all it is in 6 %.
+    /// rest may be spikes. No marker of 148 real recordings is at one place in half of its frames.
     pub frozen_share: f64,
     /// Where this share of the markers or more is frozen (0 to 1), nothing tells a recording that hangs from a person who stands still:
     /// they are left in, and such a recording is no motion.
