@@ -3,7 +3,7 @@
 use crate::structured;
 use phiw_bspline_retarget::c3d::read_c3d;
 use phiw_bspline_retarget::human::MarkerMap;
-use phiw_bspline_retarget::{MarkerRecording, marker_spikes, read_recording};
+use phiw_bspline_retarget::{MarkerRecording, MarkerSettings, read_recording};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Tree, Workspace};
 use phiw_identification::Model;
@@ -84,7 +84,9 @@ pub fn random_log(bytes: &[u8]) {
 /// Whether a recording holds what its sizes say, with and without its artefacts.
 fn check_recording(mut recording: MarkerRecording) {
     assert_eq!(recording.positions_m.len(), recording.frames() * recording.labels.len());
-    recording.remove_artefacts(marker_spikes());
+    let markers: Vec<usize> = (0..recording.labels.len()).collect();
+    recording.remove_artefacts(&markers, &MarkerSettings::default());
+    let _ = recording.extent_m(&markers);
     assert!((0.0..=1.0).contains(&recording.missing_share()));
 }
 
