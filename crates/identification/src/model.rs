@@ -1,7 +1,11 @@
 //! An identified model as one thing: rigid body, effects, what it was fitted to; written to `model.json` and read back.
 
-use crate::{Design, EffectCatalogue, EffectError, EffectSpec, Fit, IdentificationError, ReferenceModel};
+use crate::{
+    Design, Effect, EffectCatalogue, EffectError, EffectSpec, Fit, IdentificationError, ReferenceModel,
+    check_size_of_robot,
+};
 use phiw_dynamics::{PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree};
+use phiw_limits::Limits;
 use phiw_regressor::BaseParameters;
 use phiw_regressor::factor::Factor;
 use serde::{Deserialize, Serialize};
@@ -239,6 +243,10 @@ impl Model {
             );
             return Err(IdentificationError::Model(message));
         }
+        let effects = self.effects.iter().map(|effect| catalogue.build(&effect.spec, tree));
+        let effects: Vec<Box<dyn Effect>> = effects.collect::<Result<_, _>>()?;
+        let of_effects = effects.iter().map(|effect| effect.as_ref());
+        check_size_of_robot(tree, of_effects, 1, &Limits::default())?;
         let base = BaseParameters::of_tree(tree, Default::default())?;
         if base.count() != self.base_parameters.len() {
             let message = format!(
@@ -248,10 +256,8 @@ impl Model {
             );
             return Err(IdentificationError::Model(message));
         }
-        let effects = self.effects.iter().map(|effect| catalogue.build(&effect.spec, tree));
         let reference = self.reference(tree, catalogue)?;
-        let design =
-            Design::new(tree.clone(), base, effects.collect::<Result<_, _>>()?).with_reference(reference);
+        let design = Design::new(tree.clone(), base, effects).with_reference(reference);
         let values =
             self.base_parameters.iter().chain(self.effects.iter().flat_map(|effect| &effect.parameters));
         let parameters: Vec<f64> = values.map(|parameter| parameter.value).collect();

@@ -7,8 +7,10 @@ use crate::session::{Session, declared};
 use phiw_curriculum::{CurriculumError, KnownEffect, RobotModel};
 use phiw_dynamics::Tree;
 use phiw_identification::{
-    Design, EffectCatalogue, EffectSpec, Fit, Identified, Model, Progress, fit, identify, merge, with_masses,
+    Design, EffectCatalogue, EffectSpec, Fit, IdentificationError, Identified, Model, Progress,
+    check_size_of_robot, fit, identify, merge, with_masses,
 };
+use phiw_limits::Limits;
 use phiw_regressor::factor::{Factor, FactorBuilder};
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_regressor::{BaseParameters, RegressorError};
@@ -240,7 +242,7 @@ impl Logs {
 }
 
 fn read_model(path: &std::path::Path) -> Result<Model, Error> {
-    let text = crate::input::read_text(path, phiw_limits::Limits::default().model_bytes)?;
+    let text = crate::input::read_text(path, Limits::default().model_bytes)?;
     let model: Model =
         serde_json::from_str(&text).map_err(|source| Error::NotAModel { path: path.to_owned(), source })?;
     model.check().map_err(|source| Error::Model { path: path.to_owned(), source: Box::new(source) })?;
@@ -255,6 +257,9 @@ fn unmeasured_design(arguments: &NextArguments, tree: &Tree, motions: &Motions) 
         let variants = catalogue.declare(&kind, tree, &motions.ranges)?;
         effects.extend(variants.into_iter().filter_map(|variants| variants.into_iter().next()));
     }
+    // The factors of a motion, and those of all that is known.
+    let of_effects = effects.iter().map(|effect| effect.as_ref());
+    check_size_of_robot(tree, of_effects, 2, &Limits::default()).map_err(IdentificationError::from)?;
     let base = BaseParameters::of_tree(tree, Default::default()).map_err(CurriculumError::from)?;
     Ok(Design::new(tree.clone(), base, effects))
 }
