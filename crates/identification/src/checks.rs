@@ -122,7 +122,7 @@ pub enum InputError {
     },
     /// Nothing moves in what is held out.
     #[error(
-        "{held_out}: no joint moves there, so nothing can be said of the model's error on motion held out; \
+        "{held_out}: no joint moves there for long enough, so nothing can be said of the model's error on motion held out; \
          name a log with motion (--validate), or cut the rest off the log"
     )]
     NothingHeldOut {
