@@ -27,7 +27,6 @@ pub enum Source {
     Urdf,
     /// A model.json.
     Model,
-
     /// The measured logs.
     Logs,
 }
