@@ -75,24 +75,20 @@ pub enum UrdfError {
         element: String,
     },
     /// An attribute that should hold numbers does not.
-    #[error(
-        "line {line}, {element}: {attribute}=\"{value}\" is not {expected}: correct it, as in <{tag} {attribute}=\"{example}\">"
-    )]
+    #[error("line {line}, {element}: {attribute}=\"{value}\" is not {expected}: correct it, as in {example}")]
     NotANumber {
         /// Where the attribute's element starts.
         line: u32,
         /// The link or joint, with its name.
         element: String,
-        /// The attribute's element.
-        tag: String,
         /// The attribute.
         attribute: &'static str,
         /// Its value.
         value: String,
         /// What it should be, such as `three numbers`.
         expected: &'static str,
-        /// How that is written.
-        example: &'static str,
+        /// How that is written, the element around it.
+        example: String,
     },
     /// Two links or two joints share a name.
     #[error("line {line}: two {kind}s are called `{name}`: rename one")]

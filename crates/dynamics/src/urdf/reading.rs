@@ -104,11 +104,10 @@ impl<'a, 'input> Part<'a, 'input> {
             None => Err(UrdfError::NotANumber {
                 line: line(self.node),
                 element: title(self.owner),
-                tag: self.node.tag_name().name().to_owned(),
                 attribute,
                 value: value.to_owned(),
                 expected,
-                example,
+                example: format!("<{} {attribute}=\"{example}\">", self.node.tag_name().name()),
             }),
         }
     }
