@@ -72,7 +72,7 @@ impl Default for TraceResidual {
         TraceResidual {
             options: TraceOptions {
                 most_effects: 3,
-                least_significance: 5.0,
+                false_name_probability: 0.01,
                 least_share: 0.01,
                 ..TraceOptions::default()
             },

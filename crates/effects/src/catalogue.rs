@@ -1,6 +1,6 @@
 //! The catalogue finds kinds of effects by name, declares them for a robot, and builds them from a model's file.
 
-use crate::{Constants, EffectKind, FittedEffect, SignalRanges};
+use crate::{Constants, EffectKind, FittedEffect, JointProperty, SignalRanges};
 use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Variants};
@@ -66,6 +66,11 @@ impl Catalogue {
             let nearest = known.iter().min_by_key(distance).filter(|other| distance(other) <= 5).cloned();
             EffectError::UnknownKind { kind: name.to_owned(), nearest, known }
         })
+    }
+
+    /// The property of a joint that expresses an effect, if its kind is known and has one.
+    pub fn joint_property(&self, spec: &EffectSpec) -> Option<JointProperty> {
+        self.kind(&spec.kind).ok()?.joint_property()
     }
 
     /// What an effect means, with its fitted values; a kind that is unknown here gets its name and numbers.

@@ -44,6 +44,9 @@ impl EffectKind for ThermalDrift {
     fn seen_against(&self) -> Signal {
         Signal::Time
     }
+    fn needs_session_time(&self) -> bool {
+        true
+    }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
         let time_constant = constant(constants, TIME_CONSTANT, 60.0);

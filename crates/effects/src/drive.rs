@@ -2,7 +2,7 @@
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, Signal};
+use crate::kind::{Constants, EffectKind, JointProperty, Signal};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, Needs, Sample};
 
@@ -25,6 +25,9 @@ impl EffectKind for RotorInertia {
     }
     fn seen_against(&self) -> Signal {
         Signal::Acceleration
+    }
+    fn joint_property(&self) -> Option<JointProperty> {
+        Some(JointProperty::Armature)
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];

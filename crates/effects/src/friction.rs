@@ -2,7 +2,9 @@
 
 use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, product, values};
+use crate::kind::{
+    Constants, EffectKind, JointProperty, Signal, SignalRanges, around, constant, product, values,
+};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, Needs, Sample};
 
@@ -26,12 +28,14 @@ fn width_of(constants: &Constants) -> f64 {
     constant(constants, WIDTH, 0.0)
 }
 
+const VISCOUS: &str = "viscous_friction";
+
 /// fv·q̇.
 pub struct Viscous;
 
 impl EffectKind for Viscous {
     fn name(&self) -> &str {
-        "viscous_friction"
+        VISCOUS
     }
     fn may_change(&self) -> bool {
         true
@@ -41,6 +45,9 @@ impl EffectKind for Viscous {
     }
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         format!("{} has viscous friction of {}.", found.joints(), found.quantity(0))
+    }
+    fn joint_property(&self) -> Option<JointProperty> {
+        Some(JointProperty::Damping)
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
@@ -71,6 +78,15 @@ impl EffectKind for Coulomb {
     }
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         format!("{} has Coulomb friction of {}.", found.joints(), found.quantity(0))
+    }
+    fn joint_property(&self) -> Option<JointProperty> {
+        Some(JointProperty::Friction)
+    }
+    fn goes_with(&self) -> &'static [&'static str] {
+        &[VISCOUS]
+    }
+    fn constants_of_the_site(&self) -> &'static [&'static str] {
+        &[WIDTH]
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));

@@ -24,6 +24,17 @@ pub enum Signal {
     Time,
 }
 
+/// A property of a joint by which simulators express an effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointProperty {
+    /// Torque against the velocity, over it \[N·m·s/rad, N·s/m\]; `damping` of a URDF.
+    Damping,
+    /// Torque against the direction of motion \[N·m, N\]; `friction` of a URDF.
+    Friction,
+    /// Inertia that the joint's own motion alone feels \[kg·m², kg\]; a URDF has no place for it.
+    Armature,
+}
+
 /// A kind of effect: where it can act, which constants to try, and how to build it.
 ///
 /// Implement it for an effect of your own and add it with [`crate::Catalogue::with`].
@@ -82,6 +93,26 @@ pub trait EffectKind: Send + Sync {
     /// The signal that its torque is best seen against.
     fn seen_against(&self) -> Signal {
         Signal::Velocity
+    }
+
+    /// Names of kinds that are tried together with it on one site as well: either alone mimics the other in part.
+    fn goes_with(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// Names of its constants that belong to the joint rather than to the effect: where it is in a model, other kinds on the same site take the values that it has.
+    fn constants_of_the_site(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// The property of a joint that holds its only parameter, in a URDF or a simulator; none if neither can express it.
+    fn joint_property(&self) -> Option<JointProperty> {
+        None
+    }
+
+    /// Whether it changes with the time since the session began, so that logs whose clocks each begin anew cannot tell it.
+    fn needs_session_time(&self) -> bool {
+        false
     }
 
     /// Builds it. `site` is one that it accepts; constants that are missing take their defaults.

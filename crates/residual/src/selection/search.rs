@@ -222,7 +222,7 @@ impl<'a> Search<'a> {
                 join(vec![of(screened).kind], screened.gain, &[screened.member]);
             }
         }
-        for (gain, pair) in self.pairs(screened) {
+        for (gain, pair) in self.pairs(&self.model.fit, screened) {
             moves.push((worth(&pair, gain), pair.to_vec()));
             let kinds = pair.map(|member| self.problem.hypotheses[member.hypothesis].kind);
             join(kinds.to_vec(), gain, &pair);
@@ -240,7 +240,7 @@ impl<'a> Search<'a> {
     }
 
     /// On each torque the best pair of each two kinds among the best few hypotheses, where the two say more than either.
-    fn pairs(&self, screened: &[Screened]) -> Vec<(f64, [Member; 2])> {
+    fn pairs(&self, fit: &Fit, screened: &[Screened]) -> Vec<(f64, [Member; 2])> {
         let of_torque = |torque: usize| -> Vec<(f64, [Member; 2])> {
             let hypothesis = |screened: &&Screened| &self.problem.hypotheses[screened.member.hypothesis];
             let own = screened.iter().filter(|screened| {
@@ -255,8 +255,8 @@ impl<'a> Search<'a> {
                         .iter()
                         .flat_map(|&member| self.problem.variant(member).parameters.iter().copied())
                         .collect();
-                    let beside = Beside::new(self.problem, &self.model.fit, &parameters, &[torque]);
-                    let (squares, values) = beside.solve(&self.model.fit);
+                    let beside = Beside::new(self.problem, fit, &parameters, &[torque]);
+                    let (squares, values) = beside.solve(fit);
                     let bounds = members.iter().flat_map(|&member| &self.problem.variant(member).bounds);
                     let within = values
                         .iter()
@@ -325,7 +325,7 @@ impl<'a> Search<'a> {
     }
 
     /// Models with something else in the place of a member, best first.
-    fn in_place_of(&self, place: usize) -> Vec<(Model, Member)> {
+    fn in_place_of(&self, place: usize) -> Vec<(Model, Vec<Member>)> {
         let member = self.model.members[place];
         let own = &self.problem.hypotheses[member.hypothesis];
         if own.declared && own.variants.len() == 1 {
@@ -346,17 +346,24 @@ impl<'a> Search<'a> {
             open.push(member.hypothesis);
         }
         let screened = screen(self.problem, &without, &self.rows, &open);
-        let mut models: Vec<(Model, Member)> = screened
+        let mut pairs = match own.declared {
+            true => Vec::new(),
+            false => self.pairs(&without, &screened),
+        };
+        pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let singles = screened.iter().map(|screened| vec![screened.member]).filter(|single| *single != [member]);
+        let singles = singles.take(self.policy.finalists / 2);
+        let pairs = pairs.iter().map(|(_, pair)| pair.to_vec()).take(self.policy.finalists / 2);
+        let moves: Vec<Vec<Member>> = singles.chain(pairs).collect();
+        let mut models: Vec<(Model, Vec<Member>)> = moves
             .into_par_iter()
-            .take(self.policy.finalists / 2)
-            .filter(|screened| screened.member != member)
-            .map(|screened| {
+            .map(|entering| {
                 let mut members = self.model.members.clone();
-                members[place] = screened.member;
-                (self.evaluate(members, &self.model.fit), screened.member)
+                members.splice(place..=place, entering.iter().copied());
+                (self.evaluate(members, &self.model.fit), entering)
             })
             .collect();
-        models.retain(|(model, _)| model.members.len() >= self.model.members.len());
+        models.retain(|(model, entering)| entering.iter().all(|member| model.members.contains(member)));
         models.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
         models
     }
@@ -383,9 +390,14 @@ impl<'a> Search<'a> {
         let alternatives = (0..self.model.members.len())
             .map(|place| {
                 let models = self.in_place_of(place).into_iter();
+                let own = self.model.members[place].hypothesis;
                 models
-                    .filter(|(_, member)| member.hypothesis != self.model.members[place].hypothesis)
-                    .map(|(model, member)| Alternative { member, excess: model.value - self.model.value })
+                    .filter_map(|(model, entering)| match entering.as_slice() {
+                        [member] if member.hypothesis != own => {
+                            Some(Alternative { member: *member, excess: model.value - self.model.value })
+                        }
+                        _ => None,
+                    })
                     .collect()
             })
             .collect();

@@ -3,7 +3,7 @@
 use super::input::TraceOptions;
 use super::stage::Fixed;
 use crate::selection::Member;
-use phiw_effects::{Constants, EffectKind, SignalRanges};
+use phiw_effects::{Catalogue, Constants, EffectKind, SignalRanges};
 use phiw_identification::{Effect, EffectSpec, IdentificationError};
 
 /// A kind on a site, with the constants to choose from.
@@ -77,7 +77,7 @@ impl Candidates {
                 if options.excluded.iter().any(is_this) {
                     continue;
                 }
-                let constants = scan(kind, &site, ranges, present.specs, &joints);
+                let constants = scan(fixed.catalogue, kind, &site, ranges, present.specs, &joints);
                 let place = present.specs.iter().position(is_this);
                 let changed = held && kind.may_change() && place.is_some_and(|place| place < present.declared);
                 match place.filter(|_| !changed) {
@@ -160,26 +160,30 @@ impl Candidates {
     }
 }
 
-/// Constants to try. One that an effect of the model on the same joints has too, one without further constants, is as it is there: the width of a sign is the
-/// joint's, whatever the sign is part of.
+/// Constants to try; those that belong to the joint are what another effect of the model says of it.
 fn scan(
+    catalogue: &Catalogue,
     kind: &dyn EffectKind,
     site: &[usize],
     ranges: &SignalRanges,
     present: &[EffectSpec],
     joints: &[String],
 ) -> Vec<Constants> {
-    let known = present.iter().find_map(|spec| {
-        let constant = spec.constants.iter().next().filter(|_| spec.constants.len() == 1)?;
-        (spec.joints == joints && spec.kind != kind.name()).then_some(constant)
-    });
-    let scanned = kind.scan(site, ranges);
-    let Some((name, value)) = known else { return scanned };
+    let mut known = Constants::new();
+    for other in catalogue.kinds().filter(|other| other.name() != kind.name()) {
+        let spec = present.iter().find(|spec| spec.kind == other.name() && spec.joints == joints);
+        let Some(spec) = spec else { continue };
+        let constants =
+            spec.constants.iter().filter(|(name, _)| other.constants_of_the_site().contains(&name.as_str()));
+        known.extend(constants.map(|(name, value)| (name.clone(), *value)));
+    }
+    if known.is_empty() {
+        return kind.scan(site, ranges);
+    }
     let mut unique: Vec<Constants> = Vec::new();
-    for mut constants in scanned {
-        // What the kind is about is not settled by another.
-        if constants.len() > 1 && constants.contains_key(name) {
-            constants.insert(name.clone(), *value);
+    for mut constants in kind.scan(site, ranges) {
+        for (name, value) in &mut constants {
+            *value = known.get(name).copied().unwrap_or(*value);
         }
         if !unique.contains(&constants) {
             unique.push(constants);

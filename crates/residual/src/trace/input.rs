@@ -18,6 +18,8 @@ pub struct TraceOptions {
     pub false_refinement_probability: f64,
     /// Share of a torque's residual variance on motion held out that an effect on it must take away to have a name.
     pub least_share: f64,
+    /// The same for an effect whose torque follows the same signal of the same joint as a simpler one of the model.
+    pub least_share_of_kin: f64,
     /// Share of what the other effects took from the same torque that it must take: the form of an effect is never quite the catalogue's, and
     /// what mends it is no effect of its own.
     pub least_of_others: f64,
@@ -40,6 +42,7 @@ impl Default for TraceOptions {
             false_name_probability: 0.01,
             false_refinement_probability: 0.01,
             least_share: 0.2,
+            least_share_of_kin: 0.6,
             least_of_others: 0.025,
             least_size: 0.01,
             floor_margin: 1.15,

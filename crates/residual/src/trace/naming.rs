@@ -86,8 +86,7 @@ impl Search<'_> {
 
     fn judge(&self, trial: &Trial) -> Result<Vec<Judged>, IdentificationError> {
         let limit = self.options.false_name_probability / self.chosen.hypotheses.max(1) as f64;
-        let nothing = trial.fit_with(|place| place < self.declared);
-        let initial = trial.held_out_squares(&nothing);
+        let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
         let with = trial.held_out_squares(&trial.fit);
         let mut judged = Vec::new();
         for (index, &member) in trial.members.iter().enumerate() {
@@ -101,7 +100,23 @@ impl Search<'_> {
             let gain: f64 = (0..with.len())
                 .map(|torque| trial.held_out[torque].rows() * (without[torque] / with[torque]).ln())
                 .sum();
-            let material = self.is_material(trial, member, &initial, &without, &with);
+            // Whether it has a name is asked beside what is simpler: its kin of less simple a kind polish it.
+            let later = self.kin_of(place, |own, other| other > own)?;
+            let has_simpler = !self.kin_of(place, |own, other| other < own)?.is_empty();
+            let [with, without] = match later.is_empty() {
+                true => [with.clone(), without],
+                false => {
+                    let fit = |left_out: &[usize]| trial.fit_with(|other| !left_out.contains(&other));
+                    let both = [later.as_slice(), &[place]].concat();
+                    [trial.held_out_squares(&fit(&later)), trial.held_out_squares(&fit(&both))]
+                }
+            };
+            let textbook = self.fixed.catalogue.kind(&self.specs[place].kind)?.joint_property().is_some();
+            let share = match has_simpler && !textbook {
+                true => self.options.least_share_of_kin,
+                false => self.options.least_share,
+            };
+            let material = self.is_material(trial, member, share, [&initial, &without, &with]);
             judged.push(Judged {
                 place,
                 significance: certainty.significance,
@@ -113,6 +128,28 @@ impl Search<'_> {
         Ok(judged)
     }
 
+    /// Places of effects of the model that follow the same signal of the same joint as the one at `place`, and whose kind's place in the catalogue `stands` so to its own.
+    fn kin_of(
+        &self,
+        place: usize,
+        stands: impl Fn(usize, usize) -> bool,
+    ) -> Result<Vec<usize>, IdentificationError> {
+        let catalogue = self.fixed.catalogue;
+        let rank = |spec: &EffectSpec| catalogue.kinds().position(|kind| kind.name() == spec.kind);
+        let own = &self.specs[place];
+        let signal = catalogue.kind(&own.kind)?.seen_against();
+        let mut kin = Vec::new();
+        for (other, spec) in self.specs.iter().enumerate() {
+            if spec.joints == own.joints
+                && catalogue.kind(&spec.kind)?.seen_against() == signal
+                && stands(rank(own).unwrap_or_default(), rank(spec).unwrap_or_default())
+            {
+                kin.push(other);
+            }
+        }
+        Ok(kin)
+    }
+
     /// Whether what an effect takes away on motion held out is worth a name.
     ///
     /// It must take away a share of the residual of a torque that it acts on, and be a share of that torque. Where the other parameters have taken up most of it,
@@ -121,9 +158,8 @@ impl Search<'_> {
         &self,
         trial: &Trial,
         member: Member,
-        initial: &[f64],
-        without: &[f64],
-        with: &[f64],
+        least_share: f64,
+        [initial, without, with]: [&[f64]; 3],
     ) -> bool {
         let options = self.options;
         let hypothesis = &trial.problem.hypotheses[member.hypothesis];
@@ -143,12 +179,12 @@ impl Search<'_> {
             largest_share = largest_share.max(share);
             let by_others = (initial[torque] - before).max(0.0);
             seen |= hypothesis.torques.contains(&torque)
-                && share >= options.least_share
+                && share >= least_share
                 && taken >= options.least_of_others * by_others
                 && (taken / whole).sqrt() >= options.least_size;
             size = size.max((held_out.size_of(&trial.values_of(member, torque)) / whole).sqrt());
         }
-        seen || largest_share >= options.least_share && size >= ABSORBED_SIZE * options.least_size
+        seen || largest_share >= least_share && size >= ABSORBED_SIZE * options.least_size
     }
 
     /// Puts the effects into the order in which they count, and says what each has explained.
