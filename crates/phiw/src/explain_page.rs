@@ -119,7 +119,7 @@ fn signal_in_words(signal: &str) -> String {
 
 /// Place of a found effect among those of the model.
 fn place(tracing: &Tracing, index: usize) -> usize {
-    tracing.specs.len() - tracing.effects.len() + index
+    tracing.specs.len() - tracing.effects.len() - tracing.refinements.len() + index
 }
 
 fn sentence_of(analysis: &Analysis<'_>, tracing: &Tracing, index: usize) -> String {

@@ -134,8 +134,9 @@ impl<'a> Search<'a> {
         self.problem.hypotheses[member.hypothesis].declared
     }
 
-    /// A model fitted; members that break their bounds, or say nothing, are left out.
+    /// A model fitted, with what its members require; members that break their bounds, or say nothing, are left out.
     fn evaluate(&self, mut members: Vec<Member>, start: &Fit) -> Model {
+        self.add_required(&mut members);
         loop {
             let fit = Fit::new(self.problem, self.problem.active(&members), &self.rows, Some(start));
             let stays = |member: &Member| self.is_declared(member) || self.is_within_bounds(&fit, member);
@@ -144,6 +145,28 @@ impl<'a> Search<'a> {
                 return Model { members, fit, value };
             }
             members.retain(stays);
+        }
+    }
+
+    /// Whether another member requires it: then it stays as long as that does.
+    fn is_required(&self, member: &Member) -> bool {
+        self.model.members.iter().any(|other| {
+            let other = &self.problem.hypotheses[other.hypothesis];
+            !other.declared && other.requires.contains(&member.hypothesis)
+        })
+    }
+
+    fn add_required(&self, members: &mut Vec<Member>) {
+        let mut place = 0;
+        while place < members.len() {
+            let hypothesis = &self.problem.hypotheses[members[place].hypothesis];
+            for &required in hypothesis.requires.iter().filter(|_| !hypothesis.declared) {
+                if members.iter().all(|member| member.hypothesis != required) {
+                    let variant = self.problem.hypotheses[required].variants.len() / 2;
+                    members.push(Member { hypothesis: required, variant });
+                }
+            }
+            place += 1;
         }
     }
 
@@ -289,7 +312,8 @@ impl<'a> Search<'a> {
             }
         }
         let families = kinds.into_values().filter(|members| members.len() > 1);
-        let moves: Vec<Vec<Member>> = removable.iter().map(|member| vec![*member]).chain(families).collect();
+        let singles = removable.iter().filter(|member| !self.is_required(member)).map(|member| vec![*member]);
+        let moves: Vec<Vec<Member>> = singles.chain(families).collect();
         let models: Vec<Model> = moves
             .into_par_iter()
             .map(|removed| {
@@ -299,7 +323,7 @@ impl<'a> Search<'a> {
             })
             .collect();
         match models.into_iter().min_by(|a, b| a.value.total_cmp(&b.value)) {
-            Some(best) if best.value <= self.model.value => {
+            Some(best) if best.value <= self.model.value && best.members != self.model.members => {
                 self.accept(best);
                 true
             }
@@ -371,7 +395,8 @@ impl<'a> Search<'a> {
     /// Leaves out what is not sure, the least sure first.
     fn doubt(&mut self) {
         loop {
-            let tails = self.model.members.par_iter().enumerate().filter(|(_, member)| !self.is_declared(member));
+            let tails = self.model.members.par_iter().enumerate();
+            let tails = tails.filter(|(_, member)| !self.is_declared(member) && !self.is_required(member));
             let worst = tails
                 .map(|(place, member)| (certainty(self.problem, &self.model.fit, *member).tail, place))
                 .max_by(|a, b| a.0.total_cmp(&b.0));

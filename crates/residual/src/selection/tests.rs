@@ -44,6 +44,7 @@ fn problem(random: &mut RandomNumbers, torques: usize, kinds: usize, truth: &[(u
                 familiar: true,
                 torques: vec![torque],
                 variants: vec![variant],
+                requires: Vec::new(),
                 made_of_model: false,
                 declared: false,
             });

@@ -7,6 +7,7 @@ use super::tracing::{FoundEffect, RivalEffect};
 use crate::selection::{Fit, Member, Problem, Products, certainty};
 use phiw_identification::{EffectSpec, IdentificationError};
 use phiw_regressor::least_squares::GroupedFactor;
+use std::collections::BTreeMap;
 
 /// A rival that is less probable is none.
 pub const LEAST_RIVAL: f64 = 0.05;
@@ -193,7 +194,19 @@ impl Search<'_> {
         trial: &Trial,
         mut judged: Vec<Judged>,
     ) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
-        judged.sort_by(|a, b| b.named.cmp(&a.named).then(b.gain.total_cmp(&a.gain)));
+        // A kind on each of several joints is one family, which stands together.
+        let family = |judged: &Judged| -> (bool, String, Vec<String>) {
+            let spec = &self.specs[judged.place];
+            let joints = if spec.joints.len() > 1 { spec.joints.clone() } else { Vec::new() };
+            (judged.named, spec.kind.clone(), joints)
+        };
+        let mut gains: BTreeMap<(bool, String, Vec<String>), f64> = BTreeMap::new();
+        judged.iter().for_each(|judged| *gains.entry(family(judged)).or_default() += judged.gain);
+        judged.sort_by(|a, b| {
+            let (of_a, of_b) = (family(a), family(b));
+            let by_family = b.named.cmp(&a.named).then(gains[&of_b].total_cmp(&gains[&of_a]));
+            by_family.then(of_a.cmp(&of_b)).then(a.place.cmp(&b.place))
+        });
         let named = judged.iter().filter(|judged| judged.named).count();
         let declared = self.declared;
         let mut found: Vec<FoundEffect> = Vec::new();

@@ -168,6 +168,7 @@ impl<'a> Fixed<'a> {
                 torques,
                 variants,
                 declared: candidate.declared,
+                requires: self.required(candidates, candidate)?,
                 made_of_model,
             });
         }
@@ -188,6 +189,31 @@ impl<'a> Fixed<'a> {
             absent,
             rows_per_independent: self.rows_per_independent,
         })
+    }
+
+    /// Candidates that a URDF has a place for, on the same joint and followed by the same signal: of these another is a form. Nothing where the model is held: they
+    /// are in what is held.
+    fn required(
+        &self,
+        candidates: &Candidates,
+        candidate: &super::hypotheses::Candidate,
+    ) -> Result<Vec<usize>, IdentificationError> {
+        let spec = &candidate.specs[0];
+        let own = self.catalogue.kind(&spec.kind)?;
+        if self.prior.is_some() || own.joint_property().is_some() || !candidate.familiar {
+            return Ok(Vec::new());
+        }
+        let mut required = Vec::new();
+        for (place, other) in candidates.list.iter().enumerate() {
+            let kind = self.catalogue.kind(&other.specs[0].kind)?;
+            if other.specs[0].joints == spec.joints
+                && kind.joint_property().is_some()
+                && kind.seen_against() == own.seen_against()
+            {
+                required.push(place);
+            }
+        }
+        Ok(required)
     }
 
     fn leave_out_what_is_not_finite(&self, stage: &Stage, candidates: &mut Candidates) {
