@@ -31,16 +31,11 @@ fn design_effect(problem: &Problem, fit: &Fit, torque: usize) -> f64 {
     if folds < LEAST_FOLDS {
         return 1.0;
     }
-    let values = fit.columns(problem, torque);
+    let values = fit.columns(torque);
     let variance = fit.rss[torque] / rows.whole.rows().max(1.0);
     // The scores of the model's own columns, fold by fold: what a column beside them shares with them goes out.
-    let active: Vec<(usize, usize)> = rows
-        .parameters
-        .iter()
-        .enumerate()
-        .filter_map(|(column, &parameter)| fit.place[parameter].map(|place| (column, place)))
-        .filter(|&(_, place)| fit.heard[place])
-        .collect();
+    let active: Vec<(usize, usize)> =
+        fit.own[torque].iter().filter(|(_, place)| fit.heard[*place]).copied().collect();
     let of_model: Vec<Vec<f64>> = rows
         .folds
         .iter()

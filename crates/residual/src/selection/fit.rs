@@ -1,6 +1,6 @@
 //! A weighted fit of some parameters, from products.
 
-use super::problem::Problem;
+use super::problem::{Problem, Torque};
 
 /// A column of the model with less than this share of its squared norm left beside those before it is undetermined.
 const DEPENDENT: f64 = 1e-10;
@@ -18,6 +18,10 @@ pub(crate) struct Fit {
     pub active: Vec<usize>,
     /// For each parameter its place in `active`.
     pub place: Vec<Option<usize>>,
+    /// For each torque (column, place) of the active parameters that act on it.
+    pub own: Vec<Vec<(usize, usize)>>,
+    /// For each torque (column, value) of the absent ones whose absence is a value.
+    absent: Vec<Vec<(usize, f64)>>,
     /// Whether the rows determine it beside those before it.
     pub heard: Vec<bool>,
     /// L of the system's Cholesky factor, row-major.
@@ -40,7 +44,21 @@ impl Fit {
         let mut place = vec![None; problem.parameters];
         active.iter().enumerate().for_each(|(at, &parameter)| place[parameter] = Some(at));
         let all_rows: f64 = problem.torques.iter().map(|torque| torque.whole.rows()).sum();
+        let of_torque = |rows: &Torque| -> Vec<(usize, usize)> {
+            let places = rows.parameters.iter().enumerate();
+            places.filter_map(|(column, &parameter)| Some((column, place[parameter]?))).collect()
+        };
+        let absent_of = |rows: &Torque| -> Vec<(usize, f64)> {
+            let parameters = rows.parameters.iter().enumerate();
+            let absent = parameters.filter(|&(_, &parameter)| place[parameter].is_none());
+            absent
+                .map(|(column, &parameter)| (column, problem.absent[parameter]))
+                .filter(|(_, value)| *value != 0.0)
+                .collect()
+        };
         let mut fit = Fit {
+            own: problem.torques.iter().map(of_torque).collect(),
+            absent: problem.torques.iter().map(absent_of).collect(),
             heard: vec![true; active.len()],
             active,
             place,
@@ -68,14 +86,14 @@ impl Fit {
     }
 
     /// (column, value) of all parameters with a value in a torque.
-    pub fn columns(&self, problem: &Problem, torque: usize) -> Vec<(usize, f64)> {
-        let parameters = problem.torques[torque].parameters.iter().enumerate();
-        let valued = parameters.map(|(column, &parameter)| (column, self.values[parameter]));
-        valued.filter(|(_, value)| *value != 0.0).collect()
+    pub fn columns(&self, torque: usize) -> Vec<(usize, f64)> {
+        let fitted = self.own[torque].iter().map(|&(column, place)| (column, self.values[self.active[place]]));
+        let valued = fitted.filter(|(_, value)| *value != 0.0);
+        valued.chain(self.absent[torque].iter().copied()).collect()
     }
 
     fn residual(&self, problem: &Problem, torque: usize) -> f64 {
-        problem.torques[torque].whole.residual(&self.columns(problem, torque))
+        problem.torques[torque].whole.residual(&self.columns(torque))
     }
 
     /// Products of a parameter's columns with those of the active ones, and with the right-hand side less what is absent.
@@ -89,15 +107,9 @@ impl Fit {
             let products = rows.whole.column(column);
             own += weight * products[column];
             right += weight * products[rows.parameters.len()];
-            for (product, &other) in products.iter().zip(&rows.parameters) {
-                match self.place[other] {
-                    Some(at) => out[at] += weight * product,
-                    None if problem.absent[other] != 0.0 && other != parameter => {
-                        right -= weight * product * problem.absent[other];
-                    }
-                    None => {}
-                }
-            }
+            self.own[torque].iter().for_each(|&(other, place)| out[place] += weight * products[other]);
+            let absent = self.absent[torque].iter().filter(|(other, _)| *other != column);
+            right -= weight * absent.map(|&(other, value)| products[other] * value).sum::<f64>();
         }
         (own, right)
     }
@@ -106,11 +118,16 @@ impl Fit {
         let size = self.active.len();
         let mut system = vec![0.0; size * size];
         let mut right = vec![0.0; size];
-        let torques: Vec<usize> = (0..problem.torques.len()).collect();
-        for at in 0..size {
-            let row = &mut system[at * size..(at + 1) * size];
-            let (_, value) = self.products(problem, self.active[at], &torques, row);
-            right[at] = value;
+        for (torque, rows) in problem.torques.iter().enumerate() {
+            let weight = self.weights[torque];
+            for &(column, place) in &self.own[torque] {
+                let products = rows.whole.column(column);
+                let row = &mut system[place * size..(place + 1) * size];
+                self.own[torque].iter().for_each(|&(other, at)| row[at] += weight * products[other]);
+                let absent: f64 =
+                    self.absent[torque].iter().map(|&(other, value)| products[other] * value).sum();
+                right[place] += weight * (products[rows.parameters.len()] - absent);
+            }
         }
         if let Some(prior) = &problem.prior {
             let last = prior.parameters.len();

@@ -42,6 +42,8 @@ pub(crate) struct Variant {
 pub(crate) struct Hypothesis {
     /// Its kind, which makes it one of a family with those of the same number. Of two that explain alike, the smaller number is the simpler.
     pub kind: usize,
+    /// Whether it is one of the forms that others are forms of: these enter first.
+    pub textbook: bool,
     /// Whether its kind acts on each of several joints by itself, so that "on all joints" is one choice.
     pub familiar: bool,
     /// Torques that it acts on.

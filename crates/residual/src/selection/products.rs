@@ -20,10 +20,12 @@ impl Products {
         Products { size, values: vec![0.0; size * size], rows: 0.0 }
     }
 
-    /// RᵀR.
+    /// RᵀR. The factor of few rows has as few that are not zero.
     pub fn of_factor(factor: &Factor) -> Self {
         let size = factor.columns();
-        let product = factor.as_mat().transpose() * factor.as_mat();
+        let rows = usize::try_from(factor.rows()).map_or(size, |rows| rows.min(size));
+        let r = factor.as_mat().subrows(0, rows);
+        let product = r.transpose() * r;
         let values = (0..size).flat_map(|column| product.col_as_slice(column).to_vec()).collect();
         Products { size, values, rows: factor.rows() as f64 }
     }

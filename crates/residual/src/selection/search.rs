@@ -1,11 +1,11 @@
 //! Forward to the end, then prune, then swap, until nothing is better.
 
-use super::criterion::{choices, criterion, price};
+use super::criterion::{choice, choices, criterion, price};
 use super::design_effect::effective_rows;
 use super::fit::Fit;
 use super::problem::{Member, Problem};
 use super::screening::{Beside, Screened, gain_of, screen, silent};
-use super::wald::certainty;
+use super::wald::{certainty, squares_of};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -70,6 +70,10 @@ const SWEEPS: usize = 4;
 const ROUNDS: usize = 6;
 /// The criterion must fall by this much for a step: less is rounding.
 const LEAST_STEP: f64 = 1e-3;
+/// Squared standard deviations beyond its bounds up to which a member that is required may be there by chance.
+const BY_CHANCE: f64 = 9.0;
+/// By how much, and by which share, a hypothesis may gain less than the member whose place it would take, to first order, and still be fitted in full.
+const NEAR: (f64, f64) = (20.0, 0.03);
 /// Hypotheses of a torque whose pairs are looked at.
 const PAIRED: usize = 6;
 
@@ -109,14 +113,26 @@ impl<'a> Search<'a> {
         }
     }
 
+    fn say(&self, what: &str) {
+        if std::env::var("SAY").is_ok() {
+            let names: Vec<String> = self.model.members.iter().map(|m| { let h=&self.problem.hypotheses[m.hypothesis]; format!("{}{}@{:?}v{}", if h.declared {"!"} else {""}, h.kind/2, h.torques, m.variant)}).collect();
+            eprintln!("{what} J {:.1} n_e {:.0?} {}", self.model.value, self.rows, names.join(" "));
+        }
+    }
+
     fn run(&mut self) {
         for _ in 0..ROUNDS {
             let before = self.model.members.clone();
-            while self.forward() {}
-            while self.prune() {}
+            self.say("start");
+            // What the textbook has first, or a form of it takes its place.
+            while self.forward(true) {self.say("textbook");}
+            while self.forward(false) {self.say("forward");}
+            while self.prune() {self.say("prune");}
             self.sweep();
-            while self.prune() {}
+            self.say("swapped");
+            while self.prune() {self.say("prune");}
             self.doubt();
+            self.say("doubted");
             if self.model.members == before {
                 break;
             }
@@ -136,7 +152,7 @@ impl<'a> Search<'a> {
 
     /// A model fitted, with what its members require; members that break their bounds, or say nothing, are left out.
     fn evaluate(&self, mut members: Vec<Member>, start: &Fit) -> Model {
-        self.add_required(&mut members);
+        self.add_required(&mut members, start);
         loop {
             let fit = Fit::new(self.problem, self.problem.active(&members), &self.rows, Some(start));
             let stays = |member: &Member| self.is_declared(member) || self.is_within_bounds(&fit, member);
@@ -144,26 +160,52 @@ impl<'a> Search<'a> {
                 let value = criterion(self.problem, &members, &fit, &self.rows);
                 return Model { members, fit, value };
             }
-            members.retain(stays);
+            members = self.without_what_breaks(&fit, members);
         }
     }
 
-    /// Whether another member requires it: then it stays as long as that does.
+    /// Without the members that break their bounds. Where a required one does, and not by chance, what requires it goes: it would be the form of something that
+    /// cannot be.
+    fn without_what_breaks(&self, fit: &Fit, mut members: Vec<Member>) -> Vec<Member> {
+        let breaks =
+            |member: &Member| !self.is_declared(member) && !self.is_within_bounds(fit, member);
+        let broken: Vec<Member> = members.iter().filter(|member| breaks(member)).copied().collect();
+        for member in &broken {
+            let dependant = |other: &Member| {
+                let other = &self.problem.hypotheses[other.hypothesis];
+                !other.declared && other.requires.contains(&member.hypothesis)
+            };
+            let squares = squares_of(self.problem, fit, *member);
+            if squares > BY_CHANCE && members.iter().any(dependant) {
+                members.retain(|other| !dependant(other));
+                return members;
+            }
+        }
+        members.retain(|member| !broken.contains(member));
+        members
+    }
+
+    /// Whether another member requires it, or is made of it: then it stays as long as that does.
     fn is_required(&self, member: &Member) -> bool {
-        self.model.members.iter().any(|other| {
+        let own = &self.problem.hypotheses[member.hypothesis];
+        self.model.members.iter().filter(|other| *other != member).any(|other| {
             let other = &self.problem.hypotheses[other.hypothesis];
-            !other.declared && other.requires.contains(&member.hypothesis)
+            let made_of_it = other.made_of_model && own.torques.iter().any(|torque| other.torques.contains(torque));
+            made_of_it || !other.declared && other.requires.contains(&member.hypothesis)
         })
     }
 
-    fn add_required(&self, members: &mut Vec<Member>) {
+    fn add_required(&self, members: &mut Vec<Member>, start: &Fit) {
         let mut place = 0;
         while place < members.len() {
             let hypothesis = &self.problem.hypotheses[members[place].hypothesis];
             for &required in hypothesis.requires.iter().filter(|_| !hypothesis.declared) {
                 if members.iter().all(|member| member.hypothesis != required) {
-                    let variant = self.problem.hypotheses[required].variants.len() / 2;
-                    members.push(Member { hypothesis: required, variant });
+                    // The variant that says most now; in the middle where none says anything.
+                    let says = screen(self.problem, start, &self.rows, &[required]);
+                    let middle = self.problem.hypotheses[required].variants.len() / 2;
+                    let middle = Member { hypothesis: required, variant: middle };
+                    members.push(says.first().map_or(middle, |screened| screened.member));
                 }
             }
             place += 1;
@@ -197,11 +239,13 @@ impl<'a> Search<'a> {
     }
 
     /// Takes the best of all models that have more in them, if it is better.
-    fn forward(&mut self) -> bool {
+    fn forward(&mut self, textbook: bool) -> bool {
         if self.model.members.len() >= self.policy.most_members {
             return false;
         }
-        let screened = screen(self.problem, &self.model.fit, &self.rows, &self.open());
+        let mut open = self.open();
+        open.retain(|&hypothesis| !textbook || self.problem.hypotheses[hypothesis].textbook);
+        let screened = screen(self.problem, &self.model.fit, &self.rows, &open);
         let moves = self.moves(&screened);
         let models: Vec<Model> = moves
             .into_par_iter()
@@ -312,8 +356,21 @@ impl<'a> Search<'a> {
             }
         }
         let families = kinds.into_values().filter(|members| members.len() > 1);
-        let singles = removable.iter().filter(|member| !self.is_required(member)).map(|member| vec![*member]);
-        let moves: Vec<Vec<Member>> = singles.chain(families).collect();
+        let loss = |member: &Member| {
+            let hypothesis = &self.problem.hypotheses[member.hypothesis];
+            let rows: f64 = hypothesis.torques.iter().map(|&torque| self.rows[torque]).sum();
+            let squares = squares_of(self.problem, &self.model.fit, *member);
+            rows * (squares / rows).ln_1p() - price(self.problem, *member, Some(&self.model.fit), &self.rows)
+        };
+        let mut singles: Vec<(f64, Member)> = removable
+            .par_iter()
+            .filter(|member| !self.is_required(member))
+            .map(|member| (loss(member), *member))
+            .collect();
+        singles.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let worst = 2.0 * choice(self.problem) + NEAR.0;
+        let singles = singles.into_iter().take_while(|(loss, _)| *loss < worst).take(self.policy.finalists / 2);
+        let moves: Vec<Vec<Member>> = singles.map(|(_, member)| vec![member]).chain(families).collect();
         let models: Vec<Model> = moves
             .into_par_iter()
             .map(|removed| {
@@ -366,18 +423,20 @@ impl<'a> Search<'a> {
             let other = &self.problem.hypotheses[other];
             !other.made_of_model && other.torques.iter().any(|torque| own.torques.contains(torque))
         });
-        if own.variants.len() > 1 {
-            open.push(member.hypothesis);
-        }
-        let screened = screen(self.problem, &without, &self.rows, &open);
+        open.push(member.hypothesis);
+        let mut screened = screen(self.problem, &without, &self.rows, &open);
+        let own_gain = screened.iter().find(|screened| screened.member.hypothesis == member.hypothesis);
+        let least = own_gain.map_or(0.0, |own| own.gain * (1.0 - NEAR.1) - NEAR.0);
         let mut pairs = match own.declared {
             true => Vec::new(),
             false => self.pairs(&without, &screened),
         };
+        screened.retain(|screened| screened.gain >= least);
+        pairs.retain(|(gain, _)| *gain >= least);
         pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
         let singles = screened.iter().map(|screened| vec![screened.member]).filter(|single| *single != [member]);
         let singles = singles.take(self.policy.finalists / 2);
-        let pairs = pairs.iter().map(|(_, pair)| pair.to_vec()).take(self.policy.finalists / 2);
+        let pairs = pairs.iter().map(|(_, pair)| pair.to_vec()).take(self.policy.finalists / 4);
         let moves: Vec<Vec<Member>> = singles.chain(pairs).collect();
         let mut models: Vec<(Model, Vec<Member>)> = moves
             .into_par_iter()

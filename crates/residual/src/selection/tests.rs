@@ -41,6 +41,7 @@ fn problem(random: &mut RandomNumbers, torques: usize, kinds: usize, truth: &[(u
             let variant = Variant { parameters, bounds: vec![(f64::NEG_INFINITY, f64::INFINITY)], constants: 0 };
             hypotheses.push(Hypothesis {
                 kind,
+                textbook: false,
                 familiar: true,
                 torques: vec![torque],
                 variants: vec![variant],

@@ -19,26 +19,11 @@ pub(crate) struct Certainty {
 /// folds but one; since several columns would need more folds than there are, it tests the scale of the fitted combination. The other takes the
 /// residual's variance with the effective rows that are in the weights, with Fisher's distribution of all columns.
 pub(crate) fn certainty(problem: &Problem, fit: &Fit, member: Member) -> Certainty {
-    let parameters = problem.variant(member).parameters.iter().copied();
-    let own: Vec<usize> =
-        parameters.filter_map(|parameter| fit.place[parameter]).filter(|&place| fit.heard[place]).collect();
     let nothing = Certainty { significance: 0.0, tail: 1.0 };
+    let (own, inverse, values) = block(problem, fit, member);
     if own.is_empty() {
         return nothing;
     }
-    let values: Vec<f64> = own
-        .iter()
-        .map(|&place| fit.values[fit.active[place]] - problem.absent[fit.active[place]])
-        .collect();
-    // Columns of the inverse of the system that belong to the member.
-    let inverse: Vec<Vec<f64>> = own
-        .iter()
-        .map(|&place| {
-            let mut unit = vec![0.0; fit.active.len()];
-            unit[place] = 1.0;
-            fit.backward(fit.forward(&unit))
-        })
-        .collect();
     let Some(squares) = model_squares(&own, &inverse, &values) else { return nothing };
     let count = own.len() as f64;
     let model_tail = fisher_tail(squares / count, count, degrees_of_freedom(problem, fit));
@@ -56,6 +41,27 @@ pub(crate) fn certainty(problem: &Problem, fit: &Fit, member: Member) -> Certain
     let ratio = if variance > 0.0 { 1.0 / variance } else { 0.0 };
     let cluster_tail = fisher_tail(ratio, 1.0, clusters - 1.0);
     Certainty { significance: ratio.min(squares).sqrt(), tail: model_tail.max(cluster_tail) }
+}
+
+/// The weighted squares that a member takes away, to first order.
+pub(super) fn squares_of(problem: &Problem, fit: &Fit, member: Member) -> f64 {
+    let (own, inverse, values) = block(problem, fit, member);
+    if own.is_empty() { 0.0 } else { model_squares(&own, &inverse, &values).unwrap_or(0.0) }
+}
+
+/// The places of a member's columns that are heard, their columns of the system's inverse, and their values less those that stand for absence.
+fn block(problem: &Problem, fit: &Fit, member: Member) -> (Vec<usize>, Vec<Vec<f64>>, Vec<f64>) {
+    let parameters = problem.variant(member).parameters.iter().copied();
+    let own: Vec<usize> =
+        parameters.filter_map(|parameter| fit.place[parameter]).filter(|&place| fit.heard[place]).collect();
+    let value = |&place: &usize| fit.values[fit.active[place]] - problem.absent[fit.active[place]];
+    let column = |&place: &usize| {
+        let mut unit = vec![0.0; fit.active.len()];
+        unit[place] = 1.0;
+        fit.backward(fit.forward(&unit))
+    };
+    let (inverse, values) = (own.iter().map(column).collect(), own.iter().map(value).collect());
+    (own, inverse, values)
 }
 
 /// vᵀ·(Z_oo)⁻¹·v.
@@ -106,12 +112,10 @@ fn fold_scores(problem: &Problem, fit: &Fit, influence: &[f64]) -> Vec<f64> {
     let count = problem.torques.first().map_or(0, |torque| torque.folds.len());
     let mut scores = vec![0.0; count];
     for (torque, rows) in problem.torques.iter().enumerate() {
-        let values = fit.columns(problem, torque);
-        let active: Vec<(usize, f64)> = rows
-            .parameters
+        let values = fit.columns(torque);
+        let active: Vec<(usize, f64)> = fit.own[torque]
             .iter()
-            .enumerate()
-            .filter_map(|(column, &parameter)| fit.place[parameter].map(|place| (column, influence[place])))
+            .map(|&(column, place)| (column, influence[place]))
             .filter(|(_, influence)| *influence != 0.0)
             .collect();
         for (score, fold) in scores.iter_mut().zip(&rows.folds) {

@@ -41,7 +41,13 @@ impl Search<'_> {
             if self.is_held(place) {
                 continue;
             }
-            let near = self.fixed.catalogue.kind(&spec.kind)?.refine(&spec.constants, step);
+            let kind = self.fixed.catalogue.kind(&spec.kind)?;
+            let mut near = kind.refine(&spec.constants, step);
+            if step == 0 && place < self.declared && !spec.constants.is_empty() {
+                let site: Vec<usize> =
+                    spec.joints.iter().filter_map(|joint| self.fixed.tree.joint_index(joint)).collect();
+                near.extend(kind.scan(&site, &self.input.ranges));
+            }
             let specs = near.into_iter().map(|constants| EffectSpec { constants, ..spec.clone() });
             candidates.add_variants(self.fixed, present, place, specs.collect())?;
         }

@@ -36,6 +36,8 @@ struct Judged {
     gain: f64,
     /// Share of the stretches of training motion that it makes better.
     folds: f64,
+    /// Whether another effect is a form of it.
+    required: bool,
     named: bool,
 }
 
@@ -47,7 +49,7 @@ impl Search<'_> {
         loop {
             let trial = self.trial()?;
             let judged = self.judge(&trial)?;
-            let harmful = judged.iter().filter(|judged| judged.gain <= 0.0);
+            let harmful = judged.iter().filter(|judged| judged.gain <= 0.0 && !judged.required);
             match harmful.min_by(|a, b| a.gain.total_cmp(&b.gain)) {
                 Some(harmful) => {
                     let place = harmful.place;
@@ -101,25 +103,40 @@ impl Search<'_> {
             let gain: f64 = (0..with.len())
                 .map(|torque| trial.held_out[torque].rows() * (without[torque] / with[torque]).ln())
                 .sum();
-            // Whether it has a name is asked beside what is simpler: its kin of less simple a kind polish it.
-            let later = self.kin_of(place, |own, other| other > own)?;
+            // Whether it has a name is asked beside what is simpler: its kin of less simple a kind polish it, or, as forms of it, go with it.
+            let textbook = self.fixed.catalogue.kind(&self.specs[place].kind)?.joint_property().is_some();
+            let mut later = self.kin_of(place, |own, other| other > own)?;
+            // Of two that the textbook has, neither is a form of the other.
+            for other in std::mem::take(&mut later) {
+                if self.fixed.catalogue.kind(&self.specs[other].kind)?.joint_property().is_none() {
+                    later.push(other);
+                }
+            }
+            later.retain(|other| *other >= self.declared);
             let has_simpler = !self.kin_of(place, |own, other| other < own)?.is_empty();
             let [with, without] = match later.is_empty() {
                 true => [with.clone(), without],
                 false => {
                     let fit = |left_out: &[usize]| trial.fit_with(|other| !left_out.contains(&other));
                     let both = [later.as_slice(), &[place]].concat();
-                    [trial.held_out_squares(&fit(&later)), trial.held_out_squares(&fit(&both))]
+                    let beside = if textbook { with.clone() } else { trial.held_out_squares(&fit(&later)) };
+                    [beside, trial.held_out_squares(&fit(&both))]
                 }
             };
-            let textbook = self.fixed.catalogue.kind(&self.specs[place].kind)?.joint_property().is_some();
             let share = match has_simpler && !textbook {
                 true => self.options.least_share_of_kin,
                 false => self.options.least_share,
             };
             let material = self.is_material(trial, member, share, [&initial, &without, &with]);
+            let is_form_of_it = |&place: &usize| {
+                trial.places.iter().zip(&trial.members).any(|(other, member)| {
+                    let requires = &trial.problem.hypotheses[member.hypothesis].requires;
+                    *other != place && requires.contains(&trial.members[index].hypothesis)
+                })
+            };
             judged.push(Judged {
                 place,
+                required: is_form_of_it(&place),
                 significance: certainty.significance,
                 gain,
                 folds: trial.better_folds(&without_fit),
@@ -277,7 +294,7 @@ impl Trial {
 
     fn held_out_squares(&self, fit: &Fit) -> Vec<f64> {
         let of_torque = |(torque, held_out): (usize, &Products)| match held_out.rows() > 0.0 {
-            true => held_out.residual(&fit.columns(&self.problem, torque)),
+            true => held_out.residual(&fit.columns(torque)),
             false => 1.0,
         };
         self.held_out.iter().enumerate().map(of_torque).collect()
@@ -298,7 +315,7 @@ impl Trial {
             (0..self.problem.torques.len())
                 .map(|torque| {
                     let rows = &self.problem.torques[torque].folds[fold];
-                    let squares = rows.residual(&fit.columns(&self.problem, torque));
+                    let squares = rows.residual(&fit.columns(torque));
                     self.fit.weights[torque] * squares
                 })
                 .sum()

@@ -45,6 +45,8 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         input: &input,
         options,
     };
+    // A width that is wrong is a friction that is missing.
+    search.refine()?;
     for _ in 0..ROUNDS {
         let before = search.names();
         search.choose()?;

@@ -164,6 +164,7 @@ impl<'a> Fixed<'a> {
             torques.dedup();
             hypotheses.push(Hypothesis {
                 kind: candidate.kind,
+                textbook: self.catalogue.kind(&candidate.specs[0].kind)?.joint_property().is_some(),
                 familiar: candidate.familiar,
                 torques,
                 variants,
