@@ -10,14 +10,22 @@ pub(crate) struct Torque {
     pub folds: Vec<Products>,
     /// The products of all folds together.
     pub whole: Products,
+    /// Mean square of a residual that is as good as none \[N²·m², N²\].
+    pub least: f64,
 }
 
 impl Torque {
-    /// From the products of its folds.
-    pub fn new(parameters: Vec<usize>, folds: Vec<Products>) -> Self {
+    /// From the products of its folds; a residual of less than this share of the torque (RMS) is as good as none.
+    pub fn new(parameters: Vec<usize>, folds: Vec<Products>, least_share: f64) -> Self {
         let mut whole = Products::zero(parameters.len() + 1);
         folds.iter().for_each(|fold| whole.add(fold));
-        Torque { parameters, folds, whole }
+        let least = least_share * least_share * whole.right_hand_side() / whole.rows().max(1.0);
+        Torque { parameters, folds, whole, least }
+    }
+
+    /// Mean square of a residual, as far as it counts.
+    pub fn variance(&self, rss: f64) -> f64 {
+        (rss / self.whole.rows().max(1.0)).max(self.least).max(f64::MIN_POSITIVE)
     }
 
     /// The column of a parameter.

@@ -97,11 +97,24 @@ pub(super) fn gain_of(squares: f64, rows: f64) -> f64 {
     -rows * (-(squares / rows.max(1.0)).min(1.0 - 1e-9)).ln_1p()
 }
 
+/// What the criterion would gain if nothing were left of the torques.
+pub(super) fn most_of(problem: &Problem, fit: &Fit, rows: &[f64], torques: &[usize]) -> f64 {
+    let of_torque = |&torque: &usize| {
+        let own = &problem.torques[torque];
+        if own.least > 0.0 { rows[torque] * (own.variance(fit.rss[torque]) / own.least).ln() } else { f64::INFINITY }
+    };
+    torques.iter().map(of_torque).sum()
+}
+
 /// For every hypothesis of `open` the variant that gains most within its bounds, where one gains anything; best first.
 pub(super) fn screen(problem: &Problem, fit: &Fit, rows: &[f64], open: &[usize]) -> Vec<Screened> {
     let of_hypothesis = |&hypothesis: &usize| -> Option<Screened> {
         let own = &problem.hypotheses[hypothesis];
         let effective: f64 = own.torques.iter().map(|&torque| rows[torque]).sum();
+        let most = most_of(problem, fit, rows, &own.torques);
+        if most <= 0.0 {
+            return None;
+        }
         let of_variant = |variant: usize| -> Option<Screened> {
             let member = Member { hypothesis, variant };
             let beside = Beside::new(problem, fit, &own.variants[variant].parameters, &own.torques);
@@ -110,7 +123,7 @@ pub(super) fn screen(problem: &Problem, fit: &Fit, rows: &[f64], open: &[usize])
             let within = values.iter().zip(bounds).all(|(value, (low, high))| {
                 value.is_none_or(|value| *low <= value && value <= *high)
             });
-            let gain = gain_of(squares, effective) - price(problem, member, None, rows);
+            let gain = gain_of(squares, effective).min(most) - price(problem, member, None, rows);
             (within && values.iter().any(Option::is_some) && gain > 0.0).then_some(Screened { member, gain })
         };
         let variants = (0..own.variants.len()).filter_map(of_variant);

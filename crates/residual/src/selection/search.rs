@@ -4,7 +4,7 @@ use super::criterion::{choice, choices, criterion, price};
 use super::design_effect::effective_rows;
 use super::fit::Fit;
 use super::problem::{Member, Problem};
-use super::screening::{Beside, Screened, gain_of, screen, silent};
+use super::screening::{Beside, Screened, gain_of, most_of, screen, silent};
 use super::wald::{certainty, squares_of};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -331,7 +331,8 @@ impl<'a> Search<'a> {
                         .all(|(value, (low, high))| value.is_none_or(|value| *low <= value && value <= *high));
                     let prices: f64 =
                         members.iter().map(|&member| price(self.problem, member, None, &self.rows)).sum();
-                    let gain = gain_of(squares, self.rows[torque]) - prices;
+                    let most = most_of(self.problem, fit, &self.rows, &[torque]);
+                    let gain = gain_of(squares, self.rows[torque]).min(most) - prices;
                     if within && gain > first.gain && gain > second.gain {
                         let mut members = members;
                         members.sort_by_key(|member| self.problem.hypotheses[member.hypothesis].kind);

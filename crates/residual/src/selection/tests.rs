@@ -31,7 +31,7 @@ fn problem(random: &mut RandomNumbers, torques: usize, kinds: usize, truth: &[(u
             }
             folds.push(Products::of_factor(&Factor::of_rows(per_torque + 1, &rows).unwrap()));
         }
-        Torque::new((torque * per_torque..(torque + 1) * per_torque).collect(), folds)
+        Torque::new((torque * per_torque..(torque + 1) * per_torque).collect(), folds, 1e-3)
     };
     let all: Vec<Torque> = (0..torques).map(of_torque).collect();
     let mut hypotheses = Vec::new();

@@ -25,6 +25,8 @@ pub struct TraceOptions {
     pub least_of_others: f64,
     /// RMS of what an effect takes over the RMS of its torque, at least, to have a name.
     pub least_size: f64,
+    /// A residual below this share of its torque (RMS) is as good as none: nothing is sought in it.
+    pub negligible_share: f64,
     /// A residual over the noise floor by less than this factor is noise.
     pub floor_margin: f64,
     /// A residual below this share of its torque (RMS) is no structure: filters and encoders leave as much of a right model.
@@ -45,6 +47,7 @@ impl Default for TraceOptions {
             least_share_of_kin: 0.6,
             least_of_others: 0.025,
             least_size: 0.01,
+            negligible_share: 0.005,
             floor_margin: 1.15,
             structured_share: 0.01,
             torques: None,

@@ -123,11 +123,8 @@ impl Search<'_> {
                     [beside, trial.held_out_squares(&fit(&both))]
                 }
             };
-            let share = match has_simpler && !textbook {
-                true => self.options.least_share_of_kin,
-                false => self.options.least_share,
-            };
-            let material = self.is_material(trial, member, share, [&initial, &without, &with]);
+            let kin = has_simpler && !textbook;
+            let material = self.is_material(trial, member, kin, [&initial, &without, &with]);
             let is_form_of_it = |&place: &usize| {
                 trial.places.iter().zip(&trial.members).any(|(other, member)| {
                     let requires = &trial.problem.hypotheses[member.hypothesis].requires;
@@ -170,16 +167,17 @@ impl Search<'_> {
 
     /// Whether what an effect takes away on motion held out is worth a name.
     ///
-    /// It must take away a share of the residual of a torque that it acts on, and be a share of that torque. Where the other parameters have taken up most of it,
+    /// More is asked of what polishes a simpler effect of the model, its `kin`. It must take away a share of the residual of a torque that it acts on, and be a share of that torque. Where the other parameters have taken up most of it,
     /// it is to be seen on any torque, and must be a share of its torque by itself.
     fn is_material(
         &self,
         trial: &Trial,
         member: Member,
-        least_share: f64,
+        kin: bool,
         [initial, without, with]: [&[f64]; 3],
     ) -> bool {
         let options = self.options;
+        let least_share = if kin { options.least_share_of_kin } else { options.least_share };
         let hypothesis = &trial.problem.hypotheses[member.hypothesis];
         let (mut largest_share, mut size): (f64, f64) = (0.0, 0.0);
         let mut seen = false;
@@ -202,7 +200,7 @@ impl Search<'_> {
                 && (taken / whole).sqrt() >= options.least_size;
             size = size.max((held_out.size_of(&trial.values_of(member, torque)) / whole).sqrt());
         }
-        seen || largest_share >= least_share && size >= ABSORBED_SIZE * options.least_size
+        seen || !kin && largest_share >= least_share && size >= ABSORBED_SIZE * options.least_size
     }
 
     /// Puts the effects into the order in which they count, and says what each has explained.

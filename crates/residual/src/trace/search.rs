@@ -34,7 +34,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         sources: kept.iter().map(|kept| kept as &dyn BlockSource).collect(),
         rest_speeds: input.data.rest_speeds.clone(),
     };
-    let fixed = Fixed::new(&input, &data)?;
+    let fixed = Fixed::new(&input, &data, options)?;
     let mut search = Search {
         fixed: &fixed,
         specs: input.declared.clone(),

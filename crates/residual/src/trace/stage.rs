@@ -1,7 +1,7 @@
 //! One pass over the logs with a model and candidates beside it.
 
 use super::hypotheses::Candidates;
-use super::input::TraceInput;
+use super::input::{TraceInput, TraceOptions};
 use crate::selection::{self, Hypothesis, Member, Products, Torque, Variant};
 use phiw_dynamics::Tree;
 use phiw_effects::Catalogue;
@@ -25,6 +25,8 @@ pub(super) struct Fixed<'a> {
     pub prior: Option<Prior>,
     /// Rows that the conditioning alone makes one.
     pub rows_per_independent: f64,
+    /// A residual below this share of its torque (RMS) is as good as none.
+    pub negligible_share: f64,
     /// Hypotheses that could not be judged.
     pub not_judged: Mutex<BTreeSet<(String, Vec<String>)>>,
 }
@@ -46,7 +48,7 @@ pub(super) struct Stage {
 }
 
 impl<'a> Fixed<'a> {
-    pub fn new(input: &TraceInput<'a>, data: &'a Data<'a>) -> Result<Self, RegressorError> {
+    pub fn new(input: &TraceInput<'a>, data: &'a Data<'a>, options: &TraceOptions) -> Result<Self, RegressorError> {
         let prior = input.held.as_ref().map(|held| Prior {
             factor: held.factor.clone(),
             parameters: held.determined.clone(),
@@ -59,6 +61,7 @@ impl<'a> Fixed<'a> {
             data,
             prior,
             rows_per_independent: input.rows_per_independent,
+            negligible_share: options.negligible_share,
             not_judged: Mutex::default(),
         })
     }
@@ -176,7 +179,7 @@ impl<'a> Fixed<'a> {
         let torques = (0..design.rows().len()).into_par_iter().map(|row| {
             let parameters = design.rows()[row].parameters.clone();
             let of_fold = |fold: &GroupedFactor| Products::of_factor(&fold.groups()[row].factor);
-            Torque::new(parameters, stage.folds.iter().map(of_fold).collect())
+            Torque::new(parameters, stage.folds.iter().map(of_fold).collect(), self.negligible_share)
         });
         Ok(selection::Problem {
             torques: torques.collect(),
