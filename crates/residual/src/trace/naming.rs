@@ -90,7 +90,7 @@ impl Search<'_> {
     fn judge(&self, trial: &Trial) -> Result<Vec<Judged>, IdentificationError> {
         let limit = self.options.false_name_probability / self.chosen.hypotheses.max(1) as f64;
         let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
-        let with = trial.held_out_squares(&trial.fit);
+        let all = trial.held_out_squares(&trial.fit);
         let mut judged = Vec::new();
         for (index, &member) in trial.members.iter().enumerate() {
             let place = trial.places[index];
@@ -100,8 +100,8 @@ impl Search<'_> {
             let without_fit = trial.fit_with(|other| other != place);
             let without = trial.held_out_squares(&without_fit);
             let certainty = certainty(&trial.problem, &trial.fit, member);
-            let gain: f64 = (0..with.len())
-                .map(|torque| trial.held_out[torque].rows() * (without[torque] / with[torque]).ln())
+            let gain: f64 = (0..all.len())
+                .map(|torque| trial.held_out[torque].rows() * (without[torque] / all[torque]).ln())
                 .sum();
             // Whether it has a name is asked beside what is simpler: its kin of less simple a kind polish it, or, as forms of it, go with it.
             let textbook = self.fixed.catalogue.kind(&self.specs[place].kind)?.joint_property().is_some();
@@ -115,16 +115,16 @@ impl Search<'_> {
             later.retain(|other| *other >= self.declared);
             let has_simpler = !self.kin_of(place, |own, other| other < own)?.is_empty();
             let [with, without] = match later.is_empty() {
-                true => [with.clone(), without],
+                true => [all.clone(), without],
                 false => {
                     let fit = |left_out: &[usize]| trial.fit_with(|other| !left_out.contains(&other));
                     let both = [later.as_slice(), &[place]].concat();
-                    let beside = if textbook { with.clone() } else { trial.held_out_squares(&fit(&later)) };
+                    let beside = if textbook { all.clone() } else { trial.held_out_squares(&fit(&later)) };
                     [beside, trial.held_out_squares(&fit(&both))]
                 }
             };
             let kin = has_simpler && !textbook;
-            let material = self.is_material(trial, member, kin, [&initial, &without, &with]);
+            let material = self.is_material(trial, member, kin, [&initial, &without, &with, &all]);
             let is_form_of_it = |&place: &usize| {
                 trial.places.iter().zip(&trial.members).any(|(other, member)| {
                     let requires = &trial.problem.hypotheses[member.hypothesis].requires;
@@ -165,6 +165,11 @@ impl Search<'_> {
         Ok(kin)
     }
 
+    /// Whether a torque's residual is no larger than it was when the held model was fitted: then nothing has changed there since.
+    pub(super) fn is_as_it_was(&self, torque: usize, rmse: f64) -> bool {
+        self.input.held.as_ref().is_some_and(|held| rmse <= AS_IT_WAS * held.residual_std[torque])
+    }
+
     /// Whether what an effect takes away on motion held out is worth a name.
     ///
     /// More is asked of what polishes a simpler effect of the model, its `kin`. It must take away a share of the residual of a torque that it acts on, and be a share of that torque. Where the other parameters have taken up most of it,
@@ -174,7 +179,7 @@ impl Search<'_> {
         trial: &Trial,
         member: Member,
         kin: bool,
-        [initial, without, with]: [&[f64]; 3],
+        [initial, without, with, all]: [&[f64]; 4],
     ) -> bool {
         let options = self.options;
         let least_share = if kin { options.least_share_of_kin } else { options.least_share };
@@ -183,10 +188,8 @@ impl Search<'_> {
         let mut seen = false;
         for (torque, held_out) in trial.held_out.iter().enumerate() {
             let (before, after) = (without[torque], with[torque]);
-            let as_it_was = self.input.held.as_ref().is_some_and(|held| {
-                (before / held_out.rows().max(1.0)).sqrt() <= AS_IT_WAS * held.residual_std[torque]
-            });
-            if as_it_was || held_out.rows() == 0.0 {
+            let rmse = (initial[torque] / held_out.rows().max(1.0)).sqrt();
+            if held_out.rows() == 0.0 || self.is_as_it_was(torque, rmse) {
                 continue;
             }
             let whole = held_out.right_hand_side().max(f64::MIN_POSITIVE);
@@ -194,7 +197,10 @@ impl Search<'_> {
             let share = taken / before;
             largest_share = largest_share.max(share);
             let by_others = (initial[torque] - before).max(0.0);
+            // All that was found must be worth it together: two that undo each other take away much from each other only.
+            let together = ((initial[torque] - all[torque]).max(0.0) / whole).sqrt();
             seen |= hypothesis.torques.contains(&torque)
+                && together >= options.least_size
                 && share >= least_share
                 && taken >= options.least_of_others * by_others
                 && (taken / whole).sqrt() >= options.least_size;

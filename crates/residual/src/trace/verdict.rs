@@ -11,6 +11,11 @@ impl Search<'_> {
         let before = self.declared_error()?;
         let (mut effects, named) = self.name()?;
         let refinements = effects.split_off(named);
+        if effects.is_empty() && refinements.is_empty() {
+            // What was declared is as it was.
+            self.specs.clone_from(&self.input.declared);
+            self.parameters.clone_from(&self.input.parameters);
+        }
         let design = self.design()?;
         let data = self.fixed.data;
         let folds = [data.train.as_slice(), &data.held_out].concat();
@@ -73,6 +78,7 @@ impl Search<'_> {
         let large = |row: &usize| {
             error.rmse[*row] > self.options.floor_margin * self.input.noise_floor[*row]
                 && error.rmse[*row] > self.options.structured_share * torque_rms(*row)
+                && !self.is_as_it_was(*row, error.rmse[*row])
         };
         let large: Vec<usize> = (0..error.rmse.len()).filter(large).collect();
         let fit = Fit {
