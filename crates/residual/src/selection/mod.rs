@@ -23,5 +23,5 @@ mod tests;
 pub(crate) use fit::Fit;
 pub(crate) use problem::{Hypothesis, Member, Prior, Problem, Torque, Variant};
 pub(crate) use products::Products;
-pub(crate) use search::{Policy, choose_variants, select};
+pub(crate) use search::{Policy, choose_variants, select, value};
 pub(crate) use wald::certainty;

@@ -60,6 +60,8 @@ pub(crate) struct Hypothesis {
     pub variants: Vec<Variant>,
     /// Hypotheses that come with it: what it is a form of, or stands on top of.
     pub requires: Vec<usize>,
+    /// Whether its columns are what it does to first order only: what it can explain is seen once it is in force.
+    pub linearised: bool,
     /// Whether its columns are made of the model's own effects: it says nothing in a contest with one of them.
     pub made_of_model: bool,
     /// Whether it was declared: it stays in the model, only its variant is open.

@@ -74,6 +74,8 @@ const LEAST_STEP: f64 = 1e-3;
 const BY_CHANCE: f64 = 9.0;
 /// By how much, and by which share, a hypothesis may gain less than the member whose place it would take, to first order, and still be fitted in full.
 const NEAR: (f64, f64) = (20.0, 0.03);
+/// Share of a member's gain that one in its place must have that is known to first order only.
+const FIRST_ORDER: f64 = 0.5;
 /// Hypotheses of a torque whose pairs are looked at.
 const PAIRED: usize = 6;
 
@@ -82,6 +84,12 @@ pub(crate) fn select(problem: &Problem, start: Vec<Member>, policy: Policy) -> O
     let mut search = Search::new(problem, start, policy);
     search.run();
     search.outcome()
+}
+
+/// The criterion of a model; comparable between problems of the same torques and hypotheses.
+pub(crate) fn value(problem: &Problem, members: &[Member], rows: &[f64]) -> f64 {
+    let fit = Fit::new(problem, problem.active(members), rows, None);
+    criterion(problem, members, &fit, rows)
 }
 
 /// The variants of the members of `start` at which the criterion is smallest.
@@ -432,7 +440,11 @@ impl<'a> Search<'a> {
             true => Vec::new(),
             false => self.pairs(&without, &screened),
         };
-        screened.retain(|screened| screened.gain >= least);
+        let first_order = own_gain.map_or(0.0, |own| own.gain * FIRST_ORDER);
+        screened.retain(|screened| {
+            let linearised = self.problem.hypotheses[screened.member.hypothesis].linearised;
+            screened.gain >= if linearised { least.min(first_order) } else { least }
+        });
         pairs.retain(|(gain, _)| *gain >= least);
         pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
         let singles = screened.iter().map(|screened| vec![screened.member]).filter(|single| *single != [member]);

@@ -46,6 +46,7 @@ fn problem(random: &mut RandomNumbers, torques: usize, kinds: usize, truth: &[(u
                 torques: vec![torque],
                 variants: vec![variant],
                 requires: Vec::new(),
+                linearised: false,
                 made_of_model: false,
                 declared: false,
             });

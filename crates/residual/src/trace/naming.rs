@@ -91,6 +91,10 @@ impl Search<'_> {
         let limit = self.options.false_name_probability / self.chosen.hypotheses.max(1) as f64;
         let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
         let all = trial.held_out_squares(&trial.fit);
+        let is_textbook = |spec: &EffectSpec| {
+            self.fixed.catalogue.kind(&spec.kind).map(|kind| kind.joint_property().is_some())
+        };
+        let textbook_of: Vec<bool> = self.specs.iter().map(is_textbook).collect::<Result<_, _>>()?;
         let mut judged = Vec::new();
         for (index, &member) in trial.members.iter().enumerate() {
             let place = trial.places[index];
@@ -104,15 +108,10 @@ impl Search<'_> {
                 .map(|torque| trial.held_out[torque].rows() * (without[torque] / all[torque]).ln())
                 .sum();
             // Whether it has a name is asked beside what is simpler: its kin of less simple a kind polish it, or, as forms of it, go with it.
-            let textbook = self.fixed.catalogue.kind(&self.specs[place].kind)?.joint_property().is_some();
+            let textbook = textbook_of[place];
             let mut later = self.kin_of(place, |own, other| other > own)?;
             // Of two that the textbook has, neither is a form of the other.
-            for other in std::mem::take(&mut later) {
-                if self.fixed.catalogue.kind(&self.specs[other].kind)?.joint_property().is_none() {
-                    later.push(other);
-                }
-            }
-            later.retain(|other| *other >= self.declared);
+            later.retain(|other| *other >= self.declared && !textbook_of[*other]);
             let has_simpler = !self.kin_of(place, |own, other| other < own)?.is_empty();
             let [with, without] = match later.is_empty() {
                 true => [all.clone(), without],
@@ -124,7 +123,18 @@ impl Search<'_> {
                 }
             };
             let kin = has_simpler && !textbook;
-            let material = self.is_material(trial, member, kin, [&initial, &without, &with, &all]);
+            // What polishes must be worth it together: two that undo each other take away much from each other only.
+            let bare = match kin {
+                true => {
+                    let mut polish = self.kin_of(place, |own, other| other >= own)?;
+                    polish.extend(self.kin_of(place, |own, other| other < own)?);
+                    let stays = |other: &usize| *other < self.declared || textbook_of[*other];
+                    polish.retain(|other| !stays(other));
+                    trial.held_out_squares(&trial.fit_with(|other| !polish.contains(&other)))
+                }
+                false => initial.clone(),
+            };
+            let material = self.is_material(trial, member, kin, [&initial, &bare, &without, &with, &all]);
             let is_form_of_it = |&place: &usize| {
                 trial.places.iter().zip(&trial.members).any(|(other, member)| {
                     let requires = &trial.problem.hypotheses[member.hypothesis].requires;
@@ -179,7 +189,7 @@ impl Search<'_> {
         trial: &Trial,
         member: Member,
         kin: bool,
-        [initial, without, with, all]: [&[f64]; 4],
+        [initial, bare, without, with, all]: [&[f64]; 5],
     ) -> bool {
         let options = self.options;
         let least_share = if kin { options.least_share_of_kin } else { options.least_share };
@@ -197,8 +207,7 @@ impl Search<'_> {
             let share = taken / before;
             largest_share = largest_share.max(share);
             let by_others = (initial[torque] - before).max(0.0);
-            // All that was found must be worth it together: two that undo each other take away much from each other only.
-            let together = ((initial[torque] - all[torque]).max(0.0) / whole).sqrt();
+            let together = ((bare[torque] - all[torque]).max(0.0) / whole).sqrt();
             seen |= hypothesis.torques.contains(&torque)
                 && together >= options.least_size
                 && share >= least_share

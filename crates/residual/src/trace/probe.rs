@@ -38,12 +38,14 @@ pub(super) struct Fit<'a> {
     pub specs: &'a [EffectSpec],
     pub parameters: &'a [f64],
     pub ranges: &'a SignalRanges,
+    /// For each torque the angular frequencies \[rad/s\] at which its residual swings over the time.
+    pub lines: &'a [Vec<f64>],
 }
 
 /// Which signals the residuals of the torques `rows` follow, strongest first.
 pub(super) fn probe(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<Dependence>, IdentificationError> {
     let shapes = |row| {
-        let mut shapes = own_shapes(fit.fixed, row, fit.ranges);
+        let mut shapes = own_shapes(fit.fixed, row, fit.ranges, &fit.lines[row]);
         let others = (0..fit.fixed.tree.joint_count()).filter(|&other| other != row);
         shapes.extend(other_shapes(fit.fixed, row, others, fit.ranges));
         shapes
@@ -60,7 +62,7 @@ pub(super) fn probe(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<Dependence>, Ide
 /// its colour.
 pub(super) fn following(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<usize>, IdentificationError> {
     let shapes = |row| {
-        let mut shapes = own_shapes(fit.fixed, row, fit.ranges);
+        let mut shapes = own_shapes(fit.fixed, row, fit.ranges, &fit.lines[row]);
         shapes.extend(other_shapes(fit.fixed, row, neighbours(fit.fixed.tree, row), fit.ranges));
         shapes
     };

@@ -5,7 +5,7 @@ use super::input::{TraceInput, TraceOptions};
 use super::residuals::residual_shape;
 use super::stage::{Fixed, Stage, specs_and_values};
 use super::tracing::Tracing;
-use crate::selection::{Member, Policy, Problem, select};
+use crate::selection::{Member, Policy, Problem, select, value};
 use phiw_effects::SignalRanges;
 use phiw_identification::{
     BlockSource, Data, Design, Effect, EffectSpec, Fold, IdentificationError, KeptBlocks,
@@ -19,6 +19,8 @@ const ROUNDS: usize = 4;
 const FOLDS: usize = 20;
 /// Shortest stretch \[s\]: a residual's correlation must be short against it.
 const LEAST_FOLD_S: f64 = 0.5;
+/// Effects that are put into force to see what they explain, at most.
+const CONTESTS: usize = 4;
 /// Candidates that are fitted in full at each step.
 const FINALISTS: usize = 12;
 
@@ -51,7 +53,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         let before = search.names();
         search.choose()?;
         search.refine()?;
-        if search.names() == before {
+        if search.names() == before && !search.contest()? {
             break;
         }
     }
@@ -59,7 +61,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
 }
 
 /// What the last choice knew beside what it chose.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Chosen {
     /// Effective rows of each torque.
     pub rows: Vec<f64>,
@@ -72,6 +74,7 @@ pub(super) struct Chosen {
 }
 
 /// A model on its way.
+#[derive(Clone)]
 pub(super) struct Search<'a> {
     pub fixed: &'a Fixed<'a>,
     /// Effects of the model: those declared, then those found.
@@ -141,6 +144,50 @@ impl Search<'_> {
             rows: outcome.rows,
         };
         self.take(&problem, &candidates, &outcome.members, &outcome.fit.values);
+        Ok(())
+    }
+
+    /// Puts in the place of an effect what is known to first order only and, once it is in force, explains more. Whether anything was.
+    fn contest(&mut self) -> Result<bool, IdentificationError> {
+        let mut own = None;
+        let mut tried = 0;
+        for index in 0..self.chosen.alternatives.len() {
+            for (spec, _) in self.chosen.alternatives[index].clone() {
+                if tried == CONTESTS || self.fixed.absent(&spec)?.is_none() {
+                    continue;
+                }
+                tried += 1;
+                let own = match own {
+                    Some(own) => own,
+                    None => *own.insert(self.value()?),
+                };
+                let mut branch = self.clone();
+                branch.replace(self.declared + index, spec)?;
+                branch.refine()?;
+                if branch.value()? < own {
+                    *self = branch;
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(false)
+    }
+
+    /// The criterion of the model as it is.
+    fn value(&self) -> Result<f64, IdentificationError> {
+        let mut candidates =
+            Candidates::of_model(self.fixed, Present { specs: &self.specs, declared: self.declared });
+        let stage = self.pass(Vec::new())?;
+        let problem = self.fixed.problem(&stage, &mut candidates)?;
+        Ok(value(&problem, &candidates.present, &self.chosen.rows))
+    }
+
+    /// Puts another effect, with its parameters at nothing, in the place of one.
+    fn replace(&mut self, place: usize, spec: EffectSpec) -> Result<(), IdentificationError> {
+        let own = self.design()?.effect_parameters(place);
+        self.specs[place] = spec;
+        let count = self.fixed.build(&self.specs[place..=place])?.iter().map(|effect| effect.parameters().len()).sum();
+        self.parameters.splice(own, vec![0.0; count]);
         Ok(())
     }
 

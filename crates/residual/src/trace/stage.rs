@@ -172,6 +172,7 @@ impl<'a> Fixed<'a> {
                 torques,
                 variants,
                 declared: candidate.declared,
+                linearised: self.absent(&candidate.specs[0])?.is_some(),
                 requires: self.required(candidates, candidate)?,
                 made_of_model,
             });

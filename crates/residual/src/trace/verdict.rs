@@ -1,6 +1,7 @@
 //! The end of a search: the final fit, what each effect explained, what remains.
 
 use super::probe::{self, Fit};
+use super::residuals::residual_shape;
 use super::search::Search;
 use super::tracing::{Remaining, Tracing, Verdict};
 use phiw_identification::{IdentificationError, Identified, TorqueError, accumulate, fit, torque_error};
@@ -81,7 +82,15 @@ impl Search<'_> {
                 && !self.is_as_it_was(*row, error.rmse[*row])
         };
         let large: Vec<usize> = (0..error.rmse.len()).filter(large).collect();
+        if large.is_empty() {
+            return Ok(Remaining { silent: self.chosen.silent.clone(), ..Remaining::default() });
+        }
+        let positions: Vec<(f64, f64)> = self.input.ranges.joints.iter().map(|joint| joint.position).collect();
+        let data = self.fixed.data;
+        let folds = [data.train.as_slice(), &data.held_out].concat();
+        let shape = residual_shape(&self.design()?, &self.parameters, &folds, &data.sources, &positions)?;
         let fit = Fit {
+            lines: &shape.time_frequencies,
             fixed: self.fixed,
             specs: &self.specs,
             parameters: &self.parameters,
