@@ -1,17 +1,11 @@
 //! Experiments and set-up of the workspace: `cargo xtask <task>`.
 
-mod environment;
 mod mujoco;
-mod oracle;
-mod paper;
-mod plant_experiment;
-mod retarget;
-mod run;
 mod test;
 mod torture;
-mod undeclared;
 
 use clap::{Parser, Subcommand};
+use phiw_experiments::{oracle, paper, plant, retarget, run, synthetic_log, undeclared};
 use std::process::ExitCode;
 
 #[derive(Parser)]
@@ -26,7 +20,7 @@ enum Task {
     /// The best main job so far, on an example log that is made on the spot: identify, with report.
     Run(run::Arguments),
     /// A log as long as wanted, to see that memory does not grow with it.
-    SyntheticLog(run::synthetic_log::Arguments),
+    SyntheticLog(synthetic_log::Arguments),
     /// Retargeting: figure 9 of the paper, whole databases, and a page with pictures of them.
     Retarget(retarget::Arguments),
     /// All checks of the workspace, and the count of tests.
@@ -42,20 +36,28 @@ enum Task {
     /// The experiments of the paper's section 5, resumable, on one machine or many.
     Paper(paper::Arguments),
     /// Robots in physics engines with one secret each, tracked poorly: log, trace with `phiw explain`, score.
-    Plant(plant_experiment::Arguments),
+    Plant(plant::Arguments),
 }
 
 fn main() -> anyhow::Result<ExitCode> {
     match Arguments::parse().task {
-        Task::Run(arguments) => run::command(&arguments),
-        Task::SyntheticLog(arguments) => run::synthetic_log::command(&arguments),
+        Task::Run(arguments) => {
+            mujoco::fetch_or_go_on_without();
+            run::command(&arguments).map(|()| ExitCode::SUCCESS)
+        }
+        Task::SyntheticLog(arguments) => synthetic_log::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Retarget(arguments) => retarget::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Test(arguments) => test::command(&arguments),
         Task::Torture(arguments) => torture::command(&arguments),
         Task::Mujoco(arguments) => mujoco::command(&arguments),
         Task::Oracle(arguments) => oracle::command(&arguments),
-        Task::Paper(arguments) => paper::command(&arguments).map(|()| ExitCode::SUCCESS),
-        Task::Plant(arguments) => plant_experiment::command(&arguments).map(|()| ExitCode::SUCCESS),
+        Task::Paper(arguments) => {
+            if arguments.needs_mujoco() {
+                mujoco::fetch_or_go_on_without();
+            }
+            paper::command(&arguments).map(|()| ExitCode::SUCCESS)
+        }
+        Task::Plant(arguments) => plant::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Undeclared(arguments) => undeclared::command(&arguments).map(|()| ExitCode::SUCCESS),
     }
 }

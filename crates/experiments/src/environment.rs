@@ -4,13 +4,17 @@ use anyhow::{Context, ensure};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-/// The folder of the workspace.
+/// The folder of the workspace: the nearest one at or above the package that cargo runs which holds a `Cargo.lock`.
 ///
 /// # Errors
 /// The task was not started by `cargo xtask`.
 pub fn workspace_root() -> anyhow::Result<PathBuf> {
     let manifest = std::env::var_os("CARGO_MANIFEST_DIR").context("start this task with `cargo xtask`")?;
-    PathBuf::from(manifest).parent().map(PathBuf::from).context("xtask is not in a workspace")
+    let manifest = PathBuf::from(manifest);
+    let root = manifest.ancestors().find(|folder| folder.join("Cargo.lock").is_file());
+    root.map(PathBuf::from).with_context(|| {
+        format!("{} is in no workspace: no folder above has a Cargo.lock", manifest.display())
+    })
 }
 
 /// The folder that cargo builds in, which is never under version control.
@@ -49,4 +53,16 @@ pub fn release_binary() -> anyhow::Result<PathBuf> {
         message.get("executable")?.as_str().map(PathBuf::from)
     });
     executable.context("cargo built phiw but named no executable")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::workspace_root;
+
+    /// It was the folder above the package's, which is right for `xtask` only.
+    #[test]
+    fn the_workspace_is_found_from_a_package_two_folders_down() -> anyhow::Result<()> {
+        assert!(workspace_root()?.join("models/upper_body18.urdf").is_file());
+        Ok(())
+    }
 }

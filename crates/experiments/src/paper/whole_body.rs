@@ -7,7 +7,7 @@ mod pelvis;
 
 use super::subject::{FASTEST, Subject, VISCOUS_SHARE, arm_gains};
 use crate::environment;
-use crate::plant_experiment::engine::Engine;
+use crate::plant::engine::Engine;
 use anyhow::{Context, ensure};
 use pelvis::PelvisMotion;
 use phiw_curriculum::standing::{

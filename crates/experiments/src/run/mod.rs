@@ -6,10 +6,9 @@
 
 mod curriculum;
 mod curriculum_page;
-mod synthetic;
-pub mod synthetic_log;
+pub(crate) mod synthetic;
 
-use crate::{environment, mujoco};
+use crate::environment;
 use anyhow::Context;
 use phiw::arguments::{ExplainArguments, SessionArguments};
 use phiw::console::Console;
@@ -17,7 +16,7 @@ use phiw::explain::{command_line, explain};
 use phiw::identify::Outcome;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::Command;
 use synthetic::Plant;
 
 /// What an arm with gears is declared to have beside its rigid body.
@@ -42,8 +41,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// Files cannot be read or written, or the identification fails.
-pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    mujoco::fetch_or_go_on_without();
+pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
     let root = environment::workspace_root()?;
     let out = root.join(&arguments.out);
     std::fs::create_dir_all(&out).with_context(|| format!("cannot make {}", out.display()))?;
@@ -67,7 +65,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if arguments.open {
         reports.iter().try_for_each(|report| open(report))?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 /// A PUMA-560-like arm on three Fourier motions, two to train on.

@@ -5,7 +5,7 @@ mod c3d;
 mod case;
 mod comparison;
 mod pinocchio;
-pub mod python;
+pub(crate) mod python;
 
 use crate::environment;
 use answers::QUANTITIES;
@@ -14,7 +14,7 @@ use python::Python;
 use std::process::ExitCode;
 
 /// The packages, pinned.
-const REQUIREMENTS: &str = include_str!("oracle/requirements.txt");
+const REQUIREMENTS: &str = include_str!("requirements.txt");
 /// The largest relative difference that is rounding.
 const TOLERANCE: f64 = 1e-9;
 

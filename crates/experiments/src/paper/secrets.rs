@@ -4,7 +4,7 @@ use super::arm::{Arm, Footing};
 use super::report::{Results, median};
 use super::run_file::RunFile;
 use super::score::Score;
-use crate::plant_experiment::secret::SecretKind;
+use crate::plant::secret::SecretKind;
 use phiw_identification::EffectSpec;
 use std::collections::BTreeSet;
 

@@ -4,7 +4,7 @@ use super::arm::{Arm, Footing};
 use super::detection::Detection;
 use super::jobs::Job;
 use super::score::{Detail, Score};
-use crate::plant_experiment::secret::SecretKind;
+use crate::plant::secret::SecretKind;
 use anyhow::Context;
 use phiw_curriculum::Run;
 use phiw_result_folder::{Disk, replace_file};

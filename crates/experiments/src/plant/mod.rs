@@ -1,10 +1,10 @@
 //! Closed loops with a secret: robots in physics engines, tracked poorly, each with one effect that nobody declared. Their logs
 //! go to `phiw explain`, a program of its own, and its answer is held against the truth.
 
-pub mod case;
-pub mod engine;
+pub(crate) mod case;
+pub(crate) mod engine;
 mod score;
-pub mod secret;
+pub(crate) mod secret;
 mod table;
 
 use crate::undeclared::tracer::Tracer;

@@ -1,7 +1,7 @@
 //! `cargo xtask retarget`: what retargeting can do, measured.
 
 mod animation;
-pub mod database;
+pub(crate) mod database;
 mod figure9;
 mod mink;
 mod mjcf;

@@ -6,9 +6,9 @@ use super::run_file;
 use super::subject::{Subject, SubjectName};
 use super::tasks::two_tasks;
 use super::whole_body::Standing;
-use crate::plant_experiment::case;
-use crate::plant_experiment::engine::Engine;
-use crate::plant_experiment::secret::SecretKind;
+use crate::plant::case;
+use crate::plant::engine::Engine;
+use crate::plant::secret::SecretKind;
 use anyhow::{Context, ensure};
 use phiw::console::Console;
 use phiw_curriculum::{

@@ -72,7 +72,7 @@ impl Robot {
     /// # Errors
     /// The model does not read.
     pub fn read() -> anyhow::Result<Self> {
-        let urdf = include_str!("../../../models/upper_body18.urdf");
+        let urdf = include_str!("../../../../models/upper_body18.urdf");
         let tree = read_urdf(urdf, &UrdfOptions::default()).context("models/upper_body18.urdf")?.tree;
         let joints = tree.joint_count();
         let mut matrix = vec![0.0; joints * joints];

@@ -4,8 +4,8 @@ use super::arm::{Arm, Footing};
 use super::motions::Source;
 use super::shard::Shard;
 use super::subject::SubjectName;
-use crate::plant_experiment::engine::Engine;
-use crate::plant_experiment::secret::SecretKind;
+use crate::plant::engine::Engine;
+use crate::plant::secret::SecretKind;
 use std::path::PathBuf;
 
 /// Arguments of `cargo xtask paper`.

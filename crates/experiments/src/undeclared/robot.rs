@@ -15,11 +15,11 @@ pub struct Robot {
 }
 
 const MODELS: [(&str, &str); 5] = [
-    ("planar2", include_str!("../../../models/planar2.urdf")),
-    ("scara4", include_str!("../../../models/scara4.urdf")),
-    ("puma560", include_str!("../../../models/puma560.urdf")),
-    ("arm7", include_str!("../../../models/arm7.urdf")),
-    ("upper_body18", include_str!("../../../models/upper_body18.urdf")),
+    ("planar2", include_str!("../../../../models/planar2.urdf")),
+    ("scara4", include_str!("../../../../models/scara4.urdf")),
+    ("puma560", include_str!("../../../../models/puma560.urdf")),
+    ("arm7", include_str!("../../../../models/arm7.urdf")),
+    ("upper_body18", include_str!("../../../../models/upper_body18.urdf")),
 ];
 
 /// All robots, small ones first.

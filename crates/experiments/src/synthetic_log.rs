@@ -1,13 +1,12 @@
 //! `cargo xtask synthetic-log`: a log as long as wanted, to see that memory does not grow with it.
 
-use super::synthetic::Plant;
 use crate::environment;
+use crate::run::synthetic::Plant;
 use anyhow::ensure;
 use phiw_dynamics::Tree;
 use phiw_dynamics::random_tree::{RandomTreeOptions, random_urdf};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf, read_urdf_file};
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Command line of `cargo xtask synthetic-log`.
 #[derive(clap::Args)]
@@ -33,7 +32,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// The robot cannot be read, or the log not written.
-pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
     ensure!(arguments.rate > 0.0, "--rate {} is no rate", arguments.rate);
     let (tree, urdf) = robot(arguments)?;
     let bar = indicatif::ProgressBar::new(arguments.rows);
@@ -47,7 +46,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     )?;
     bar.finish_and_clear();
     println!("{}, of the robot {}", arguments.out.display(), urdf.display());
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 fn robot(arguments: &Arguments) -> anyhow::Result<(Tree, PathBuf)> {

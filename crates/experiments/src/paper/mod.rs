@@ -24,25 +24,33 @@ mod tasks;
 mod tidy;
 mod whole_body;
 
-pub use crate::plant_experiment::engine::Engine;
-pub use crate::plant_experiment::secret::SecretKind;
-pub use arguments::{Arguments, Command, Detector, EstimatorName, Initial, RunArguments};
-pub use arm::{Arm, Footing};
-pub use figures::{balance, choices};
-pub use jobs::{Job, do_all};
-pub use motions::Source;
-pub use run_file::RunFile;
-pub use score::Score;
-pub use setup::Setup;
-pub use subject::{Subject, SubjectName};
+pub(crate) use crate::plant::engine::Engine;
+pub(crate) use crate::plant::secret::SecretKind;
+pub use arguments::Arguments;
+pub(crate) use arguments::{Detector, EstimatorName, Initial, RunArguments};
+pub(crate) use arm::{Arm, Footing};
+pub(crate) use figures::{balance, choices};
+pub(crate) use jobs::{Job, do_all};
+pub(crate) use motions::Source;
+pub(crate) use run_file::RunFile;
+pub(crate) use score::Score;
+pub(crate) use setup::Setup;
+pub(crate) use subject::{Subject, SubjectName};
 
-use crate::{environment, mujoco};
+use crate::environment;
 use anyhow::Context;
-use arguments::MergeArguments;
+use arguments::{Command, MergeArguments};
 use indicatif::{ProgressBar, ProgressStyle};
 use jobs::Outcome;
 use phiw::console::Console;
 use std::path::Path;
+
+impl Arguments {
+    /// Whether the runs need MuJoCo's library, which the caller may want to fetch first.
+    pub fn needs_mujoco(&self) -> bool {
+        self.command.is_none() && self.run.slurm.is_none() && self.run.backend == Engine::Mujoco
+    }
+}
 
 /// Runs the task.
 ///
@@ -57,9 +65,6 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 fn run(arguments: &RunArguments) -> anyhow::Result<()> {
-    if arguments.backend == crate::plant_experiment::engine::Engine::Mujoco {
-        mujoco::fetch_or_go_on_without();
-    }
     let out = environment::workspace_root()?.join(&arguments.out);
     std::fs::create_dir_all(&out).with_context(|| out.display().to_string())?;
     let setup = Setup::new(arguments, &out, &Console::of_terminal(false))?;

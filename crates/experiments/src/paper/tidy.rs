@@ -4,7 +4,7 @@ use super::ending::ended_after;
 use super::report::Results;
 use super::run_file::replace;
 use super::{numbers, reliability, secrets};
-use crate::plant_experiment::secret::SecretKind;
+use crate::plant::secret::SecretKind;
 use phiw_curriculum::Converged;
 use std::collections::BTreeSet;
 use std::fmt::Write;
