@@ -1,4 +1,20 @@
-//! `cargo xtask synthetic-log`: a log as long as wanted, to see that memory does not grow with it.
+//! `cargo xtask synthetic-log`: a log as long as wanted.
+//!
+//! # What it asks
+//!
+//! Whether memory grows with the length of a log. It makes the log; `phiw identify` on it gives the answer.
+//!
+//! # How it is run
+//!
+//! `cargo xtask synthetic-log --out target/long.csv --rows 5000000`, then `phiw identify` with that log.
+//!
+//! # What it prints
+//!
+//! The paths of the log and of the robot's URDF.
+//!
+//! # Where results go
+//!
+//! The log goes where `--out` says. A robot of other than 18 joints is a random one, and its URDF is written beside the log.
 
 use crate::environment;
 use crate::run::synthetic::Plant;

@@ -1,4 +1,24 @@
 //! `cargo xtask retarget`: what retargeting can do, measured.
+//!
+//! # What it asks
+//!
+//! How fast and how close the robot follows recordings of people. `databases`: whole databases through `phiw retarget`, with marker error, hands, elbows, jerk
+//! and time. `animation`: a film of person and robot. `mink`: the same markers through mink, frame by frame. `figure9`: the paper's figure 9, time and final
+//! cost of the solvers from several starts.
+//!
+//! # How it is run
+//!
+//! `cargo xtask retarget` measures everything, `cargo xtask retarget figure9 databases` some parts. mink is installed from PyPI into a private environment, only
+//! if `--mink python3` names a Python. The robot is Torobo and the recordings are the seated set where `../shared/data` has them; otherwise the embedded
+//! motions and `models/upper_body18.urdf` stand in, and it is said.
+//!
+//! # What it prints
+//!
+//! The sentences of the page, as they are measured.
+//!
+//! # Where results go
+//!
+//! Into `retarget` in the build folder, or where `--out` says: `retarget.html` with pictures, and the retargeted motions of each database.
 
 mod animation;
 pub(crate) mod database;

@@ -1,7 +1,28 @@
-//! Robot logs with effects that nobody declared: generate them, let the tracer loose on them, score what it says.
+//! `cargo xtask undeclared`: robot logs with effects that nobody declared. It generates them, has `phiw explain` trace them, and scores what that says.
 //!
-//! The tracer is a separate program (`phiw explain`) that sees files only. What is true stays here, or in a `truth.json` beside the
-//! folder that it sees. All forms of effects are written from the literature and not from the tracer's catalogue.
+//! # What it asks
+//!
+//! Which undeclared effects the tracer finds, with the right joints, and what it invents. A case is one of five robots with one, two, three or no secret effects
+//! (the suites `one`, `two`, `three`, `control`), or with one that the catalogue does not have (`outside`). Noise, jitter, quantisation and the declared
+//! effects are drawn as well. A case follows from its seed alone. Seeds for developing the tracer and seeds for reporting are disjoint.
+//!
+//! The tracer is a separate program that sees files only. What is true stays here, or in a `truth.json` beside the folder that it sees. All forms of
+//! effects are written from the literature and not from the tracer's catalogue.
+//!
+//! # How it is run
+//!
+//! `cargo xtask undeclared --all` is the full experiment, 1000 cases of each family of seeds; `--resume` goes on with one that was stopped. `--suite`,
+//! `--kind`, `--robot` and `--count` choose among the cases, `--case SEED` traces one and shows its truth, and `--generate DIR` only writes the files.
+//!
+//! # What it prints
+//!
+//! Tables: for each kind how often it was named right, taken for a rival, given to the wrong joints or missed; false names where
+//! nothing was hidden; the verdicts on what the catalogue does not have; the share of the error removed; time; and every failure with its seed.
+//!
+//! # Where results go
+//!
+//! Into `target/undeclared` below the working directory, or where `--out` says, a folder for each family of seeds (`dev`, `report`): `score.md`, `cases.csv`
+//! with one row for each case, and `outcomes/`, what `--resume` goes on from. `--keep DIR` keeps the files of each case.
 
 mod case;
 mod dice;
