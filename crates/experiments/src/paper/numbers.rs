@@ -3,8 +3,10 @@
 use super::arguments::RelaxationName;
 use super::arm::{Arm, Footing};
 use super::reliability;
-use super::report::{Results, median};
+use super::report::Results;
 use super::run_file::RunFile;
+use phiw_identification::accuracy::{Reliability, ReliabilityCriterion};
+use phiw_report::statistics::median;
 
 use Arm::{Curriculum, Greedy, Random, TaskA, TaskB, TorqueOptimal};
 use Footing::Standing;
@@ -46,8 +48,9 @@ pub fn rows(results: &Results) -> Vec<[String; 4]> {
     }
     let count = |arm: Arm, iteration: usize| {
         let all = reliability::of_arm(results, home, arm, iteration);
-        let [well, with_bias] = [reliability::Reliability::well, reliability::Reliability::well_with_bias]
-            .map(|test| all.iter().filter(|parameter| test(parameter)).count());
+        let criterion = ReliabilityCriterion::default();
+        let [well, with_bias] = [Reliability::well, Reliability::well_with_bias]
+            .map(|test| all.iter().filter(|parameter| test(parameter, &criterion)).count());
         format!("{well} ({with_bias} with bias counted)")
     };
     row(

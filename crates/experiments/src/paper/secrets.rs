@@ -1,11 +1,12 @@
 //! Plants with a secret: what closing the loop is worth. And plants without: what it invents.
 
 use super::arm::{Arm, Footing};
-use super::report::{Results, median};
+use super::report::Results;
 use super::run_file::RunFile;
 use super::score::Score;
 use crate::plant::secret::SecretKind;
 use phiw_identification::EffectSpec;
+use phiw_report::statistics::median;
 use std::collections::BTreeSet;
 
 /// Head of the table.

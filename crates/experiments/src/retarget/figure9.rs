@@ -1,13 +1,13 @@
 //! Figure 9: time and final cost of retargeting one motion of T = 740 from several starts, without and with splines by quasi-Newton, and
 //! by the solver that knows the structure.
 
-use super::database::median;
 use super::page::Page;
 use super::{Example, Scene};
 use phiw_bspline_retarget::bspline::Basis;
 use phiw_bspline_retarget::solver::{Iterations, QuasiNewton, Solution, quasi_newton, solve};
 use phiw_bspline_retarget::{Problem, RetargetOptions};
 use phiw_report::plot::{BoxGroup, BoxPlot, box_plot};
+use phiw_report::statistics::median;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
