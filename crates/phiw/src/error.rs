@@ -163,7 +163,7 @@ pub enum Error {
         /// The log.
         path: PathBuf,
         /// What is wrong with it.
-        source: CurriculumError,
+        source: Box<CurriculumError>,
     },
     /// A joint that no motion moves.
     #[error(
@@ -229,7 +229,7 @@ pub enum Error {
     Curriculum(#[from] CurriculumError),
     /// The identified parameters cannot be written as a URDF.
     #[error("identified.urdf: {0}")]
-    IdentifiedUrdf(UrdfError),
+    IdentifiedUrdf(Box<UrdfError>),
     /// All logs of the training together.
     #[error("{logs}: {source}")]
     TrainingLogs {
