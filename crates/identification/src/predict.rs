@@ -150,11 +150,8 @@ impl<'a> Predictor<'a> {
                 }
                 evaluated = scratch.evaluate(&block, sample, evaluation);
                 for (torque, layout) in design.rows().iter().enumerate() {
-                    let columns = &evaluation[layout.range.clone()];
-                    let terms = columns.iter().zip(&layout.parameters);
-                    row[torque] = columns[layout.parameters.len()];
-                    row[torques + torque] =
-                        terms.map(|(column, &parameter)| column * parameters[parameter]).sum();
+                    row[torque] = layout.measured_torque(evaluation);
+                    row[torques + torque] = layout.torque(evaluation, parameters);
                     row[2 * torques + torque] = evaluation[design.width() + torque];
                 }
             },
