@@ -1,6 +1,6 @@
 //! Forward dynamics: the articulated body algorithm (ABA), or the mass matrix where mimic joints close loops.
 
-use crate::ldl::solve_in_place;
+use crate::dense::ldl::solve_in_place;
 use crate::{
     DimensionError, Inertia, JointType, Mat3, Placement, Scalar, Spatial, Tree, Vec3, Workspace, check_size,
 };

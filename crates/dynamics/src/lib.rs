@@ -3,11 +3,11 @@
 mod analytic;
 mod backend;
 mod configuration;
+pub mod dense;
 mod forward_dynamics;
 mod inertia;
 mod inverse_dynamics;
 mod kinematics;
-mod ldl;
 mod mass_matrix;
 mod motion;
 pub mod random_tree;
