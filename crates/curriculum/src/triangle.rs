@@ -4,6 +4,7 @@
 //! cost 10 ms; both know nothing of the zeros, and all singular values but two are thrown away. Here the QR of one triangle on top of
 //! another touches the non-zeros only (n³/3 multiplications), and Lanczos' method finds the two in some tens of products.
 
+use phiw_dynamics::dense::dot;
 use phiw_regressor::factor::Factor;
 
 /// An upper triangular matrix, column by column.
@@ -172,19 +173,6 @@ impl Triangle {
         }
         if sum.is_finite() { sum } else { f64::INFINITY }
     }
-}
-
-pub(crate) fn dot(left: &[f64], right: &[f64]) -> f64 {
-    // Four sums at a time, so that the processor adds them side by side; in a fixed order, so that the result is always the same.
-    let mut sums = [0.0; 4];
-    let (left_fours, right_fours) = (left.chunks_exact(4), right.chunks_exact(4));
-    let rest: f64 = left_fours.remainder().iter().zip(right_fours.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in left_fours.zip(right_fours) {
-        for lane in 0..4 {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
 /// Change of the eigenvalue over one step, as a share, at which it counts as found.

@@ -4,6 +4,7 @@ use super::Factor;
 use crate::RegressorError;
 use faer::Mat;
 use phiw_dynamics::check_size;
+use phiw_dynamics::dense::dot;
 
 /// A column whose part orthogonal to the columns before it is smaller than this share of its norm is undetermined.
 const RANK_TOLERANCE: f64 = 1e-7;
@@ -173,8 +174,4 @@ impl Factor {
         );
         Ok(inverse)
     }
-}
-
-fn dot(left: &[f64], right: &[f64]) -> f64 {
-    left.iter().zip(right).map(|(a, b)| a * b).sum()
 }
