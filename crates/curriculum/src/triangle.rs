@@ -5,7 +5,7 @@
 //! another touches the non-zeros only (n³/3 multiplications), and Lanczos' method finds the two in some tens of products.
 
 use phiw_dynamics::dense::dot;
-use phiw_regressor::factor::Factor;
+use phiw_regressor::factor::{Factor, solve_lower, solve_upper};
 
 /// An upper triangular matrix, column by column.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,20 +95,12 @@ impl Triangle {
 
     /// R⁻¹·x, in place.
     pub(crate) fn solve(&self, x: &mut [f64]) {
-        for column in (0..self.size).rev() {
-            let entries = self.column(column);
-            let value = x[column] / entries[column];
-            x[column] = value;
-            x[..column].iter_mut().zip(entries).for_each(|(rest, entry)| *rest -= value * entry);
-        }
+        solve_upper(|column| self.column(column), x);
     }
 
     /// R⁻ᵀ·x, in place.
     pub(crate) fn solve_transposed(&self, x: &mut [f64]) {
-        for column in 0..self.size {
-            let entries = self.column(column);
-            x[column] = (x[column] - dot(&entries[..column], &x[..column])) / entries[column];
-        }
+        solve_lower(|column| self.column(column), x);
     }
 
     /// The largest and the smallest singular value; the smallest is 0 where a diagonal element is.

@@ -99,6 +99,24 @@ proptest! {
     }
 
     #[test]
+    fn triangular_solves_undo_the_factor((columns, rows) in matrices()) {
+        let factor = Factor::of_rows(columns, &rows).unwrap();
+        prop_assume!(factor.undetermined_columns().is_empty());
+        let size = factor.parameters();
+        let r = DMatrix::from_fn(size, size, |row, column| factor.entry(row, column));
+        prop_assume!(factor.condition_number().unwrap() < 1e6);
+        let x = DVector::from_fn(size, |row, _| 1.0 + (row as f64).sin());
+        let (mut by_upper, mut by_lower) = ((&r * &x).as_slice().to_vec(), (r.transpose() * &x).as_slice().to_vec());
+        factor.solve_upper(&mut by_upper).unwrap();
+        factor.solve_lower(&mut by_lower).unwrap();
+        for row in 0..size {
+            assert_close(by_upper[row], x[row], 1e-7, "R⁻¹·R·x");
+            assert_close(by_lower[row], x[row], 1e-7, "R⁻ᵀ·Rᵀ·x");
+        }
+        prop_assert!(factor.solve_upper(&mut vec![0.0; size + 1]).is_err());
+    }
+
+    #[test]
     fn selecting_columns_is_the_factor_of_those_columns((columns, rows) in matrices(), seed in any::<u64>()) {
         let kept: Vec<usize> = (0..columns).rev().filter(|column| seed >> column & 1 == 1).collect();
         let chosen: Vec<f64> = rows.chunks(columns).flat_map(|row| kept.iter().map(|&column| row[column])).collect();

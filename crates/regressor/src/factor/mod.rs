@@ -7,9 +7,11 @@
 mod builder;
 mod leave_one_out;
 mod queries;
+mod substitution;
 mod triangle;
 
 pub use builder::FactorBuilder;
 pub use leave_one_out::leave_one_out;
 pub use queries::Solution;
+pub use substitution::{solve_lower, solve_upper};
 pub use triangle::Factor;
