@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod accumulate;
+mod block_source;
 mod checks;
 mod design;
 mod effect;
@@ -15,7 +16,8 @@ mod rates;
 mod reference;
 mod sample;
 
-pub use accumulate::{BlockSource, Fold, accumulate};
+pub use accumulate::{Fold, accumulate};
+pub use block_source::{BlockSource, try_for_each_block};
 pub use checks::{InputError, check_excitation, check_logs, check_size_of_factors, check_size_of_robot};
 pub use design::{Design, DesignScratch, RowLayout};
 pub use effect::{Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Entry, Evaluator};
@@ -25,8 +27,7 @@ pub use identify::{Data, Identified, Variants, identify};
 pub use kept_blocks::KeptBlocks;
 pub use log_set::{HELD_OUT_SHARE, LogFile, LogSet, Progress};
 pub use model::{
-    BodyParameters, EffectParameters, FactorRows, Model, NamedParameter, parameter_name, standard_unit,
-    with_masses,
+    BodyParameters, EffectParameters, FactorRows, Model, NamedParameter, parameter_name, standard_unit, with_masses,
 };
 pub use predict::{Prediction, predict};
 pub use reference::ReferenceModel;
