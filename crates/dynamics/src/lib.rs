@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod analytic;
+mod articulated_body;
 mod backend;
 mod configuration;
 pub mod dense;
