@@ -1,7 +1,6 @@
 //! Many recordings, in parallel, each by itself.
 
 use super::motion_file::{MotionFile, Settings};
-use super::stem;
 use crate::Error;
 use crate::arguments::RetargetArguments;
 use crate::console::Console;
@@ -223,4 +222,9 @@ fn one(
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// A file's name without folder and extension.
+pub(super) fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
