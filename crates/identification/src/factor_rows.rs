@@ -36,3 +36,28 @@ impl FactorRows {
         Ok(Factor::of_triangle(size, self.rows, &self.entries)?)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::FactorRows;
+    use phiw_regressor::factor::Factor;
+
+    /// A model's factor went through one more decomposition on its way back, which changed its last digits.
+    #[test]
+    fn a_factor_comes_back_to_the_last_bit_under_either_name_of_its_entries() {
+        let rows: Vec<f64> = (0..30).map(|k| (1.7 * f64::from(k) + 0.3).sin()).collect();
+        let factor = Factor::of_rows(3, &rows).unwrap();
+        let written = serde_json::to_string(&FactorRows::of(&factor, vec![4, 7])).unwrap();
+        for text in [written.clone(), written.replace("\"entries\"", "\"triangle\"")] {
+            let read: FactorRows = serde_json::from_str(&text).unwrap();
+            assert_eq!(read.parameters, [4, 7]);
+            assert_eq!(read.factor().unwrap(), factor, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_factor_with_an_entry_less_is_refused() {
+        let rows = FactorRows { parameters: vec![0, 1], rows: 3, entries: vec![1.0; 5] };
+        assert_eq!(rows.factor().unwrap_err().to_string(), "the model's factor has 5 entries, but 3 columns");
+    }
+}
