@@ -1,19 +1,20 @@
 //! From a recording to a motion of the robot: calibration, start, solution, and what it is worth.
 
-use crate::Problem;
 use crate::artefacts::Artefact;
 use crate::bspline::{Basis, Curve};
 use crate::human::{HumanBody, MarkerMap, Placed};
 use crate::human_start::human_start;
 use crate::marker_settings::MarkerSettings;
 use crate::quality::{Quality, quality};
-use crate::recording::{MarkerRecording, RecordingError, read_recording};
+use crate::reading::read_recording;
+use crate::recording::{MarkerRecording, RecordingError};
 use crate::retarget_error::{RetargetError, check_near};
 use crate::robot::{RobotError, RobotModel};
 use crate::robot_start::robot_start;
 use crate::solver::{Iterations, Solution, Stop, solve};
 use crate::start::{align, start};
 use crate::weights::{Cost, Weights};
+use crate::{Calibration, Problem};
 use phiw_dynamics::{Tree, Vec3};
 use phiw_limits::Limits;
 use std::collections::BTreeMap;
@@ -63,19 +64,6 @@ pub struct Retargeter {
     map: MarkerMap,
     robot: RobotModel,
     options: RetargetOptions,
-}
-
-/// What a static trial tells of a person.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Calibration {
-    /// Where markers sit on their segments.
-    pub markers: BTreeMap<String, Placed>,
-    /// The lengths ξ^h \[m\], in the order of [`crate::human::SEGMENT_PARAMETERS`].
-    pub lengths_m: Vec<f64>,
-    /// Coordinates of the pose by name \[rad, m\].
-    pub pose: BTreeMap<String, f64>,
-    /// RMS distance of the markers that the map places from where they are \[m\].
-    pub marker_rms_m: f64,
 }
 
 /// A person in one recording, as the markers alone tell.

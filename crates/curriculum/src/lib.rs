@@ -27,7 +27,7 @@ pub use candidates::{Candidate, Candidates};
 pub use constraint::{Constraint, Safety, Unconstrained, ZmpConstraint};
 pub use controller::{Controller, FeedForward};
 pub use curriculum::{Curriculum, Plan, unreliable_model};
-pub use end::{Certain, Converged, EndCriterion, EndReason, FixedCount};
+pub use end::{Certain, Converged, EndCriterion, FixedCount};
 pub use error::CurriculumError;
 pub use estimation::{
     Estimate, Estimator, Evidence, Gain, Instant, LeastSquares, MotionLikelihood, Prior, RowsAt,
@@ -37,7 +37,7 @@ pub use experiment::{BuildBackend, Experiment, SimulatedRobot, Trial};
 pub use growth::{Found, Growth, TraceResidual};
 pub use measured::Measured;
 pub use motion::{Motion, MotionDataset};
-pub use record::{IterationRecord, Run};
+pub use record::{EndReason, IterationRecord, Run};
 pub use relaxation::{ConditionRelaxation, Learnt, Maximum, Relaxation, Scale, UncertaintyRelaxation};
 pub use rivalry::Rivalry;
 pub use robot::{KnownEffect, Robot, RobotModel};

@@ -64,10 +64,7 @@ pub(crate) fn torques_along(
         // All of them in order, for effects with memory.
         scratch.evaluate(block, sample, &mut row)?;
         if sample % stride == 0 {
-            torques.extend(design.rows().iter().map(|layout| {
-                let columns = &row[layout.range.clone()];
-                columns.iter().zip(&layout.parameters).map(|(column, &k)| column * parameters[k]).sum::<f64>()
-            }));
+            torques.extend(design.rows().iter().map(|layout| layout.torque(&row, parameters)));
         }
     }
     Ok(torques)

@@ -289,3 +289,16 @@ fn positions_and_velocities_are_of_one_instant() {
         assert!((share - 0.5).abs() < 0.03, "{name}: {share}");
     }
 }
+
+/// A foot on a body beyond the last ended the program.
+#[test]
+fn a_foot_on_a_body_that_is_not_there_is_refused() {
+    let Humanoid { chain, legs, .. } = Humanoid::new();
+    let bodies = chain.bodies().len();
+    let foot = Foot { body: bodies, sole: vec![[0.0; 3]; 3] };
+    let error = Feet::new(&chain, &[foot], legs.stance()).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        format!("body {bodies} does not exist: there are {bodies}, counted from 0")
+    );
+}

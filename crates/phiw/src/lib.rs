@@ -2,7 +2,6 @@
 
 pub mod analysis;
 pub mod arguments;
-mod consistency;
 pub mod console;
 mod date;
 mod draws;

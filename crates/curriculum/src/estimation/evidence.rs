@@ -4,8 +4,7 @@ use super::foresight;
 use super::stored::StoredFactor;
 use crate::candidates::grouped_factor;
 use crate::{CurriculumError, Measured};
-use phiw_identification::Design;
-use phiw_regressor::RegressorError;
+use phiw_identification::{Design, IdentificationError};
 use phiw_regressor::factor::Factor;
 use phiw_regressor::least_squares::{Group, GroupedFactor};
 use phiw_telemetry::Block;
@@ -66,9 +65,9 @@ impl From<Evidence> for StoredEvidence {
 }
 
 impl TryFrom<StoredEvidence> for Evidence {
-    type Error = RegressorError;
+    type Error = IdentificationError;
 
-    fn try_from(stored: StoredEvidence) -> Result<Self, RegressorError> {
+    fn try_from(stored: StoredEvidence) -> Result<Self, IdentificationError> {
         let StoredEvidence { rows_at, factor, instants, foreseen } = stored;
         Ok(Evidence { rows_at, factor: factor.try_into()?, instants, foreseen })
     }

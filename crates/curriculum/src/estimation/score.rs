@@ -13,6 +13,7 @@ use crate::{CurriculumError, Measured, Robot, RobotModel};
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, Mat, Par, Side};
+use phiw_dynamics::dense::{Cholesky, dot};
 use phiw_identification::{Design, EffectSpec, RowLayout};
 use std::ops::Range;
 
@@ -294,28 +295,14 @@ impl<'a> Score<'a> {
 
 /// ½gᵀS⁻¹g and −S⁻¹g; none where the model leaves too little of a column (`squares` are those of the whole columns).
 fn newton(s: &Mat<f64>, g: &[f64], squares: &[f64]) -> Option<(f64, Vec<f64>)> {
-    let size = g.len();
-    let mut lower = Mat::<f64>::zeros(size, size);
-    let mut reduced = vec![0.0; size];
-    for row in 0..size {
-        for column in 0..=row {
-            let known: f64 = (0..column).map(|k| lower[(row, k)] * lower[(column, k)]).sum();
-            let rest = s[(row, column)] - known;
-            if row != column {
-                lower[(row, column)] = rest / lower[(column, column)];
-            } else if rest > LEFT * squares[row] {
-                lower[(row, row)] = rest.sqrt();
-            } else {
-                return None;
-            }
-        }
-        let known: f64 = (0..row).map(|k| lower[(row, k)] * reduced[k]).sum();
-        reduced[row] = (g[row] - known) / lower[(row, row)];
+    let factor = Cholesky::of(g.len(), |row, column| s[(row, column)])?;
+    let leaves_enough = |(row, square): (usize, &f64)| factor.entry(row, row).powi(2) > LEFT * square;
+    if !squares.iter().enumerate().all(leaves_enough) {
+        return None;
     }
-    let gain = 0.5 * reduced.iter().map(|value| value * value).sum::<f64>();
-    for row in (0..size).rev() {
-        let known: f64 = (row + 1..size).map(|k| lower[(k, row)] * reduced[k]).sum();
-        reduced[row] = (reduced[row] - known) / lower[(row, row)];
-    }
-    Some((gain, reduced.into_iter().map(|value| -value).collect()))
+    let mut step = g.to_vec();
+    factor.solve_lower(&mut step);
+    let gain = 0.5 * dot(&step, &step);
+    factor.solve_upper(&mut step);
+    Some((gain, step.into_iter().map(|value| -value).collect()))
 }

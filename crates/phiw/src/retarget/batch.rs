@@ -1,7 +1,6 @@
 //! Many recordings, in parallel, each by itself.
 
 use super::motion_file::{MotionFile, Settings};
-use super::stem;
 use crate::Error;
 use crate::arguments::RetargetArguments;
 use crate::console::Console;
@@ -220,4 +219,9 @@ fn one(
         .collect();
     output.write(&motion, &told, retargeter, &settings, arguments)?;
     Ok(Done::Retargeted(Box::new(motion.quality), recording.duration_s(), artefacts))
+}
+
+/// A file's name without folder and extension.
+pub(super) fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
