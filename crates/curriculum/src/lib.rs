@@ -10,14 +10,18 @@ mod error;
 mod estimation;
 mod experiment;
 mod growth;
+mod margin;
 mod measured;
 mod motion;
+mod motion_limits;
+mod planner;
 mod record;
 mod relaxation;
 mod rivalry;
 mod robot;
 mod score_test;
 pub mod selection;
+mod stance;
 pub mod standing;
 mod steps;
 mod triangle;
@@ -26,22 +30,28 @@ mod whiteness;
 pub use candidates::{Candidate, Candidates};
 pub use constraint::{Constraint, Safety, Unconstrained, ZmpConstraint};
 pub use controller::{Controller, FeedForward};
-pub use curriculum::{Curriculum, Plan, unreliable_model};
+pub use curriculum::{Curriculum, CurriculumSettings, unreliable_model};
 pub use end::{Certain, Converged, EndCriterion, EndReason, FixedCount};
 pub use error::CurriculumError;
 pub use estimation::{
-    Estimate, Estimator, Evidence, Gain, Instant, LeastSquares, MotionLikelihood, Prior, RowsAt,
-    WeightedLeastSquares,
+    BayesianLeastSquares, Estimate, Estimator, Evidence, Gain, Instant, LeastSquares, LogNoise,
+    MotionLikelihood, Prior, RowsAt, WeightedLeastSquares,
 };
 pub use experiment::{BuildBackend, Experiment, SimulatedRobot, Trial};
 pub use growth::{Found, Growth, TraceResidual};
+pub use margin::MotionMargin;
 pub use measured::Measured;
 pub use motion::{Motion, MotionDataset};
+pub use motion_limits::{Excess, MotionLimits, Unrest};
+pub use planner::{Belief, MeasuredSoFar, NoneAllowed, Permission, Plan, Policy, permission, plan};
 pub use record::{IterationRecord, Run};
-pub use relaxation::{ConditionRelaxation, Learnt, Maximum, Relaxation, Scale, UncertaintyRelaxation};
+pub use relaxation::{
+    ConditionRelaxation, ConstantReduction, Learnt, Maximum, Relaxation, Scale, UncertaintyRelaxation,
+};
 pub use rivalry::Rivalry;
 pub use robot::{KnownEffect, Robot, RobotModel};
 pub use score_test::ScoreTest;
 pub use selection::Selection;
+pub use stance::{StanceError, StanceSettings};
 pub use steps::StepTolerance;
 pub use triangle::Triangle;

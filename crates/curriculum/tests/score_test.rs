@@ -135,7 +135,7 @@ fn an_effect_that_was_found_does_not_change_what_cond_is_of() {
     let design = arm.robot.design(arm.robot.declared()).unwrap();
     let mut evidence = Evidence::none(&design, RowsAt::Periods).unwrap();
     run.logs.iter().for_each(|log| evidence.add(&design, log).unwrap());
-    let declared = arm.candidates.measured(evidence.factor()).unwrap().condition_number();
+    let declared = arm.candidates.measured(evidence.factor(), None).unwrap().condition_number();
     let kept = run.history.last().unwrap().condition_number.unwrap();
     assert!((kept / declared - 1.0).abs() < 1e-6, "{kept}, not {declared}");
 }

@@ -172,7 +172,7 @@ impl Setup {
             RelaxationName::Condition => Box::new(ConditionRelaxation::default()),
             RelaxationName::Uncertainty => Box::new(UncertaintyRelaxation::default()),
         };
-        let constraint = ZmpConstraint::new(subject.stance.clone());
+        let constraint = ZmpConstraint::of_the_paper(subject.stance.clone());
         let settings = Settings {
             backend: format!("{:?}", arguments.backend).to_lowercase(),
             robot: arguments.robot,

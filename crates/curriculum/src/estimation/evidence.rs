@@ -42,11 +42,11 @@ pub struct Instant {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(into = "StoredEvidence", try_from = "StoredEvidence")]
 pub struct Evidence {
-    rows_at: RowsAt,
-    factor: GroupedFactor,
-    instants: Vec<Instant>,
+    pub(super) rows_at: RowsAt,
+    pub(super) factor: GroupedFactor,
+    pub(super) instants: Vec<Instant>,
     /// Of which parameters the columns are those of the periods' beginnings; none of them if it is empty.
-    foreseen: Vec<bool>,
+    pub(super) foreseen: Vec<bool>,
 }
 
 #[derive(Serialize, Deserialize)]

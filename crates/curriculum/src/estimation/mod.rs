@@ -1,5 +1,6 @@
 //! From what was measured to parameters: equation (4), and estimators that know where the noise comes from.
 
+mod bayesian;
 mod evidence;
 mod foresight;
 mod least_squares;
@@ -10,6 +11,7 @@ mod score;
 mod sensitivity;
 mod stored;
 
+pub use bayesian::{BayesianLeastSquares, LogNoise};
 pub use evidence::{Evidence, Instant, RowsAt};
 pub use least_squares::{LeastSquares, WeightedLeastSquares};
 pub use likelihood::MotionLikelihood;

@@ -101,6 +101,7 @@ impl Arm {
             growth: None,
             end,
             rows_at: RowsAt::Periods,
+            settings: CurriculumSettings::default(),
         }
     }
 }
