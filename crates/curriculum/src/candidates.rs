@@ -1,7 +1,7 @@
 //! What each motion of the dataset would tell: its factor, computed once for all iterations and all runs.
 
 use crate::triangle::Triangle;
-use crate::{CurriculumError, MotionDataset, Robot, RobotModel};
+use crate::{CurriculumError, Evidence, MotionDataset, Robot, RobotModel};
 use phiw_identification::{Design, EffectSpec, Fold, accumulate};
 use phiw_regressor::RegressorError;
 use phiw_regressor::least_squares::GroupedFactor;
@@ -132,16 +132,14 @@ impl Candidates {
         &self.candidates
     }
 
-    /// R of what has been measured in the candidates' columns, weighted like them. `factor` is over the parameters of the belief.
-    ///
-    /// Where each torque has `rate_hz` rows a second \[Hz\], they count as if they were as dense in time as those of the motions; without it they count as they are.
+    /// R of what has been measured in the candidates' columns, weighted like them, its rows counted as if they were as dense in time as those of the motions.
     ///
     /// # Errors
-    /// The factor is of another robot.
-    pub fn measured(&self, factor: &GroupedFactor, rate_hz: Option<f64>) -> Result<Triangle, RegressorError> {
-        let density = rate_hz.map_or(1.0, |rate_hz| (self.rate_hz / rate_hz).sqrt());
+    /// The evidence is of another robot.
+    pub fn measured(&self, evidence: &Evidence) -> Result<Triangle, RegressorError> {
+        let density = evidence.rate_hz().map_or(1.0, |rate_hz| (self.rate_hz / rate_hz).sqrt());
         let weights: Vec<f64> = self.weights.iter().map(|weight| density * weight).collect();
-        Ok(Triangle::of_factor(&factor.select(&self.parameters)?.combine(&weights)?))
+        Ok(Triangle::of_factor(&evidence.factor().select(&self.parameters)?.combine(&weights)?))
     }
 }
 

@@ -1,5 +1,6 @@
 //! Algorithm 1, lines 10 to 17: select, measure, estimate, relax; and, where the model may grow, look for what it lacks.
 
+use crate::contest::{rivals_to_separate, unconfirmed};
 use crate::estimation::RowsAt;
 use crate::growth::Found;
 use crate::planner::{Belief, MeasuredSoFar, Policy, plan};
@@ -206,22 +207,16 @@ impl Curriculum<'_> {
     ) -> Result<(Learning, Vec<EffectSpec>), CurriculumError> {
         let mut with = self.fitted(&learning, &effects, logs)?;
         while let Some(misfit) = self.misfit(&with)? {
-            let mut least: Option<(f64, usize, Learning)> = None;
+            let (mut gains, mut without) = (Vec::new(), Vec::new());
             for place in 0..effects.len() {
                 let others = [&effects[..place], &effects[place + 1..]].concat();
-                let without = self.fitted(&learning, &others, logs)?;
-                let gain = self.misfit(&without)?.unwrap_or(f64::INFINITY) - misfit;
-                if least.as_ref().is_none_or(|least| gain < least.0) {
-                    least = Some((gain, place, without));
-                }
+                let learning = self.fitted(&learning, &others, logs)?;
+                gains.push(self.misfit(&learning)?.unwrap_or(f64::INFINITY) - misfit);
+                without.push(learning);
             }
-            match least {
-                Some((gain, place, without)) if gain < least_gain => {
-                    effects.remove(place);
-                    with = without;
-                }
-                _ => break,
-            }
+            let Some(place) = unconfirmed(&gains, least_gain) else { break };
+            effects.remove(place);
+            with = without.swap_remove(place);
         }
         Ok((with, effects))
     }
@@ -288,7 +283,7 @@ impl Curriculum<'_> {
         let Some(evidence) = run.evidence.as_ref().filter(|evidence| !evidence.is_empty()) else {
             return Ok(None);
         };
-        Ok(Some(self.candidates.measured(evidence.factor(), None)?))
+        Ok(Some(self.candidates.measured(evidence)?))
     }
 
     /// What the next iteration would do; none once the run has ended. For a real robot this is all there is to do before it moves.
@@ -334,17 +329,11 @@ impl Curriculum<'_> {
     }
 }
 
-/// The rivals that the next motion is to tell apart. A pair has one motion, and then the parameters have one: what tells rivals apart need not tell
-/// anything else, and rivals that one motion has not told may be rivals for ever.
+/// The rivals that the next motion is to tell apart.
 fn open_rivalry<'a>(rivals: &'a [Rivalry], history: &[IterationRecord]) -> Option<&'a Rivalry> {
-    if history.last().is_some_and(|record| record.separates.is_some()) {
-        return None;
-    }
-    let tried = |names: &[String; 2]| {
-        let separated = history.iter().filter_map(|record| record.separates.as_ref());
-        separated.into_iter().any(|pair| names.iter().all(|name| pair.contains(name)))
-    };
-    rivals.iter().find(|rivalry| !tried(&rivalry.names()))
+    let names: Vec<[String; 2]> = rivals.iter().map(Rivalry::names).collect();
+    let separated: Vec<Option<[String; 2]>> = history.iter().map(|record| record.separates.clone()).collect();
+    rivals_to_separate(&names, &separated).map(|index| &rivals[index])
 }
 
 /// The first belief of a run: [`RobotModel::unreliable`] about `truth`, the same for the same seed.

@@ -3,6 +3,7 @@
 
 mod candidates;
 mod constraint;
+mod contest;
 mod controller;
 mod curriculum;
 mod end;
@@ -29,6 +30,7 @@ mod whiteness;
 
 pub use candidates::{Candidate, Candidates};
 pub use constraint::{Constraint, Safety, Unconstrained, ZmpConstraint};
+pub use contest::{Contender, ScoreTestSettings, Winner, rivals_to_separate, unconfirmed};
 pub use controller::{Controller, FeedForward};
 pub use curriculum::{Curriculum, CurriculumSettings, unreliable_model};
 pub use end::{Certain, Converged, EndCriterion, EndReason, FixedCount};
@@ -38,7 +40,7 @@ pub use estimation::{
     MotionLikelihood, Prior, RowsAt, WeightedLeastSquares,
 };
 pub use experiment::{BuildBackend, Experiment, SimulatedRobot, Trial};
-pub use growth::{Found, Growth, TraceResidual};
+pub use growth::{Found, Growth, SessionSettings, TraceResidual};
 pub use margin::MotionMargin;
 pub use measured::Measured;
 pub use motion::{Motion, MotionDataset};
@@ -55,3 +57,4 @@ pub use selection::Selection;
 pub use stance::{StanceError, StanceSettings};
 pub use steps::StepTolerance;
 pub use triangle::Triangle;
+pub use whiteness::WhitenessSettings;

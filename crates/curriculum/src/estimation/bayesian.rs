@@ -107,9 +107,10 @@ impl Estimator for BayesianLeastSquares {
 }
 
 impl Evidence {
-    /// What somebody else has reduced: rows of \[Φ f\] of logs that were conditioned, as `phiw identify` has them.
-    pub fn of_factor(factor: GroupedFactor) -> Self {
-        Evidence { rows_at: super::RowsAt::Stamps, factor, instants: Vec::new(), foreseen: Vec::new() }
+    /// What somebody else has reduced: rows of \[Φ f\] of logs that were conditioned, as `phiw identify` has them, `rate_hz` of each torque a second \[Hz\].
+    pub fn of_factor(factor: GroupedFactor, rate_hz: Option<f64>) -> Self {
+        let rows_at = super::RowsAt::Stamps;
+        Evidence { rows_at, factor, instants: Vec::new(), foreseen: Vec::new(), rate_hz }
     }
 
     /// The same of rows that have been weighted and taken together, over these `parameters` of `count`: what a `model.json` keeps.
@@ -121,6 +122,6 @@ impl Evidence {
         parameters: Vec<usize>,
         factor: Factor,
     ) -> Result<Self, RegressorError> {
-        Ok(Self::of_factor(GroupedFactor::new(count, vec![Group { parameters, factor }])?))
+        Ok(Self::of_factor(GroupedFactor::new(count, vec![Group { parameters, factor }])?, None))
     }
 }

@@ -47,6 +47,8 @@ pub struct Evidence {
     pub(super) instants: Vec<Instant>,
     /// Of which parameters the columns are those of the periods' beginnings; none of them if it is empty.
     pub(super) foreseen: Vec<bool>,
+    /// Rows a second of each torque \[Hz\]; none where they are as dense as those of the motions.
+    pub(super) rate_hz: Option<f64>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -56,12 +58,14 @@ struct StoredEvidence {
     instants: Vec<Instant>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     foreseen: Vec<bool>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    rate_hz: Option<f64>,
 }
 
 impl From<Evidence> for StoredEvidence {
     fn from(evidence: Evidence) -> Self {
-        let Evidence { rows_at, factor, instants, foreseen } = evidence;
-        StoredEvidence { rows_at, factor: StoredFactor::from(&factor), instants, foreseen }
+        let Evidence { rows_at, factor, instants, foreseen, rate_hz } = evidence;
+        StoredEvidence { rows_at, factor: StoredFactor::from(&factor), instants, foreseen, rate_hz }
     }
 }
 
@@ -69,8 +73,8 @@ impl TryFrom<StoredEvidence> for Evidence {
     type Error = RegressorError;
 
     fn try_from(stored: StoredEvidence) -> Result<Self, RegressorError> {
-        let StoredEvidence { rows_at, factor, instants, foreseen } = stored;
-        Ok(Evidence { rows_at, factor: factor.try_into()?, instants, foreseen })
+        let StoredEvidence { rows_at, factor, instants, foreseen, rate_hz } = stored;
+        Ok(Evidence { rows_at, factor: factor.try_into()?, instants, foreseen, rate_hz })
     }
 }
 
@@ -93,7 +97,7 @@ impl Evidence {
         if !foreseen.contains(&true) {
             foreseen.clear();
         }
-        Ok(Evidence { rows_at, factor, instants: Vec::new(), foreseen })
+        Ok(Evidence { rows_at, factor, instants: Vec::new(), foreseen, rate_hz: None })
     }
 
     /// The same for a robot that moves without noise: all columns are those of a period's mean motion.
@@ -122,6 +126,11 @@ impl Evidence {
     /// R of \[Φ f\], one for each torque.
     pub fn factor(&self) -> &GroupedFactor {
         &self.factor
+    }
+
+    /// Rows a second of each torque \[Hz\]; none where they are as dense in time as those of the motions to choose from.
+    pub fn rate_hz(&self) -> Option<f64> {
+        self.rate_hz
     }
 
     /// Instants that stand for the motion.

@@ -5,7 +5,7 @@ mod permission;
 pub use permission::{NoneAllowed, Permission, permission};
 
 use crate::curriculum::{Purpose, random};
-use crate::selection::{Choice, Question};
+use crate::selection::{Best, Choice, Question, Scored, decide};
 use crate::triangle::Triangle;
 use crate::{
     Candidates, Constraint, CurriculumError, Learnt, MotionDataset, Relaxation, Rivalry, Robot, RobotModel,
@@ -144,18 +144,8 @@ fn separating(
     let mut differences = Vec::with_capacity(allowed.len());
     for &motion in allowed {
         let motion_of = &belief.dataset.motions()[motion];
-        let difference = rivalry.difference(belief.robot, motion_of, &scale, policy.rivalry_period_s)?;
-        differences.push((motion, difference));
+        let score = rivalry.difference(belief.robot, motion_of, &scale, policy.rivalry_period_s)?;
+        differences.push(Scored { motion, score });
     }
-    Ok(largest(differences))
-}
-
-/// The motion with the largest number, the first of equals.
-fn largest(mut numbers: Vec<(usize, f64)>) -> Choice {
-    numbers.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    Choice {
-        motion: numbers.first().map_or(0, |best| best.0),
-        merit: numbers.first().map(|best| best.1),
-        runner_up: numbers.get(1).copied(),
-    }
+    Ok(decide(&differences, Best::Largest).unwrap_or(Choice { motion: 0, merit: None, runner_up: None }))
 }

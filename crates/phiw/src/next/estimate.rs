@@ -15,8 +15,7 @@ use phiw_identification::{
     identify, merge, with_masses,
 };
 use phiw_limits::Limits;
-use phiw_regressor::BaseParameters;
-use phiw_regressor::least_squares::GroupedFactor;
+use phiw_regressor::{BaseParameters, RegressorError};
 use phiw_residual::Catalogue;
 use phiw_telemetry::Survey;
 use serde::Serialize;
@@ -59,10 +58,8 @@ pub struct Present {
 
 /// The measured logs, reduced.
 struct MeasuredLogs {
-    /// The factors of the rows of each log.
-    logs: Vec<GroupedFactor>,
-    /// Rows a second that each torque has in them \[Hz\].
-    rate_hz: f64,
+    /// What had been measured after each log.
+    after_each: Vec<Evidence>,
     /// How long they are together \[s\].
     seconds: f64,
 }
@@ -99,22 +96,13 @@ impl Present {
         let model = prior.model.with_parameters(&robot, &specs(&design), &estimate.parameters)?;
         let weights = vec![1.0; tree.joint_count()];
         let candidates = Candidates::foreseeable(&robot, &design, &motions.dataset, &weights)?;
-        let mut triangle: Option<Triangle> = None;
-        let mut condition_numbers = Vec::new();
-        for log in measured.iter().flat_map(|measured| &measured.logs) {
-            let rate_hz = measured.as_ref().map(|measured| measured.rate_hz);
-            let mut own = candidates.measured(log, rate_hz).map_err(CurriculumError::from)?;
-            let all = match triangle.take() {
-                Some(mut all) => {
-                    all.absorb(&mut own);
-                    all
-                }
-                None => own,
-            };
-            condition_numbers.push(Some(all.condition_number()));
-            triangle = Some(all);
-        }
-        let measured = measured.map(|measured| (measured.logs.len(), measured.seconds));
+        let after_each = measured.iter().flat_map(|measured| &measured.after_each);
+        let triangles: Vec<Triangle> = after_each
+            .map(|logs| candidates.measured(logs))
+            .collect::<Result<_, _>>()
+            .map_err(CurriculumError::from)?;
+        let condition_numbers = triangles.iter().map(|all| Some(all.condition_number())).collect();
+        let measured = measured.map(|measured| (measured.after_each.len(), measured.seconds));
         Ok(Present {
             source,
             robot,
@@ -123,7 +111,7 @@ impl Present {
             estimate,
             model,
             candidates,
-            triangle,
+            triangle: triangles.into_iter().last(),
             condition_numbers,
             measured,
         })
@@ -192,21 +180,20 @@ impl Known {
         let Identified { design, train_folds, held_out_folds, .. } = identify(tree, effects, &data)?;
         // What was held out to choose constants has been measured, too.
         let folds = [train_folds, held_out_folds].concat();
-        let of_log = |log: usize| {
+        let rate_hz = session.logs.conditioning().plan(&session.logs.surveys()[0])?.output_rate_hz();
+        let up_to = |log: usize| {
             let stretches = data.train.iter().chain(&data.held_out).zip(&folds);
-            let own: Vec<GroupedFactor> =
-                stretches.filter(|(fold, _)| fold.log == log).map(|(_, factor)| factor.clone()).collect();
-            (!own.is_empty()).then(|| merge(&own)).transpose()
+            let own = stretches.filter(|(fold, _)| fold.log <= log).map(|(_, factor)| factor.clone());
+            Ok(Evidence::of_factor(merge(&own.collect::<Vec<_>>())?, Some(rate_hz)))
         };
         let surveys = session.logs.training();
-        let logs = (0..surveys.len()).filter_map(|log| of_log(log).transpose());
+        let after_each: Result<Vec<Evidence>, RegressorError> = (0..surveys.len()).map(up_to).collect();
         let measured = MeasuredLogs {
-            logs: logs.collect::<Result<_, _>>().map_err(CurriculumError::from)?,
-            rate_hz: session.logs.conditioning().plan(&session.logs.surveys()[0])?.output_rate_hz(),
+            after_each: after_each.map_err(CurriculumError::from)?,
             seconds: surveys.iter().map(Survey::duration).sum(),
         };
         let noise = LogNoise::of_fit(&fit(&design, &folds)?);
-        let evidence = Evidence::of_factor(merge(&folds).map_err(CurriculumError::from)?);
+        let evidence = Evidence::of_factor(merge(&folds).map_err(CurriculumError::from)?, Some(rate_hz));
         Ok(Known { source: Source::Logs, design, evidence, noise, measured: Some(measured) })
     }
 }
