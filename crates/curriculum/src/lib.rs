@@ -36,14 +36,14 @@ pub use curriculum::{Curriculum, CurriculumSettings, unreliable_model};
 pub use end::{Certain, Converged, EndCriterion, EndReason, FixedCount};
 pub use error::CurriculumError;
 pub use estimation::{
-    BayesianLeastSquares, Estimate, Estimator, Evidence, Gain, Instant, LeastSquares, LogNoise,
-    MotionLikelihood, Prior, RowsAt, WeightedLeastSquares,
+    BayesianLeastSquares, Estimate, Estimator, Evidence, EvidenceSettings, Gain, Instant, LeastSquares,
+    LogNoise, MotionLikelihood, NewtonSettings, Prior, RowsAt, ScoreSettings, WeightedLeastSquares,
 };
-pub use experiment::{BuildBackend, Experiment, SimulatedRobot, Trial};
+pub use experiment::{BuildBackend, Experiment, SimulatedRobot, Stillness, Trial};
 pub use growth::{Found, Growth, SessionSettings, TraceResidual};
 pub use margin::MotionMargin;
 pub use measured::Measured;
-pub use motion::{Motion, MotionDataset};
+pub use motion::{Motion, MotionDataset, MotionTolerance};
 pub use motion_limits::{Excess, MotionLimits, Unrest};
 pub use planner::{Belief, MeasuredSoFar, NoneAllowed, Permission, Plan, Policy, permission, plan};
 pub use record::{IterationRecord, Run};

@@ -265,6 +265,7 @@ impl Setup {
             actuator_noise: noise,
             timing: timing(backend),
             fall_tilt_rad: 0.3,
+            stillness: Default::default(),
             build: Box::new(move |tree, world| backend.build(tree, world)),
         }
     }

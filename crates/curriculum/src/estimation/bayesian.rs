@@ -109,8 +109,8 @@ impl Estimator for BayesianLeastSquares {
 impl Evidence {
     /// What somebody else has reduced: rows of \[Φ f\] of logs that were conditioned, as `phiw identify` has them, `rate_hz` of each torque a second \[Hz\].
     pub fn of_factor(factor: GroupedFactor, rate_hz: Option<f64>) -> Self {
-        let rows_at = super::RowsAt::Stamps;
-        Evidence { rows_at, factor, instants: Vec::new(), foreseen: Vec::new(), rate_hz }
+        let settings = super::RowsAt::Stamps.into();
+        Evidence { settings, factor, instants: Vec::new(), foreseen: Vec::new(), rate_hz }
     }
 
     /// The same of rows that have been weighted and taken together, over these `parameters` of `count`: what a `model.json` keeps.
