@@ -22,9 +22,6 @@ pub struct ScoreTestSettings {
     pub most_effects: usize,
     /// Measured time below which nothing is looked for \[s\]. Default: 12.
     pub least_s: f64,
-    /// Kinds that are not asked for. Default: `thermal_drift`. Every log of a curriculum has a clock of its own: of what changes with the time since a motor was switched on, nothing is
-    /// known.
-    pub excluded: Vec<String>,
 }
 
 impl Default for ScoreTestSettings {
@@ -38,7 +35,6 @@ impl Default for ScoreTestSettings {
             refinements: 2,
             most_effects: 3,
             least_s: 12.0,
-            excluded: vec!["thermal_drift".to_owned()],
         }
     }
 }

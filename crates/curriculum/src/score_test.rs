@@ -5,8 +5,8 @@ use crate::growth::{Found, Growth};
 use crate::{
     CurriculumError, Estimator, Evidence, Gain, Measured, MotionLikelihood, Robot, RobotModel, RowsAt,
 };
+use phiw_effects::{Constants, EffectKind, JointRange, SignalRanges};
 use phiw_identification::{EffectCatalogue, EffectSpec};
-use phiw_residual::catalogue::{Constants, JointRange, SignalRanges};
 
 /// Asks of every effect of the catalogue what it would save of −log L ([`MotionLikelihood::gains`]), fits the few best in full, adds the simplest
 /// of those that explain alike if it is worth its price, and asks again.
@@ -41,8 +41,7 @@ impl ScoreTest {
     ) -> Result<Vec<Gain>, CurriculumError> {
         let ranges = ranges(robot, logs);
         let present = model.specs();
-        let mut candidates = candidates(robot, &ranges, &present);
-        candidates.retain(|effect| !self.settings.excluded.contains(&effect.kind));
+        let candidates = candidates(robot, &ranges, &present);
         let gains = self.estimator.gains(robot, model, logs, &candidates)?;
         let mut best = Vec::new();
         // Constants of one effect on one site follow each other.
@@ -203,11 +202,13 @@ fn is_alike(one: &EffectSpec, other: &EffectSpec) -> bool {
     one.kind == other.kind && one.joints == other.joints
 }
 
-/// Every effect that may be beside `present`, with all constants to try.
+/// Every effect that may be beside `present`, with all constants to try. Every log of a curriculum has a clock of its own: of what changes with the time since a motor
+/// was switched on, nothing is known.
 fn candidates(robot: &Robot, ranges: &SignalRanges, present: &[EffectSpec]) -> Vec<EffectSpec> {
     let tree = robot.tree();
     let mut specs = Vec::new();
-    for kind in robot.catalogue().kinds().filter(|kind| !kind.needs_held_model()) {
+    let can_be_told = |kind: &&dyn EffectKind| !kind.needs_held_model() && !kind.needs_session_time();
+    for kind in robot.catalogue().kinds().filter(can_be_told) {
         for site in kind.sites(tree) {
             let joints: Vec<String> = site.iter().map(|&joint| tree.joint(joint).joint.clone()).collect();
             let spec = |constants: Constants| EffectSpec {

@@ -114,7 +114,7 @@ impl Evidence {
         let factor = GroupedFactor::new(design.parameter_count(), groups)?;
         let mut foreseen = match settings.rows_at {
             RowsAt::Stamps => Vec::new(),
-            RowsAt::Periods => foresight::foreseen(design)?,
+            RowsAt::Periods => foresight::foreseen(design),
         };
         if !foreseen.contains(&true) {
             foreseen.clear();

@@ -18,6 +18,17 @@ pub struct WrenchNoise {
     pub moment_nm: f64,
 }
 
+impl WrenchNoise {
+    /// Standard deviation of the noise in the rows of the virtual joints \[N, N·m\], for so many feet with `lever_m` \[m\] between their soles and
+    /// the base: by this lever the forces' noise is noise of the moments at the base.
+    pub fn at_base(&self, feet: usize, lever_m: f64) -> [f64; BASE] {
+        let feet = (feet as f64).sqrt();
+        let force = feet * self.force_n;
+        let moment = feet * self.moment_nm.hypot(lever_m * self.force_n);
+        [force, force, force, moment, moment, moment]
+    }
+}
+
 /// A robot that stands on its feet, over any backend with contacts.
 ///
 /// Rows in which a foot moves (noise of the motors can lift an edge of a sole) are no rows of a robot whose feet stay, and do not count.

@@ -10,13 +10,13 @@ use phiw_curriculum::{
     RobotModel, RowsAt, Triangle,
 };
 use phiw_dynamics::{InertialParameters, Tree};
+use phiw_effects::Catalogue;
 use phiw_identification::{
     Design, EffectCatalogue, EffectSpec, IdentificationError, Identified, Progress, check_size_of_robot, fit,
     identify, merge, with_masses,
 };
 use phiw_limits::Limits;
 use phiw_regressor::{BaseParameters, RegressorError};
-use phiw_residual::Catalogue;
 use phiw_telemetry::Survey;
 use serde::Serialize;
 
