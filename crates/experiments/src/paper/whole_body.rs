@@ -178,6 +178,7 @@ impl Subject {
                 ..Timing::default()
             },
             fall_tilt_rad: 0.3,
+            stillness: Default::default(),
             build: Box::new(move |tree, world| build(backend, tree, world)),
         };
         let wrench_noise = if noise > 0.0 { WRENCH_NOISE } else { silent };
