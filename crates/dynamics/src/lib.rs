@@ -2,6 +2,7 @@
 
 mod analytic;
 mod backend;
+mod body_kinematics;
 mod configuration;
 mod forward_dynamics;
 mod inertia;
@@ -19,7 +20,8 @@ mod workspace;
 mod world;
 
 pub use analytic::AnalyticBackend;
-pub use backend::{BackendError, DynamicsBackend};
+pub use backend::{BackendError, DynamicsBackend, SimulationBackend};
+pub use body_kinematics::{BodyJoint, BodyKinematics, MotionSubspace};
 pub use inertia::Inertia;
 pub use motion::BodyMotion;
 pub use scalar::{Dual, Lanes, Scalar};

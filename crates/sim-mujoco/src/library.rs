@@ -107,6 +107,9 @@ functions! {
     mj_RungeKutta: fn(*const Model, *mut Data, c_int);
     mj_implicit: fn(*const Model, *mut Data);
     mj_rnePostConstraint: fn(*const Model, *mut Data);
+    mj_objectVelocity: fn(*const Model, *const Data, c_int, c_int, *mut f64, c_int);
+    mj_objectAcceleration: fn(*const Model, *const Data, c_int, c_int, *mut f64, c_int);
+    mj_jacBody: fn(*const Model, *const Data, *mut f64, *mut f64, c_int);
     mj_contactForce: fn(*const Model, *const Data, c_int, *mut f64);
     mju_setLogHandler: fn(Option<LogHandler>) -> Option<LogHandler>;
 }
