@@ -34,6 +34,10 @@ const CHECKS: [Check; 3] = [
     },
 ];
 
+/// Licences, duplicates and sources of what is linked, by `deny.toml`. Advisories are left out: they need a network.
+const DEPENDENCIES: Check =
+    Check { arguments: &["deny", "check", "licenses", "bans", "sources"], environment: &[] };
+
 /// `--show-output` prints what passing tests said, so that a test that skipped itself is seen and counted.
 const TESTS: &[&str] = &["test", "--workspace", "--no-fail-fast", "--", "--show-output"];
 
@@ -44,7 +48,15 @@ const TESTS: &[&str] = &["test", "--workspace", "--no-fail-fast", "--", "--show-
 pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     mujoco::fetch_or_go_on_without();
     let mut failed = Vec::new();
-    let checks = if arguments.quick { &[] } else { &CHECKS[..] };
+    let mut checks = Vec::new();
+    let mut unchecked_dependencies = false;
+    if !arguments.quick {
+        match has_deny()? {
+            true => checks.push(&DEPENDENCIES),
+            false => unchecked_dependencies = true,
+        }
+        checks.extend(&CHECKS);
+    }
     for check in checks {
         if !passes(check)? {
             failed.push(check.arguments);
@@ -58,8 +70,20 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     for arguments in &failed {
         println!("failed: cargo {}", arguments.join(" "));
     }
+    if unchecked_dependencies {
+        println!(
+            "skipped: cargo-deny is not installed: licences, duplicates and sources of dependencies are unchecked"
+        );
+    }
     println!("{tally}");
     Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Whether `cargo deny` can be run.
+fn has_deny() -> anyhow::Result<bool> {
+    let version =
+        environment::cargo()?.args(["deny", "--version"]).output().context("cargo cannot be started")?;
+    Ok(version.status.success())
 }
 
 fn passes(check: &Check) -> anyhow::Result<bool> {

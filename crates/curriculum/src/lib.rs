@@ -19,6 +19,7 @@ mod robot;
 mod score_test;
 pub mod selection;
 pub mod standing;
+mod steps;
 mod triangle;
 mod whiteness;
 
@@ -42,4 +43,5 @@ pub use rivalry::Rivalry;
 pub use robot::{KnownEffect, Robot, RobotModel};
 pub use score_test::ScoreTest;
 pub use selection::Selection;
+pub use steps::StepTolerance;
 pub use triangle::Triangle;

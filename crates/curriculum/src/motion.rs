@@ -1,6 +1,6 @@
 //! Motions to choose from: the robot's motion dataset (Q₁ʳ, …, Q_Kʳ).
 
-use crate::CurriculumError;
+use crate::{CurriculumError, StepTolerance};
 use phiw_plant::Reference;
 use phiw_telemetry::{Block, Recording};
 
@@ -61,7 +61,7 @@ impl Motion {
     /// A motion from a log with positions, velocities and accelerations, as `phiw retarget` writes it.
     ///
     /// # Errors
-    /// A signal is missing, the stamps are not even, or a number is not finite.
+    /// A signal is missing, the stamps are not even, a number is not finite, or the signals contradict each other.
     pub fn from_recording(name: &str, task: &str, recording: &Recording) -> Result<Self, CurriculumError> {
         let wrong =
             |problem: &str| CurriculumError::Motion { name: name.to_owned(), problem: problem.to_owned() };
@@ -81,6 +81,7 @@ impl Motion {
         let signals = [recording.q.clone(), qd.clone(), qdd.clone()];
         let motion = Self::new(name, task, recording.joints.len(), period_s, signals)?;
         motion.check_derivatives(&recording.joints)?;
+        motion.check_steps(&recording.joints, &[], &StepTolerance::default())?;
         Ok(motion)
     }
 

@@ -16,7 +16,7 @@ mod reference;
 mod sample;
 
 pub use accumulate::{BlockSource, Fold, accumulate};
-pub use checks::{InputError, check_excitation, check_logs, check_size_of_factors};
+pub use checks::{InputError, check_excitation, check_logs, check_size_of_factors, check_size_of_robot};
 pub use design::{Design, DesignScratch, RowLayout};
 pub use effect::{Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Entry, Evaluator};
 pub use error::IdentificationError;

@@ -66,6 +66,16 @@ pub enum Error {
         /// What is wrong with it.
         source: Box<IdentificationError>,
     },
+    /// A model file of another robot.
+    #[error("{} does not fit {}: {source}", path.display(), urdf.display())]
+    ModelOfAnother {
+        /// The model.
+        path: PathBuf,
+        /// The robot.
+        urdf: PathBuf,
+        /// The first difference.
+        source: Box<IdentificationError>,
+    },
     /// The robot's base floats.
     #[error("{}: the robot's base floats, and a log does not hold its motion; make its joint of type floating a fixed one", path.display())]
     FloatingBase {
@@ -153,7 +163,7 @@ pub enum Error {
         /// The log.
         path: PathBuf,
         /// What is wrong with it.
-        source: CurriculumError,
+        source: Box<CurriculumError>,
     },
     /// A joint that no motion moves.
     #[error(
@@ -219,7 +229,7 @@ pub enum Error {
     Curriculum(#[from] CurriculumError),
     /// The identified parameters cannot be written as a URDF.
     #[error("identified.urdf: {0}")]
-    IdentifiedUrdf(UrdfError),
+    IdentifiedUrdf(Box<UrdfError>),
     /// All logs of the training together.
     #[error("{logs}: {source}")]
     TrainingLogs {
@@ -253,6 +263,7 @@ impl Error {
             | Error::FloatingBase { .. }
             | Error::NotAModel { .. }
             | Error::Model { .. }
+            | Error::ModelOfAnother { .. }
             | Error::Map { .. }
             | Error::Robot { .. }
             | Error::Recording(_)

@@ -12,6 +12,7 @@ mod explain_page;
 pub mod identified_urdf;
 pub mod identify;
 mod input;
+mod model_file;
 pub mod next;
 mod not_identified;
 pub mod output;

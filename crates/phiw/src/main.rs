@@ -13,8 +13,7 @@ fn main() -> ExitCode {
     std::panic::set_hook(Box::new(|fault| {
         console::say("error: phiw itself is at fault, please report it: ", &fault.to_string());
     }));
-    threads::start();
-    std::panic::catch_unwind(|| run(&arguments)).unwrap_or(ExitCode::FAILURE)
+    std::panic::catch_unwind(|| threads::with(|| run(&arguments))).unwrap_or(ExitCode::FAILURE)
 }
 
 /// Does what was asked for and says what became of it.

@@ -3,12 +3,15 @@
 use super::motions::Motions;
 use crate::Error;
 use crate::arguments::NextArguments;
+use crate::model_file::ModelFile;
 use crate::session::{Session, declared};
 use phiw_curriculum::{CurriculumError, KnownEffect, RobotModel};
 use phiw_dynamics::Tree;
 use phiw_identification::{
-    Design, EffectCatalogue, EffectSpec, Fit, Identified, Model, Progress, fit, identify, merge, with_masses,
+    Design, EffectCatalogue, EffectSpec, Fit, IdentificationError, Identified, Progress, check_size_of_robot,
+    fit, identify, merge, with_masses,
 };
+use phiw_limits::Limits;
 use phiw_regressor::factor::{Factor, FactorBuilder};
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_regressor::{BaseParameters, RegressorError};
@@ -79,7 +82,7 @@ impl Estimate {
         motions: &Motions,
         progress: Progress<'_>,
     ) -> Result<Self, Error> {
-        let model = arguments.model.as_ref().map(|path| read_model(path)).transpose()?;
+        let model = arguments.model.as_ref().map(|path| ModelFile::read(path)).transpose()?;
         let logs = match arguments.measured.is_empty() {
             true => None,
             false => Some(Logs::new(arguments, tree, model.as_ref(), progress)?),
@@ -87,7 +90,7 @@ impl Estimate {
         let share = arguments.urdf_error;
         match (model, logs) {
             (Some(model), logs) => {
-                let (design, _) = model.design(tree, &Catalogue::default())?;
+                let (design, _) = model.design(&arguments.urdf, tree, &Catalogue::default())?;
                 let measured = logs.map(|logs| logs.measured);
                 Self::of_evidence(design, Some((Source::Model, Evidence::of_model(&model)?)), measured, share)
             }
@@ -164,11 +167,12 @@ fn posterior(
 }
 
 impl Evidence {
-    fn of_model(model: &Model) -> Result<Self, Error> {
+    fn of_model(file: &ModelFile) -> Result<Self, Error> {
+        let model = &file.model;
         let effects = model.effects.iter().flat_map(|effect| &effect.parameters);
         let named = model.base_parameters.iter().chain(effects);
         let deviations: Vec<f64> = named.map(|parameter| parameter.std.unwrap_or(f64::NAN)).collect();
-        let (factor, columns) = (model.factor.factor()?, model.factor.parameters.clone());
+        let (factor, columns) = (file.factor()?, model.factor.parameters.clone());
         Ok(Evidence { correlation: correlation(&factor, &columns, &deviations), factor, columns })
     }
 
@@ -205,7 +209,7 @@ impl Logs {
     fn new(
         arguments: &NextArguments,
         tree: &Tree,
-        model: Option<&Model>,
+        model: Option<&ModelFile>,
         progress: Progress<'_>,
     ) -> Result<Self, Error> {
         // A first motion may leave joints at rest: the next will not.
@@ -214,7 +218,7 @@ impl Logs {
         let data = session.data(&sources);
         let effects = match model {
             Some(model) => {
-                let (design, _) = model.design(tree, &session.catalogue)?;
+                let (design, _) = model.design(&arguments.urdf, tree, &session.catalogue)?;
                 let build = |spec: &EffectSpec| Ok(vec![session.catalogue.build(spec, tree)?]);
                 specs(&design).iter().map(build).collect::<Result<_, Error>>()?
             }
@@ -239,14 +243,6 @@ impl Logs {
     }
 }
 
-fn read_model(path: &std::path::Path) -> Result<Model, Error> {
-    let text = crate::input::read_text(path, phiw_limits::Limits::default().model_bytes)?;
-    let model: Model =
-        serde_json::from_str(&text).map_err(|source| Error::NotAModel { path: path.to_owned(), source })?;
-    model.check().map_err(|source| Error::Model { path: path.to_owned(), source: Box::new(source) })?;
-    Ok(model)
-}
-
 /// The declared columns when there is no log yet. Nothing can choose among an effect's constants then: the simplest stand for all.
 fn unmeasured_design(arguments: &NextArguments, tree: &Tree, motions: &Motions) -> Result<Design, Error> {
     let catalogue = Catalogue::default();
@@ -255,6 +251,9 @@ fn unmeasured_design(arguments: &NextArguments, tree: &Tree, motions: &Motions) 
         let variants = catalogue.declare(&kind, tree, &motions.ranges)?;
         effects.extend(variants.into_iter().filter_map(|variants| variants.into_iter().next()));
     }
+    // The factors of a motion, and those of all that is known.
+    let of_effects = effects.iter().map(|effect| effect.as_ref());
+    check_size_of_robot(tree, of_effects, 2, &Limits::default()).map_err(IdentificationError::from)?;
     let base = BaseParameters::of_tree(tree, Default::default()).map_err(CurriculumError::from)?;
     Ok(Design::new(tree.clone(), base, effects))
 }

@@ -108,7 +108,7 @@ impl FactorBuilder {
         columns: &[usize],
         weight: f64,
     ) -> Result<(), RegressorError> {
-        check_size("columns of the merged factor", columns.len(), factor.columns())?;
+        check_size("the columns of a factor to be taken in", columns.len(), factor.columns())?;
         let rows = self.rows + factor.rows();
         let mut row = vec![0.0; self.columns];
         for index in 0..factor.columns() {

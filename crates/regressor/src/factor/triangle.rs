@@ -122,7 +122,7 @@ impl Factor {
         let identity: Vec<usize> = (0..first.columns).collect();
         let mut builder = FactorBuilder::new(first.columns);
         for factor in std::iter::once(first).chain(factors) {
-            check_size("columns of the merged factor", factor.columns, first.columns)?;
+            check_size("the columns of a factor to be taken in", factor.columns, first.columns)?;
             builder.push_factor(factor, &identity, 1.0)?;
         }
         Ok(builder.factor())
