@@ -71,19 +71,26 @@ where
     let largest = over_states(tree, states, 11, |RandomState { q, v, a }| {
         backend.body_motions(q, v, a, &mut found)?;
         tree.body_motions(q, v, a, &mut expected);
-        let kinds: [fn(&BodyMotion<f64>) -> Vec<f64>; 5] = [
-            |motion| motion.placement.rotation.0.concat(),
-            |motion| motion.placement.translation.0.to_vec(),
-            |motion| motion.angular_velocity.0.to_vec(),
-            |motion| motion.angular_acceleration.0.to_vec(),
-            |motion| motion.proper_acceleration.0.to_vec(),
-        ];
-        Ok(kinds.iter().fold(0.0, |largest, kind| {
-            let all = |motions: &[BodyMotion<f64>]| motions.iter().flat_map(kind).collect::<Vec<_>>();
-            worse(largest, relative_difference(&all(&found), &all(&expected)))
-        }))
+        let (found, expected) = (numbers_by_kind(&found), numbers_by_kind(&expected));
+        Ok(found
+            .iter()
+            .zip(&expected)
+            .fold(0.0, |largest, (found, expected)| worse(largest, relative_difference(found, expected))))
     })?;
     Measured::check("motions of bodies against the tree's", largest, AGREEMENT, "")
+}
+
+/// The numbers of all motions: rotations, translations, angular velocities, angular and linear accelerations.
+fn numbers_by_kind(motions: &[BodyMotion<f64>]) -> [Vec<f64>; 5] {
+    let mut kinds: [Vec<f64>; 5] = Default::default();
+    for motion in motions {
+        kinds[0].extend(motion.placement.rotation.0.as_flattened());
+        kinds[1].extend(motion.placement.translation.0);
+        kinds[2].extend(motion.angular_velocity.0);
+        kinds[3].extend(motion.angular_acceleration.0);
+        kinds[4].extend(motion.proper_acceleration.0);
+    }
+    kinds
 }
 
 /// Φw = τ over the backend's own kinematics: the joint torque regressor of the motion that the backend computes, times the tree's

@@ -3,7 +3,7 @@
 
 use crate::inertial::PrincipalInertia;
 use crate::layout::{contact, data, model};
-use crate::library::{Data, Functions, Model, functions};
+use crate::library::{Data, Functions, Model, ObjectMotion, functions};
 use crate::mjcf::placeholder;
 use crate::{Integrator, MujocoError};
 use phiw_dynamics::{Mat3, Placement, Spatial, Vec3};
@@ -44,11 +44,6 @@ impl Drop for Simulation {
 
 /// MuJoCo's name for the frames of bodies (`mjOBJ_XBODY`), as against those of their inertias.
 const BODY_FRAME: i32 = 2;
-
-/// A motion as MuJoCo writes it, the angular half first.
-fn angular_first([rx, ry, rz, x, y, z]: [f64; 6]) -> Spatial<f64> {
-    Spatial { linear: Vec3([x, y, z]), angular: Vec3([rx, ry, rz]) }
-}
 
 /// A model that nobody owns yet.
 struct Compiled(&'static Functions, NonNull<Model>);
@@ -250,36 +245,21 @@ impl Simulation {
 
     /// The velocity of a body's frame along its own axes.
     pub fn body_velocity(&self, body: usize) -> Spatial<f64> {
-        let mut velocity = [0.0; 6];
-        // SAFETY: the invariant; the body is one of the model's, and there is room for six numbers.
-        unsafe {
-            (self.functions.mj_objectVelocity)(
-                self.model.as_ptr(),
-                self.data.as_ptr(),
-                BODY_FRAME,
-                self.number_of(body),
-                velocity.as_mut_ptr(),
-                1,
-            );
-        }
-        angular_first(velocity)
+        self.object_motion(self.functions.mj_objectVelocity, body)
     }
 
     /// The acceleration of a body's frame, its origin's less gravity, along its own axes; after [`Self::accelerate_bodies`].
     pub fn body_acceleration(&self, body: usize) -> Spatial<f64> {
-        let mut acceleration = [0.0; 6];
-        // SAFETY: as in `body_velocity`.
-        unsafe {
-            (self.functions.mj_objectAcceleration)(
-                self.model.as_ptr(),
-                self.data.as_ptr(),
-                BODY_FRAME,
-                self.number_of(body),
-                acceleration.as_mut_ptr(),
-                1,
-            );
-        }
-        angular_first(acceleration)
+        self.object_motion(self.functions.mj_objectAcceleration, body)
+    }
+
+    fn object_motion(&self, function: ObjectMotion, body: usize) -> Spatial<f64> {
+        let mut motion = [0.0; 6];
+        let (model, data) = (self.model.as_ptr(), self.data.as_ptr());
+        // SAFETY: the invariant; the body is one of the model's, and there is room for six numbers.
+        unsafe { function(model, data, BODY_FRAME, self.number_of(body), motion.as_mut_ptr(), 1) };
+        let [rx, ry, rz, x, y, z] = motion;
+        Spatial { linear: Vec3([x, y, z]), angular: Vec3([rx, ry, rz]) }
     }
 
     /// The motion of a body's frame, along the world's axes, that unit velocity of a coordinate gives it. Allocates.
