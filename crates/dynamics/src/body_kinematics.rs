@@ -17,8 +17,8 @@ pub struct BodyJoint {
 /// configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MotionSubspace {
-    /// One coordinate; the body's velocity against its parent is this axis \[1 for a slide, rad/m for a turn\] times the
-    /// coordinate's. For a joint that follows another, the ratio is part of the axis.
+    /// One coordinate, whose velocity times this axis is the body's velocity against its parent. A prismatic joint has a linear unit vector,
+    /// a revolute joint an angular one; for a joint that follows another it is multiplied by the ratio.
     Axis(Spatial<f64>),
     /// Six coordinates of a floating base: the linear, then the angular velocity of the body in its own frame.
     Floating,
@@ -34,22 +34,24 @@ impl MotionSubspace {
         }
     }
 
-    /// The motion that unit velocity of the subspace's coordinate `coordinate` gives; zero where there is no such coordinate.
+    /// Writes the motion that unit velocity of each coordinate gives, one after the other; as many as there is room for.
     #[inline(always)]
-    pub fn axis<T: Scalar>(&self, coordinate: usize) -> Spatial<T> {
+    pub fn axes<T: Scalar>(&self, axes: &mut [Spatial<T>]) {
         match self {
-            MotionSubspace::Axis(axis) if coordinate == 0 => {
-                Spatial { linear: Vec3::constant(axis.linear.0), angular: Vec3::constant(axis.angular.0) }
-            }
-            MotionSubspace::Axis(_) => Spatial::zero(),
-            MotionSubspace::Floating => {
-                let mut axis = Spatial::zero();
-                match coordinate {
-                    0..3 => axis.linear.0[coordinate] = T::one(),
-                    3..6 => axis.angular.0[coordinate - 3] = T::one(),
-                    _ => (),
+            MotionSubspace::Axis(Spatial { linear, angular }) => {
+                if let Some(axis) = axes.first_mut() {
+                    *axis = Spatial { linear: Vec3::constant(linear.0), angular: Vec3::constant(angular.0) };
                 }
-                axis
+            }
+            MotionSubspace::Floating => {
+                for (coordinate, axis) in axes.iter_mut().take(6).enumerate() {
+                    *axis = Spatial::zero();
+                    if coordinate < 3 {
+                        axis.linear.0[coordinate] = T::one();
+                    } else {
+                        axis.angular.0[coordinate - 3] = T::one();
+                    }
+                }
             }
         }
     }
@@ -93,7 +95,7 @@ pub trait BodyKinematics<T: Scalar = f64> {
     /// Whether the first body floats.
     #[inline(always)]
     fn has_floating_base(&self) -> bool {
-        self.body_count() > 0 && self.body_joint(0).motion_subspace == MotionSubspace::Floating
+        self.body_count() > 0 && matches!(self.body_joint(0).motion_subspace, MotionSubspace::Floating)
     }
 }
 

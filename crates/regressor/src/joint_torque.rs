@@ -37,6 +37,9 @@ pub struct RegressorScratch<T> {
 
 impl JointTorqueRegressor {
     /// The structure of φ for a robot: `&tree`, or whatever else knows how the robot's bodies hang together.
+    ///
+    /// # Panics
+    /// A body comes before its parent, which [`BodyKinematics`] rules out.
     pub fn new(robot: impl BodyKinematics) -> Self {
         let bodies = robot.body_count();
         // Coordinates of each body's chain, from the root down.
@@ -196,8 +199,8 @@ impl JointTorqueRegressor {
             for (axis, outer) in axes.iter_mut().zip(inherited) {
                 *axis = motion.placement.motion_inverse(*outer);
             }
-            for (coordinate, axis) in axes.iter_mut().skip(inherited.len()).enumerate() {
-                *axis = joint.motion_subspace.axis(coordinate);
+            if let Some(own) = axes.get_mut(inherited.len()..) {
+                joint.motion_subspace.axes(own);
             }
             for (axis, target) in axes.iter().zip(&self.chains[index]) {
                 let start = target.pair * PARAMETERS_PER_BODY;
