@@ -1,7 +1,7 @@
 //! Where measurements come from: a trait, and a simulated robot over any backend.
 
 use crate::{Controller, CurriculumError, Measured, Motion, Robot, RobotModel};
-use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World};
+use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
 use phiw_plant::{Effect, History, Plant, PlantSetup, Reaction, Run as PlantRun, Sensors, Timing};
 use rand_chacha::ChaCha8Rng;
 
@@ -34,7 +34,8 @@ pub trait Experiment: Send + Sync {
 }
 
 /// Makes a backend of the robot as it is built.
-pub type BuildBackend = dyn Fn(&Tree, &World) -> Result<Box<dyn DynamicsBackend>, BackendError> + Send + Sync;
+pub type BuildBackend =
+    dyn Fn(&Tree, &World) -> Result<Box<dyn SimulationBackend>, BackendError> + Send + Sync;
 
 /// A simulated robot: the plant of the paper's Figure 2, over any backend.
 ///

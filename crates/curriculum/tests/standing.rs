@@ -3,7 +3,7 @@
 use phiw_curriculum::standing::*;
 use phiw_curriculum::*;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
-use phiw_dynamics::{BackendError, DynamicsBackend, Foot, Tree, Workspace, World};
+use phiw_dynamics::{BackendError, Foot, SimulationBackend, Tree, Workspace, World};
 use phiw_plant::{Gains, Timing, feet_from_toml};
 use phiw_regressor::BaseParameters;
 use rand::SeedableRng;
@@ -100,11 +100,11 @@ impl Humanoid {
     }
 }
 
-fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     Ok(Box::new(phiw_sim_rapier::RapierBackend::new(tree, world)?))
 }
 
-fn mujoco(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+fn mujoco(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     let backend = phiw_sim_mujoco::MujocoBackend::new(tree, world);
     let backend =
         backend.map_err(|error| BackendError::Backend { backend: "mujoco", message: error.to_string() })?;
