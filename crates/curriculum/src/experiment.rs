@@ -2,7 +2,7 @@
 
 use crate::{Controller, CurriculumError, Measured, Motion, Robot, RobotModel};
 use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World};
-use phiw_plant::{Effect, History, Plant, PlantSetup, Reaction, Run as PlantRun, Sensors, Timing};
+use phiw_plant::{Effect, History, Plant, PlantRun, PlantSetup, Reaction, Sensors, Timing};
 use rand_chacha::ChaCha8Rng;
 
 /// What happened when a motion was tried.

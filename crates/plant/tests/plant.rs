@@ -4,8 +4,8 @@ mod plants;
 
 use phiw_dynamics::{BackendError, DimensionError, DynamicsBackend, Foot, Placement, Tree, World};
 use phiw_plant::{
-    Clock, ComputedTorque, Coupling, Effect, Friction, Gains, Mechanism, Plant, PlantError, PlantSetup, Run,
-    Sensors, Timing, TorqueModel,
+    Clock, ComputedTorque, Coupling, Effect, Friction, Gains, Mechanism, Plant, PlantError, PlantRun,
+    PlantSetup, Sensors, Timing, TorqueModel,
 };
 use plants::{analytic, model, motion, poor_controller, random, rms, rotors, run, setup, true_steps};
 
@@ -79,7 +79,7 @@ fn sensors_add_what_they_are_told() {
     let coarse = with(Sensors { angle_quantum: list(quantum), ..Sensors::default() });
     assert!(coarse.recording.q.iter().all(|q| (q / quantum - (q / quantum).round()).abs() < 1e-9));
     let angle =
-        |run: &Run, row: usize| run.history.drive_angle_at(2, run.recording.t[row] - run.recording.t[0]);
+        |run: &PlantRun, row: usize| run.history.drive_angle_at(2, run.recording.t[row] - run.recording.t[0]);
     let error =
         rms((0..coarse.recording.len()).map(|row| coarse.recording.q[row * 6 + 2] - angle(&coarse, row)));
     assert!((error / (quantum / 12.0_f64.sqrt()) - 1.0).abs() < 0.15, "{error}");
@@ -156,7 +156,7 @@ fn limp(joints: usize, effects: Vec<Effect>) -> PlantSetup {
 }
 
 /// A double pendulum swings from level: its energy, springs and motors included, at all steps.
-fn energies(effects: Vec<Effect>, stored: &dyn Fn(&Run, usize) -> f64) -> Vec<f64> {
+fn energies(effects: Vec<Effect>, stored: &dyn Fn(&PlantRun, usize) -> f64) -> Vec<f64> {
     let tree = model("planar2", false);
     let world = World { rotor_inertia: vec![0.05, 0.02], ..World::default() };
     let flexible = effects.iter().any(|effect| matches!(effect, Effect::Flexibility { .. }));
@@ -190,7 +190,7 @@ fn at(values: &[f64], row: usize, joint: usize) -> f64 {
 
 #[test]
 fn what_stores_energy_keeps_it_and_what_rubs_takes_it() {
-    let check_kept = |effects: Vec<Effect>, stored: &dyn Fn(&Run, usize) -> f64| {
+    let check_kept = |effects: Vec<Effect>, stored: &dyn Fn(&PlantRun, usize) -> f64| {
         let energies = energies(effects, stored);
         let drift = energies.iter().map(|energy| (energy - energies[0]).abs()).fold(0.0, f64::max);
         assert!(drift < 0.02, "{drift} J of some 60 J exchanged");
