@@ -31,5 +31,5 @@ pub use plant::{Plant, PlantSetup, Timing};
 pub use presliding::Presliding;
 pub use reference::{FadedSines, MultiSine, Reference};
 pub use run::{PlantRun, Reaction};
-pub use sensors::{Clock, Sensors};
+pub use sensors::{Clock, Derivatives, Sensors};
 pub use support::{SupportError, feet_from_toml};
