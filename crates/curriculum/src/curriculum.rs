@@ -1,6 +1,7 @@
 //! Algorithm 1, lines 10 to 17: select, measure, estimate, relax; and, where the model may grow, look for what it lacks.
 
 use crate::estimation::RowsAt;
+use crate::experiment::check_noise;
 use crate::growth::Found;
 use crate::selection::{Choice, Question};
 use crate::triangle::Triangle;
@@ -88,6 +89,7 @@ impl Curriculum<'_> {
     /// # Errors
     /// The run is not of this robot, the robot can not be run, or nothing can be estimated.
     pub fn step(&self, run: &mut Run) -> Result<(), CurriculumError> {
+        check_noise(self.robot, self.experiment, self.estimator)?;
         let Some(plan) = self.plan(run)? else { return Ok(()) };
         let motion = &self.dataset.motions()[plan.choice.motion];
         let mut noise = random(run.seed, run.history.len(), Purpose::Experiment);

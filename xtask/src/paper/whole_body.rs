@@ -17,7 +17,7 @@ use phiw_curriculum::{Motion, Robot, SimulatedRobot};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{BackendError, DynamicsBackend, Foot, PARAMETERS_PER_BODY, Tree, World};
 use phiw_identification::EffectSpec;
-use phiw_plant::{Effect, Timing, feet_from_toml};
+use phiw_plant::{Effect, Sensors, Timing, feet_from_toml};
 use phiw_regressor::BaseParameters;
 use phiw_residual::catalogue::Catalogue;
 use phiw_sim_mujoco::{Integrator, MujocoBackend};
@@ -242,6 +242,7 @@ impl Subject {
                 stance: standing.stance.clone(),
             }),
             actuator_noise: noise,
+            sensors: Sensors::exact(CONTROL_PERIOD_S),
             timing: Timing {
                 control_period_s: CONTROL_PERIOD_S,
                 longest_step_s: LONGEST_STEP_S,
