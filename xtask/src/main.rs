@@ -1,5 +1,6 @@
 //! Experiments and set-up of the workspace: `cargo xtask <task>`.
 
+mod consumers;
 mod environment;
 mod mujoco;
 mod oracle;

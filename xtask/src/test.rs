@@ -2,6 +2,7 @@
 
 mod tally;
 
+use crate::consumers::Consumers;
 use crate::{environment, mujoco};
 use anyhow::Context;
 use std::io::{BufRead, BufReader};
@@ -62,10 +63,20 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             failed.push(check.arguments);
         }
     }
-    let (mut tally, passed) = run_tests()?;
+    let mut tally = Tally::default();
     tally.add_failures(failed.len() as u64);
-    if !passed {
+    if !run_tests(TESTS, &mut tally)? {
         failed.push(TESTS);
+    }
+    let consumers = Consumers::generate()?;
+    tally.add_failures(consumers.problems.len() as u64);
+    let arguments = consumers.arguments()?;
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    if !run_tests(&arguments, &mut tally)? {
+        failed.push(&arguments);
+    }
+    for problem in &consumers.problems {
+        println!("failed: {problem}");
     }
     for arguments in &failed {
         println!("failed: cargo {}", arguments.join(" "));
@@ -76,7 +87,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         );
     }
     println!("{tally}");
-    Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if failed.is_empty() && consumers.problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// Whether `cargo deny` can be run.
@@ -96,15 +107,15 @@ fn passes(check: &Check) -> anyhow::Result<bool> {
     Ok(status.success())
 }
 
-/// Runs the tests, passing on their output line by line, and counts; whether all is well.
-fn run_tests() -> anyhow::Result<(Tally, bool)> {
-    announce(TESTS);
+/// Runs tests, passing on their output line by line, and counts; whether all is well.
+fn run_tests(arguments: &[&str], tally: &mut Tally) -> anyhow::Result<bool> {
+    announce(arguments);
     let mut child = environment::cargo()?
-        .args(TESTS)
+        .args(arguments)
         .stdout(Stdio::piped())
         .spawn()
         .context("cargo cannot be started")?;
-    let mut tally = Tally::default();
+    let failures = tally.failures();
     if let Some(output) = child.stdout.take() {
         for line in BufReader::new(output).split(b'\n') {
             let line = line.context("the output of the tests cannot be read")?;
@@ -114,10 +125,10 @@ fn run_tests() -> anyhow::Result<(Tally, bool)> {
         }
     }
     let passed = child.wait().context("cargo test did not end")?.success();
-    if !passed && !tally.has_failures() {
+    if !passed && tally.failures() == failures {
         tally.add_failures(1); // tests that do not compile, or a binary that crashed
     }
-    Ok((tally, passed))
+    Ok(passed)
 }
 
 fn announce(arguments: &[&str]) {
