@@ -2,9 +2,9 @@
 
 mod tally;
 
-use crate::consumers::Consumers;
-use crate::{environment, mujoco};
+use crate::{consumers, mujoco};
 use anyhow::Context;
+use phiw_experiments::environment;
 use std::io::{BufRead, BufReader};
 use std::process::{ExitCode, Stdio};
 use tally::Tally;
@@ -60,26 +60,25 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     }
     for check in checks {
         if !passes(check)? {
-            failed.push(check.arguments);
+            failed.push(named(check.arguments));
         }
     }
     let mut tally = Tally::default();
     tally.add_failures(failed.len() as u64);
     if !run_tests(TESTS, &mut tally)? {
-        failed.push(TESTS);
+        failed.push(named(TESTS));
     }
-    let consumers = Consumers::generate()?;
-    tally.add_failures(consumers.problems.len() as u64);
-    let arguments = consumers.arguments()?;
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    if !run_tests(&arguments, &mut tally)? {
-        failed.push(&arguments);
+    let folder = tempfile::Builder::new().prefix("phiw-consumers-").tempdir()?;
+    let problems = consumers::generate(folder.path())?;
+    tally.add_failures(problems.len() as u64);
+    failed.extend(problems);
+    let consumers = consumers::arguments(folder.path())?;
+    let consumers: Vec<&str> = consumers.iter().map(String::as_str).collect();
+    if !run_tests(&consumers, &mut tally)? {
+        failed.push(named(&consumers));
     }
-    for problem in &consumers.problems {
+    for problem in &failed {
         println!("failed: {problem}");
-    }
-    for arguments in &failed {
-        println!("failed: cargo {}", arguments.join(" "));
     }
     if unchecked_dependencies {
         println!(
@@ -87,7 +86,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         );
     }
     println!("{tally}");
-    Ok(if failed.is_empty() && consumers.problems.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// Whether `cargo deny` can be run.
@@ -132,5 +131,9 @@ fn run_tests(arguments: &[&str], tally: &mut Tally) -> anyhow::Result<bool> {
 }
 
 fn announce(arguments: &[&str]) {
-    println!("\n=== cargo {}", arguments.join(" "));
+    println!("\n=== {}", named(arguments));
+}
+
+fn named(arguments: &[&str]) -> String {
+    format!("cargo {}", arguments.join(" "))
 }

@@ -127,7 +127,9 @@ fn a_pipe_in_the_place_of_a_file_is_refused() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_small_address_space_is_no_panic() {
-    for (kilobytes, threads) in [(200_000, "1"), (200_000, ""), (80_000, "1"), (80_000, "64")] {
+    for (kilobytes, threads) in
+        [(1_000_000, ""), (200_000, "1"), (200_000, ""), (80_000, "1"), (80_000, "64")]
+    {
         let folder = TempDir::new().unwrap();
         fs::write(folder.path().join("robot.urdf"), synthetic::URDF).unwrap();
         fs::write(folder.path().join("train.csv"), synthetic::csv(&synthetic::recording(1, 15.0))).unwrap();
