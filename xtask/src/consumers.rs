@@ -3,8 +3,7 @@
 use anyhow::Context;
 use phiw_experiments::environment;
 use serde_json::Value;
-use std::collections::BTreeSet;
-use std::{fs, path::Path};
+use std::{collections::BTreeSet, fs, path::Path};
 
 /// Writes a workspace into `folder`, with a crate for each published crate that uses it as its README does. What is returned are published crates without an example
 /// that can be run, or with metadata that are not complete: one line each.
