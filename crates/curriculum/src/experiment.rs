@@ -2,6 +2,7 @@
 
 use crate::{Controller, CurriculumError, Estimator, KnownEffect, Measured, Motion, Robot, RobotModel};
 use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World};
+use phiw_effects::JointProperty;
 use phiw_plant::{Effect, Friction, History, Plant, PlantRun, PlantSetup, Reaction, Sensors, Timing};
 use rand_chacha::ChaCha8Rng;
 
@@ -190,25 +191,24 @@ impl Experiment for SimulatedRobot {
     }
 }
 
-/// The effects of a model as a plant has them: one law of physics under two names.
+/// The effects of a model as a plant has them: those that simulators express as a property of a joint.
 fn plant_effects(robot: &Robot, model: &RobotModel) -> Result<Vec<Effect>, CurriculumError> {
     robot.design(&model.specs())?;
     let effect = |known: &KnownEffect| {
-        let not_simulated = || CurriculumError::NotSimulated { kind: known.spec.kind.clone() };
-        let width = known.spec.constants.get("sign_width").copied().unwrap_or(0.0);
-        let ([name], &[value]) = (known.spec.joints.as_slice(), known.parameters.as_slice()) else {
-            return Err(not_simulated());
+        let property = robot.catalogue().joint_property(&known.spec);
+        let joint = known.spec.joints.first().and_then(|joint| robot.tree().joint_index(joint));
+        let (Some(property), Some(joint), &[value]) = (property, joint, known.parameters.as_slice()) else {
+            return Err(CurriculumError::NotSimulated { kind: known.spec.kind.clone() });
         };
-        let joint = robot.tree().joint_index(name).ok_or_else(not_simulated)?;
-        let friction = |law: Friction| Effect::Friction { joint, law };
-        Ok(match known.spec.kind.as_str() {
-            "viscous_friction" => friction(Friction::Viscous { coefficient: value }),
-            "coulomb_friction" => friction(Friction::Coulomb { torque: value, width }),
-            "quadratic_friction" => friction(Friction::Quadratic { coefficient: value }),
-            "load_dependent_friction" => friction(Friction::LoadDependent { coefficient: value, width }),
-            "rotor_inertia" => Effect::RotorInertia { joint, inertia: value },
-            "torque_offset" => Effect::TorqueOffset { joint, torque: value },
-            _ => return Err(not_simulated()),
+        let width = known.spec.constants.get("sign_width").copied().unwrap_or(0.0);
+        Ok(match property {
+            JointProperty::Damping => {
+                Effect::Friction { joint, law: Friction::Viscous { coefficient: value } }
+            }
+            JointProperty::Friction => {
+                Effect::Friction { joint, law: Friction::Coulomb { torque: value, width } }
+            }
+            JointProperty::Armature => Effect::RotorInertia { joint, inertia: value },
         })
     };
     model.effects.iter().map(effect).collect()

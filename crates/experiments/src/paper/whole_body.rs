@@ -16,10 +16,10 @@ use phiw_curriculum::standing::{
 use phiw_curriculum::{Motion, Robot, SimulatedRobot};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{BackendError, DynamicsBackend, Foot, PARAMETERS_PER_BODY, Tree, World};
+use phiw_effects::Catalogue;
 use phiw_identification::EffectSpec;
 use phiw_plant::{Effect, Sensors, Timing, feet_from_toml};
 use phiw_regressor::BaseParameters;
-use phiw_residual::catalogue::Catalogue;
 use phiw_sim_mujoco::{Integrator, MujocoBackend};
 use phiw_zmp::{Stance, SupportPolygon};
 

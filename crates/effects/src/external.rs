@@ -1,6 +1,7 @@
 //! What acts from outside or has been added: a payload, a force, gravity from another direction.
 
-use super::kind::{Constants, EffectKind};
+use crate::fitted::FittedEffect;
+use crate::kind::{Constants, EffectKind, Signal};
 use phiw_dynamics::{PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree};
 use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
 use phiw_regressor::JointTorqueRegressor;
@@ -20,6 +21,12 @@ impl EffectKind for Payload {
     }
     fn telling_motion(&self) -> &'static str {
         "the same motion with and without the payload"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!("The link behind {} carries {} more than the model knows.", found.joints(), found.quantity(0))
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let regressor = JointTorqueRegressor::new(tree);
@@ -64,6 +71,13 @@ impl EffectKind for ExternalForce {
     }
     fn telling_motion(&self) -> &'static str {
         "rests in many poses, with and without what pulls"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, force) = (found.joints(), found.quantity(0));
+        format!("Something pulls at the link behind {joint} (a hose, a cable): {force} along x.")
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let regressor = JointTorqueRegressor::new(tree);
@@ -166,10 +180,20 @@ impl EffectKind for GravityTilt {
     fn telling_motion(&self) -> &'static str {
         "rests in many poses of the first joint"
     }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let lean = (found.value(0).hypot(found.value(1)) / STANDARD_GRAVITY).clamp(-1.0, 1.0).asin();
+        format!("The base is not level: gravity leans by {:.2} degrees.", lean.to_degrees())
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
+    }
     fn build(&self, tree: &Tree, _site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         Box::new(Tilt { joints: tree.joint_count(), constants: constants.clone() })
     }
 }
+
+/// What the lean of the base is measured against \[m/s²\].
+const STANDARD_GRAVITY: f64 = 9.81;
 
 struct Tilt {
     joints: usize,
@@ -185,7 +209,7 @@ impl Effect for Tilt {
             joint: "base".to_owned(),
             name: name.to_owned(),
             unit: "m/s²".to_owned(),
-            bounds: (-9.81, 9.81),
+            bounds: (-STANDARD_GRAVITY, STANDARD_GRAVITY),
         };
         vec![parameter("gx"), parameter("gy")]
     }

@@ -1,24 +1,9 @@
-//! The catalogue of effects. One file for each physical cause; [`Catalogue`] finds them by name.
+//! The catalogue finds kinds of effects by name, declares them for a robot, and builds them from a model's file.
 
-mod columns;
-mod coupling;
-mod drift;
-mod drive;
-mod elasticity;
-mod external;
-mod friction;
-mod hysteresis;
-mod kind;
-mod position;
-mod sensing;
-mod sentence;
-
-pub use columns::{Formula, OwnTorque, ParameterKind, smooth_sign};
-pub use kind::{Constants, EffectKind, JointRange, SignalRanges};
-pub use sentence::sentence;
-
+use crate::{Constants, EffectKind, FittedEffect, JointProperty, SignalRanges};
+use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, EffectCatalogue, EffectError, EffectSpec, Variants};
+use phiw_identification::{Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Variants};
 
 /// Kinds of effects by name, in the order of simplicity: of two that explain alike, the earlier is preferred.
 pub struct Catalogue {
@@ -26,7 +11,7 @@ pub struct Catalogue {
 }
 
 impl Default for Catalogue {
-    /// The 23 kinds that phiw knows.
+    /// All kinds that phiw knows.
     fn default() -> Self {
         Catalogue {
             kinds: vec![
@@ -81,6 +66,17 @@ impl Catalogue {
             let nearest = known.iter().min_by_key(distance).filter(|other| distance(other) <= 5).cloned();
             EffectError::UnknownKind { kind: name.to_owned(), nearest, known }
         })
+    }
+
+    /// The property of a joint that expresses an effect, if its kind is known and has one.
+    pub fn joint_property(&self, spec: &EffectSpec) -> Option<JointProperty> {
+        self.kind(&spec.kind).ok()?.joint_property()
+    }
+
+    /// What an effect means, with its fitted values; a kind that is unknown here gets its name and numbers.
+    pub fn sentence(&self, spec: &EffectSpec, parameters: &[EffectParameter], fitted: &[f64]) -> String {
+        let found = FittedEffect::new(spec, parameters, fitted);
+        self.kind(&spec.kind).map_or_else(|_| found.plainly(), |kind| kind.sentence(&found))
     }
 
     /// A kind on every joint of the robot, each with the constants that the data may choose from.

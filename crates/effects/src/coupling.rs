@@ -1,8 +1,9 @@
 //! Two joints behind one transmission: each feels the other's motion, or their sum (differential wrists).
 
-use super::columns::{ParameterKind, smooth_sign};
-use super::friction::WIDTH;
-use super::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
+use crate::columns::{ParameterKind, smooth_sign};
+use crate::fitted::FittedEffect;
+use crate::friction::WIDTH;
+use crate::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Sample};
 
@@ -96,6 +97,18 @@ const TERMS: [Term; 8] = [
     },
 ];
 
+/// How each term is said, the most telling first.
+const SAID: [(&str, &str); 8] = [
+    ("fv_cross", "of coupled viscous friction"),
+    ("fc_sum", "of friction with the sign of the sum of their speeds"),
+    ("fc_difference", "of friction with the sign of the difference of their speeds"),
+    ("Ia_cross", "of coupled inertia"),
+    ("fv_of_second_on_first", "of viscous friction of the second on the first"),
+    ("fv_of_first_on_second", "of viscous friction of the first on the second"),
+    ("fc_of_second_on_first", "of Coulomb friction of the second on the first"),
+    ("fc_of_first_on_second", "of Coulomb friction of the first on the second"),
+];
+
 /// Sets of terms to try, simplest first: single terms, then the differential's.
 const COMBINATIONS: [u32; 14] =
     [1, 2, 4, 8, 16, 32, 64, 128, 1 | 4, 1 | 8, 1 | 2 | 4, 1 | 2 | 8, 16 | 64, 32 | 128];
@@ -123,10 +136,20 @@ impl EffectKind for TransmissionCoupling {
         if constant(found, TERMS_CONSTANT, 0.0) as u32 & 0b1100_1100 == 0 {
             return Vec::new();
         }
-        super::kind::around(found, WIDTH, step)
+        crate::kind::around(found, WIDTH, step)
     }
     fn telling_motion(&self) -> &'static str {
         "each of the two joints moving alone, then both together"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let terms = SAID.iter().flat_map(|(term, words)| {
+            found
+                .quantities()
+                .filter(move |(name, _)| name == term)
+                .map(move |(_, value)| format!("{value} {words}"))
+        });
+        let terms: Vec<String> = terms.collect();
+        format!("{} share a transmission: {}.", found.joints(), terms.join(", "))
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let chosen = constant(constants, TERMS_CONSTANT, 7.0) as u32;
@@ -189,6 +212,10 @@ impl Effect for Coupling {
                 .collect::<Vec<_>>()
         };
         self.terms.iter().enumerate().flat_map(of_term).collect()
+    }
+    /// Terms with a sign, whose parameters are torques, are not.
+    fn is_linear_in_motion(&self, parameter: usize) -> bool {
+        self.terms.get(parameter).is_some_and(|term| term.dimension != ParameterKind::Torque)
     }
     fn evaluator(&self) -> Box<dyn Evaluator + '_> {
         Box::new(CouplingColumns {

@@ -1,6 +1,7 @@
 //! A flexible transmission between motor and link.
 
-use super::kind::{Constants, EffectKind, constant};
+use crate::fitted::FittedEffect;
+use crate::kind::{Constants, EffectKind, Signal, constant};
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
 
@@ -19,6 +20,12 @@ impl EffectKind for JointElasticity {
     }
     fn telling_motion(&self) -> &'static str {
         "quick reversals, so that the torque changes fast"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!("The transmission of {} gives: {:.3e} {}.", found.joints(), found.value(0), found.unit(0))
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Acceleration
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
@@ -73,6 +80,9 @@ impl Effect for Elastic {
     fn relinearised(&self, fitted: &[f64]) -> Option<Box<dyn Effect>> {
         let compliance = (self.compliance + fitted.first().copied().unwrap_or_default()).max(0.0);
         Some(Box::new(Elastic { compliance, ..self.clone() }))
+    }
+    fn is_causal(&self) -> bool {
+        false
     }
     fn evaluator(&self) -> Box<dyn Evaluator + '_> {
         Box::new(ElasticColumns { joint: self.joint, joints: self.joints })

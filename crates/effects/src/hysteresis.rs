@@ -1,7 +1,8 @@
 //! Friction with memory: presliding and backlash.
 
-use super::columns::{Formula, OwnTorque, ParameterKind};
-use super::kind::{Constants, EffectKind, SignalRanges, around, constant, values};
+use crate::columns::{Formula, OwnTorque, ParameterKind};
+use crate::fitted::FittedEffect;
+use crate::kind::{Constants, EffectKind, SignalRanges, around, constant, values};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, Sample};
 
@@ -28,6 +29,14 @@ impl EffectKind for Hysteresis {
     }
     fn telling_motion(&self) -> &'static str {
         "small slow strokes of growing size about one position"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!(
+            "The torque of {} depends on the way since the last reversal: {} over {:.4} rad or m.",
+            found.joints(),
+            found.quantity(0),
+            found.constant(PRESLIDING)
+        )
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let formula = Dahl { joint: site[0], presliding: constant(constants, PRESLIDING, 0.05) };

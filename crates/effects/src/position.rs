@@ -1,7 +1,8 @@
 //! Torques that depend on the position alone: springs, balancers, ripple, end stops.
 
-use super::columns::{OwnTorque, ParameterKind};
-use super::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
+use crate::columns::{OwnTorque, ParameterKind};
+use crate::fitted::FittedEffect;
+use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant, product, values};
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::{Effect, Sample};
 
@@ -14,6 +15,12 @@ impl EffectKind for JointSpring {
     }
     fn telling_motion(&self) -> &'static str {
         "slow motion over the whole range of the joint"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!("A spring pulls {} back: {}.", found.joints(), found.quantity(0))
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
@@ -43,6 +50,13 @@ impl EffectKind for GravityBalancer {
     }
     fn telling_motion(&self) -> &'static str {
         "slow motion over the whole range, in several poses of the joints behind"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, amplitude) = (found.joints(), found.amplitude());
+        format!("{joint} is counterbalanced: up to {amplitude} as a sine of its angle.")
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
@@ -86,6 +100,18 @@ impl EffectKind for TorqueRipple {
     }
     fn telling_motion(&self) -> &'static str {
         "slow motion at constant speed"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let periods = found.constant(FREQUENCY);
+        format!(
+            "The torque of {} ripples by {} with {:.2} periods a radian over 2π ({periods:.1} a turn).",
+            found.joints(),
+            found.amplitude(),
+            periods / std::f64::consts::TAU
+        )
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
@@ -138,6 +164,13 @@ impl EffectKind for EndStop {
     }
     fn telling_motion(&self) -> &'static str {
         "slow motion up to the limit and back"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, stiffness) = (found.joints(), found.quantity(0));
+        format!("{joint} runs into something stiff at {:.3}: {stiffness}.", found.constant(STOP))
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];

@@ -1,7 +1,8 @@
 //! What the motor and its measurement add: rotor inertia, offset, gain.
 
-use super::columns::{OwnTorque, ParameterKind};
-use super::kind::{Constants, EffectKind};
+use crate::columns::{OwnTorque, ParameterKind};
+use crate::fitted::FittedEffect;
+use crate::kind::{Constants, EffectKind, JointProperty, Signal};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, Needs, Sample};
 
@@ -18,11 +19,22 @@ impl EffectKind for RotorInertia {
     fn telling_motion(&self) -> &'static str {
         "quick accelerations in several poses of the joints behind"
     }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, inertia) = (found.joints(), found.quantity(0));
+        format!("{joint} carries a rotor inertia of {inertia} that the links do not account for.")
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Acceleration
+    }
+    fn joint_property(&self) -> Option<JointProperty> {
+        Some(JointProperty::Armature)
+    }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = sample.qdd()[joint];
         let parameters = [("Ia", ParameterKind::Inertia, 0.0)];
-        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+        let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
+        Box::new(effect.linear_in_motion())
     }
 }
 
@@ -38,6 +50,12 @@ impl EffectKind for TorqueOffset {
     }
     fn telling_motion(&self) -> &'static str {
         "rests in several poses"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!("The torque of {} is off by a constant {}.", found.joints(), found.quantity(0))
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let columns = move |_: &Sample<'_>, out: &mut [f64]| out[0] = 1.0;
@@ -59,6 +77,12 @@ impl EffectKind for TorqueGain {
     }
     fn telling_motion(&self) -> &'static str {
         "a known load on the joint"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!("The torque of {} is measured {:+.1} % too large.", found.joints(), 100.0 * found.value(0))
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Torque
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];

@@ -1,8 +1,9 @@
 //! Friction that changes with time or temperature.
 
-use super::columns::{OwnTorque, ParameterKind, smooth_sign};
-use super::friction::WIDTH;
-use super::kind::{Constants, EffectKind, SignalRanges, around, constant, values};
+use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
+use crate::fitted::FittedEffect;
+use crate::friction::WIDTH;
+use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, values};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, Sample};
 
@@ -35,6 +36,16 @@ impl EffectKind for ThermalDrift {
     }
     fn telling_motion(&self) -> &'static str {
         "the same motion cold and warm"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, time) = (found.joints(), found.constant(TIME_CONSTANT));
+        format!("The friction of {joint} falls as it warms up, over {time:.0} s.")
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Time
+    }
+    fn needs_session_time(&self) -> bool {
+        true
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];

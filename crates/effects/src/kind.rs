@@ -1,5 +1,6 @@
 //! What the catalogue knows of a kind of effect.
 
+use crate::FittedEffect;
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
 use phiw_telemetry::Survey;
@@ -8,9 +9,36 @@ use std::collections::BTreeMap;
 /// Non-linear constants of an effect by name, SI units.
 pub type Constants = BTreeMap<String, f64>;
 
-/// A kind of effect: where it can act, which constants to try, and how to build it.
+/// A signal that an effect's torque can be plotted against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Signal {
+    /// The joint's position \[rad, m\].
+    Position,
+    /// The joint's velocity \[rad/s, m/s\].
+    Velocity,
+    /// The joint's acceleration \[rad/s², m/s²\].
+    Acceleration,
+    /// The joint's measured torque \[N·m, N\].
+    Torque,
+    /// Time \[s\].
+    Time,
+}
+
+/// A property of a joint by which simulators express an effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointProperty {
+    /// Torque against the velocity, over it \[N·m·s/rad, N·s/m\]; `damping` of a URDF.
+    Damping,
+    /// Torque against the direction of motion \[N·m, N\]; `friction` of a URDF.
+    Friction,
+    /// Inertia that the joint's own motion alone feels \[kg·m², kg\]; a URDF has no place for it.
+    Armature,
+}
+
+/// A kind of effect: where it can act, which constants to try, how to build it, and what the rest of the program needs to know of it.
 ///
-/// Implement it for an effect of your own and add it with [`crate::Catalogue::with`].
+/// What it says of its parameters (units, physical bounds) and columns (linear in the motion, causal) the [`Effect`] says that it builds.
+/// Implement it for an effect of your own and add it with [`crate::Catalogue::with`]: see the recipe on the crate's front page.
 pub trait EffectKind: Send + Sync {
     /// Its name, as in `report.json`.
     fn name(&self) -> &str;
@@ -57,6 +85,41 @@ pub trait EffectKind: Send + Sync {
 
     /// The motion, or the signal, that would tell it from its rivals.
     fn telling_motion(&self) -> &'static str;
+
+    /// What it means when it was found, with its fitted values, in one sentence to a user: its name and numbers by default.
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        found.plainly()
+    }
+
+    /// The signal that its torque is best seen against.
+    fn seen_against(&self) -> Signal {
+        Signal::Velocity
+    }
+
+    /// Names of kinds that are tried together with it on one site as well: either alone mimics the other in part.
+    fn goes_with(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// Names of its constants that belong to the joint rather than to the effect: where it is in a model, other kinds on the same site take the values that it has.
+    fn constants_of_the_site(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// The property of a joint that holds its only parameter, in a URDF or a simulator; none if neither can express it.
+    fn joint_property(&self) -> Option<JointProperty> {
+        None
+    }
+
+    /// Whether it always takes energy from the motion: its power is that of a brake at every moment, whatever its parameters are within their bounds.
+    fn dissipates(&self) -> bool {
+        false
+    }
+
+    /// Whether it changes with the time since the session began, so that logs whose clocks each begin anew cannot tell it.
+    fn needs_session_time(&self) -> bool {
+        false
+    }
 
     /// Builds it. `site` is one that it accepts; constants that are missing take their defaults.
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect>;
@@ -124,18 +187,18 @@ impl SignalRanges {
 }
 
 /// One set for each value of one constant.
-pub(super) fn values(name: &str, values: impl IntoIterator<Item = f64>) -> Vec<Constants> {
+pub(crate) fn values(name: &str, values: impl IntoIterator<Item = f64>) -> Vec<Constants> {
     values.into_iter().map(|value| Constants::from([(name.to_owned(), value)])).collect()
 }
 
 /// Every pair of a set of each.
-pub(super) fn product(left: &[Constants], right: &[Constants]) -> Vec<Constants> {
+pub(crate) fn product(left: &[Constants], right: &[Constants]) -> Vec<Constants> {
     let join = |a: &Constants, b: &Constants| a.clone().into_iter().chain(b.clone()).collect();
     left.iter().flat_map(|a| right.iter().map(move |b| join(a, b))).collect()
 }
 
 /// `found` with one constant times each factor, `spread` shrinking with every step.
-pub(super) fn around(found: &Constants, name: &str, step: usize) -> Vec<Constants> {
+pub(crate) fn around(found: &Constants, name: &str, step: usize) -> Vec<Constants> {
     let Some(&value) = found.get(name) else { return Vec::new() };
     let spread = 1.5_f64.powf(0.5_f64.powi(step as i32));
     [1.0 / spread, spread]
@@ -148,6 +211,6 @@ pub(super) fn around(found: &Constants, name: &str, step: usize) -> Vec<Constant
 }
 
 /// A constant, or its default.
-pub(super) fn constant(constants: &Constants, name: &str, default: f64) -> f64 {
+pub(crate) fn constant(constants: &Constants, name: &str, default: f64) -> f64 {
     constants.get(name).copied().unwrap_or(default)
 }

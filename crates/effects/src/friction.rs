@@ -1,15 +1,18 @@
 //! Friction that depends on the velocity alone, or on the load.
 
-use super::columns::{OwnTorque, ParameterKind, smooth_sign};
-use super::kind::{Constants, EffectKind, SignalRanges, around, constant, product, values};
+use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
+use crate::fitted::FittedEffect;
+use crate::kind::{
+    Constants, EffectKind, JointProperty, Signal, SignalRanges, around, constant, product, values,
+};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, Needs, Sample};
 
 /// The constant of every smoothed sign: the speed over which it turns \[rad/s, m/s\].
-pub(super) const WIDTH: &str = "sign_width";
+pub(crate) const WIDTH: &str = "sign_width";
 
 /// Speeds over which a sign may turn: the plain sign, then up to 0.064 rad/s (m/s), but no more than half of the joint's RMS speed.
-pub(super) fn sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
+pub(crate) fn sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
     let largest = 0.5 * ranges.joints[joint].velocity_rms;
     let widths =
         (0..15).map(|step| 0.0005 * 2.0_f64.powf(0.5 * f64::from(step))).filter(|&width| width <= largest);
@@ -17,7 +20,7 @@ pub(super) fn sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants>
 }
 
 /// A few of them, for effects that are not themselves about the sign.
-pub(super) fn few_sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
+pub(crate) fn few_sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
     sign_widths(joint, ranges).into_iter().step_by(5).collect()
 }
 
@@ -25,12 +28,14 @@ fn width_of(constants: &Constants) -> f64 {
     constant(constants, WIDTH, 0.0)
 }
 
+const VISCOUS: &str = "viscous_friction";
+
 /// fv·q̇.
 pub struct Viscous;
 
 impl EffectKind for Viscous {
     fn name(&self) -> &str {
-        "viscous_friction"
+        VISCOUS
     }
     fn may_change(&self) -> bool {
         true
@@ -38,11 +43,21 @@ impl EffectKind for Viscous {
     fn telling_motion(&self) -> &'static str {
         "a motion at several constant speeds"
     }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!("{} has viscous friction of {}.", found.joints(), found.quantity(0))
+    }
+    fn joint_property(&self) -> Option<JointProperty> {
+        Some(JointProperty::Damping)
+    }
+    fn dissipates(&self) -> bool {
+        true
+    }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = sample.qd()[joint];
         let parameters = [("fv", ParameterKind::PerVelocity, 0.0)];
-        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+        let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
+        Box::new(effect.linear_in_motion())
     }
 }
 
@@ -64,6 +79,21 @@ impl EffectKind for Coulomb {
     }
     fn telling_motion(&self) -> &'static str {
         "a motion that reverses often, at low and at high speed"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!("{} has Coulomb friction of {}.", found.joints(), found.quantity(0))
+    }
+    fn joint_property(&self) -> Option<JointProperty> {
+        Some(JointProperty::Friction)
+    }
+    fn goes_with(&self) -> &'static [&'static str] {
+        &[VISCOUS]
+    }
+    fn constants_of_the_site(&self) -> &'static [&'static str] {
+        &[WIDTH]
+    }
+    fn dissipates(&self) -> bool {
+        true
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));
@@ -95,6 +125,11 @@ impl EffectKind for Asymmetric {
     }
     fn telling_motion(&self) -> &'static str {
         "the same path forth and back at several speeds, with rests"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let halves: Vec<String> = found.quantities().map(|(_, half)| half).collect();
+        let (joint, halves) = (found.joints(), halves.join(" and "));
+        format!("{joint} rubs differently in its two directions: half the difference is {halves}.")
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));
@@ -129,6 +164,10 @@ impl EffectKind for Quadratic {
     }
     fn telling_motion(&self) -> &'static str {
         "a fast motion beside a slow one"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, coefficient) = (found.joints(), found.quantity(0));
+        format!("The friction of {joint} bends with the square of the speed: {coefficient}.")
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
@@ -169,6 +208,17 @@ impl EffectKind for Stribeck {
     fn telling_motion(&self) -> &'static str {
         "a slow motion, well below the speed at which friction is lowest"
     }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!(
+            "{} sticks at low speed: {} on top of Coulomb friction, gone above {:.3} rad/s or m/s (Stribeck).",
+            found.joints(),
+            found.quantity(0),
+            found.constant(STRIBECK_VELOCITY)
+        )
+    }
+    fn dissipates(&self) -> bool {
+        true
+    }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));
         let speed = constant(constants, STRIBECK_VELOCITY, 0.1);
@@ -206,6 +256,16 @@ impl EffectKind for LoadDependent {
     }
     fn telling_motion(&self) -> &'static str {
         "the same motion with the arm stretched out and folded, or with a load"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, share) = (found.joints(), found.value(0));
+        format!("The friction of {joint} grows with its load: {share:.3} of the torque that it carries.")
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Torque
+    }
+    fn dissipates(&self) -> bool {
+        true
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));

@@ -1,7 +1,8 @@
 //! What stands between the torque that acts and the numbers in the log: delay, encoder offset, saturation.
 
-use super::columns::{OwnTorque, ParameterKind};
-use super::kind::{Constants, EffectKind, SignalRanges, constant, values};
+use crate::columns::{OwnTorque, ParameterKind};
+use crate::fitted::FittedEffect;
+use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant, values};
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
 use phiw_telemetry::Block;
@@ -34,6 +35,10 @@ impl EffectKind for TimeDelay {
     fn telling_motion(&self) -> &'static str {
         "quick reversals of the torque"
     }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let delay = found.constant(DELAY) + found.value(0);
+        format!("The torque of {} is stamped {:.2} ms late.", found.joints(), 1e3 * delay)
+    }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let spec = spec(self.name(), tree, site, constants);
         Box::new(Delay { site: site.to_vec(), delay: constant(constants, DELAY, 0.0), spec })
@@ -61,6 +66,9 @@ impl Effect for Delay {
     }
     fn needs(&self) -> Needs {
         Needs { torque: true, ..Needs::default() }
+    }
+    fn is_causal(&self) -> bool {
+        false
     }
     fn evaluator(&self) -> Box<dyn Evaluator + '_> {
         Box::new(DelayColumns(self))
@@ -130,6 +138,13 @@ impl EffectKind for EncoderOffset {
     }
     fn telling_motion(&self) -> &'static str {
         "rests in many poses of the joint and of those behind it"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let offset = found.in_unit_of(0, found.constant(OFFSET) + found.value(0));
+        format!("The zero of {}'s encoder is off by {offset}.", found.joints())
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let unit = if tree.joint(site[0]).joint_type == JointType::Prismatic { "m" } else { "rad" };
@@ -227,6 +242,13 @@ impl EffectKind for ActuatorSaturation {
     }
     fn telling_motion(&self) -> &'static str {
         "a motion that asks for more torque than the drive has"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, limit) = (found.joints(), found.constant(LIMIT));
+        format!("The drive of {joint} delivers no more than {limit:.3} N·m or N, whatever is commanded.")
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Torque
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, limit) = (site[0], constant(constants, LIMIT, f64::INFINITY));
