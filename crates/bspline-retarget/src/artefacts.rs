@@ -1,8 +1,8 @@
 //! What cameras and files do to markers: samples that are no measurements, found and taken out.
 
+use crate::marker_settings::MarkerSettings;
 use crate::recording::MarkerRecording;
-use phiw_spikes::{SpikeSettings, find_spikes};
-use std::collections::BTreeMap;
+use phiw_spikes::find_spikes;
 use std::fmt;
 
 /// Samples of a marker that were taken out.
@@ -23,9 +23,9 @@ pub struct Artefact {
 pub enum ArtefactKind {
     /// Exactly 0, 0, 0: what software writes where a marker was not seen.
     Zero,
-    /// Far off for at most three frames.
+    /// Far off for a few frames.
     Spike,
-    /// The marker never moves by a bit, while others do.
+    /// The marker never moves by a bit, but for spikes, while others do.
     Frozen,
 }
 
@@ -41,83 +41,103 @@ impl fmt::Display for Artefact {
     }
 }
 
-/// What is far off for a marker: by more than 50 mm, too. Where markers rest, cameras' glitches of a few millimetres are many times what is usual
-/// there, and do no harm. None of 144 recordings of `ue_adl` has a spike by this (`cargo test -p phiw-bspline-retarget --test c3d`).
-pub fn marker_spikes() -> SpikeSettings {
-    SpikeSettings { smallest: 0.05, ..SpikeSettings::default() }
-}
-
 impl MarkerRecording {
-    /// Takes samples that are no measurements for missing ones, and says which.
-    pub fn remove_artefacts(&mut self, settings: SpikeSettings) -> Vec<Artefact> {
-        let mut found: BTreeMap<(usize, ArtefactKind), (usize, usize)> = BTreeMap::new();
-        let markers = self.labels.len().max(1);
-        let mut remove = |place: usize, kind: ArtefactKind, positions: &mut [[f64; 3]]| {
-            let (frame, marker) = (place / markers, place % markers);
-            let (samples, first) = found.entry((marker, kind)).or_insert((0, frame + 1));
-            *samples += 1;
-            *first = (*first).min(frame + 1);
-            positions[place] = [f64::NAN; 3];
-        };
-        for place in 0..self.positions_m.len() {
-            if self.positions_m[place] == [0.0; 3] {
-                remove(place, ArtefactKind::Zero, &mut self.positions_m);
-            }
+    /// Takes samples of these markers that are no measurements for missing ones, and says which; markers are indices of labels.
+    ///
+    /// Frozen markers stay where they are [most](MarkerSettings::still_share) of all.
+    pub fn remove_artefacts(&mut self, markers: &[usize], settings: &MarkerSettings) -> Vec<Artefact> {
+        let zeros: Vec<Option<Artefact>> = markers
+            .iter()
+            .map(|&marker| {
+                let frames = self.frames_where(marker, |position| position == [0.0; 3]);
+                self.take_out(marker, ArtefactKind::Zero, &frames)
+            })
+            .collect();
+        let frozen = self.frozen(markers, settings);
+        let still = self.is_still(markers, settings);
+        let mut artefacts = Vec::new();
+        for (&marker, zeros) in markers.iter().zip(zeros) {
+            artefacts.extend(zeros);
+            let (kind, frames) = if frozen.contains(&marker) && !still {
+                (ArtefactKind::Frozen, self.frames_where(marker, |_| true))
+            } else {
+                (ArtefactKind::Spike, self.spikes(marker, settings))
+            };
+            artefacts.extend(self.take_out(marker, kind, &frames));
         }
-        let range = |marker: usize| self.range_m(marker);
-        let ranges: Vec<f64> = (0..self.labels.len()).map(range).collect();
-        // One frame, or a person who stands still in a synthetic file, says nothing.
-        let others_move = ranges.iter().filter(|range| **range > 0.0).count() > self.labels.len() / 2;
-        for (marker, range) in ranges.into_iter().enumerate() {
-            let places = (marker..self.positions_m.len()).step_by(markers);
-            if range == 0.0 && others_move {
-                let seen: Vec<usize> =
-                    places.filter(|&place| self.positions_m[place][0].is_finite()).collect();
-                seen.into_iter().for_each(|place| remove(place, ArtefactKind::Frozen, &mut self.positions_m));
-                continue;
-            }
-            let mut spikes: Vec<usize> = (0..3)
-                .flat_map(|axis| {
-                    let samples: Vec<f64> =
-                        places.clone().map(|place| self.positions_m[place][axis]).collect();
-                    find_spikes(&samples, settings)
-                })
-                .collect();
-            spikes.sort_unstable();
-            spikes.dedup();
-            for frame in spikes {
-                remove(frame * markers + marker, ArtefactKind::Spike, &mut self.positions_m);
-            }
-        }
-        let artefact = |((marker, kind), (samples, first_frame)): ((usize, _), _)| Artefact {
-            marker: self.labels[marker].clone(),
-            kind,
-            samples,
-            first_frame,
-        };
-        found.into_iter().map(artefact).collect()
+        artefacts
     }
 
-    /// The largest extent of a marker's way along an axis \[m\]; NaN if it is never seen.
-    fn range_m(&self, marker: usize) -> f64 {
-        let mut most = f64::NAN;
-        for axis in 0..3 {
-            let positions = self.positions_m.iter().skip(marker).step_by(self.labels.len().max(1));
-            let mut range = [f64::INFINITY, f64::NEG_INFINITY];
-            for position in positions.filter(|position| position[0].is_finite()) {
-                range = [range[0].min(position[axis]), range[1].max(position[axis])];
-            }
-            if range[0] <= range[1] {
-                most = most.max(range[1] - range[0]);
-            }
-        }
-        most
+    /// Whether [most](MarkerSettings::still_share) of those of these markers that are seen are frozen.
+    pub fn is_still(&self, markers: &[usize], settings: &MarkerSettings) -> bool {
+        let frozen = self.frozen(markers, settings).len();
+        let seen = markers.iter().filter(|&&marker| self.is_ever_seen(marker)).count();
+        frozen > 0 && frozen as f64 >= settings.still_share * seen as f64
     }
 
-    /// The diagonal of the box around all markers that a frame shows, at least four: the median over the frames \[m\]. None without such a frame.
-    pub fn extent_m(&self) -> Option<f64> {
+    /// Which of these markers are [frozen](MarkerSettings::frozen_share). One frame alone says nothing.
+    pub fn frozen(&self, markers: &[usize], settings: &MarkerSettings) -> Vec<usize> {
+        let is_frozen = |&marker: &usize| {
+            let seen = self.frames_where(marker, |_| true);
+            let most = self.frames_at_one_place(marker);
+            seen.len() > 1 && most as f64 > settings.frozen_share * seen.len() as f64
+        };
+        markers.iter().copied().filter(is_frozen).collect()
+    }
+
+    /// In how many frames a marker is at one and the same place, if it is there in more than half of the frames that show it; else a number
+    /// that is no more than half.
+    fn frames_at_one_place(&self, marker: usize) -> usize {
+        // Boyer and Moore's vote: the place of the majority, if there is one.
+        let (mut place, mut votes) = ([f64::NAN; 3], 0_usize);
+        for frame in self.frames_where(marker, |_| true) {
+            let position = self.position_m(frame, marker);
+            if votes == 0 {
+                place = position;
+            }
+            votes = if position == place { votes + 1 } else { votes - 1 };
+        }
+        self.frames_where(marker, |position| position == place).len()
+    }
+
+    /// Frames that show a marker, and show it so.
+    fn frames_where(&self, marker: usize, so: impl Fn([f64; 3]) -> bool) -> Vec<usize> {
+        let shown = |&frame: &usize| {
+            let position = self.position_m(frame, marker);
+            position[0].is_finite() && so(position)
+        };
+        (0..self.frames()).filter(shown).collect()
+    }
+
+    /// Frames in which a coordinate of a marker is far off.
+    fn spikes(&self, marker: usize, settings: &MarkerSettings) -> Vec<usize> {
+        let mut frames: Vec<usize> = (0..3)
+            .flat_map(|axis| {
+                let samples: Vec<f64> =
+                    (0..self.frames()).map(|frame| self.position_m(frame, marker)[axis]).collect();
+                find_spikes(&samples, settings.spikes)
+            })
+            .collect();
+        frames.sort_unstable();
+        frames.dedup();
+        frames
+    }
+
+    /// Takes these frames of a marker, in order, as not seen.
+    fn take_out(&mut self, marker: usize, kind: ArtefactKind, frames: &[usize]) -> Option<Artefact> {
+        let markers = self.labels.len();
+        frames.iter().for_each(|frame| self.positions_m[frame * markers + marker] = [f64::NAN; 3]);
+        let first = frames.first()?;
+        let marker = self.labels[marker].clone();
+        Some(Artefact { marker, kind, samples: frames.len(), first_frame: first + 1 })
+    }
+
+    /// The diagonal of the box around those of these markers that a frame shows, at least four: the median over the frames \[m\]. None without
+    /// such a frame.
+    pub fn extent_m(&self, markers: &[usize]) -> Option<f64> {
         let diagonal = |frame: &[[f64; 3]]| {
-            let seen = || frame.iter().filter(|position| position[0].is_finite());
+            let seen =
+                || markers.iter().map(|&marker| frame[marker]).filter(|position| position[0].is_finite());
             let side = |axis: usize| {
                 let (low, high) = seen().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), position| {
                     (low.min(position[axis]), high.max(position[axis]))

@@ -1,22 +1,24 @@
-//! CSV of named points: `t` \[s\] and for each point `<name>.x`, `<name>.y`, `<name>.z` \[m\].
+//! CSV of named points: `t` \[s\] and for each point `<name>.x`, `<name>.y`, `<name>.z`, in metres if nothing else is said.
 
-use crate::recording::{MarkerRecording, RecordingError};
+use crate::recording::{MarkerRecording, RATES_HZ, RecordingError, metres};
 use std::path::Path;
 
 /// Largest deviation of a time step from their mean, as a share of it.
 const STEP_TOLERANCE: f64 = 0.02;
 
-/// Reads a table of points in metres at a constant rate; an empty or NaN cell is a missing point.
+/// Reads a table of points at a constant rate, in `units` or else in metres; an empty or NaN cell is a missing point.
 ///
 /// # Errors
-/// The file cannot be read, a column or a cell is wrong, or the times are not equally spaced.
-pub fn read_point_csv(path: &Path) -> Result<MarkerRecording, RecordingError> {
+/// The file cannot be read, a column or a cell is wrong, the times are not equally spaced or no camera's, or the unit is not known.
+pub fn read_point_csv(path: &Path, units: Option<&str>) -> Result<MarkerRecording, RecordingError> {
     let file = std::fs::File::open(path)
         .map_err(|source| RecordingError::Unreadable { path: path.into(), source })?;
-    parse(file).map_err(|what| RecordingError::Csv { path: path.into(), what })
+    parse(file, units).map_err(|what| RecordingError::Csv { path: path.into(), what })
 }
 
-fn parse(source: impl std::io::Read) -> Result<MarkerRecording, String> {
+fn parse(source: impl std::io::Read, units: Option<&str>) -> Result<MarkerRecording, String> {
+    let unit = units.unwrap_or("m");
+    let unit_m = metres(unit).ok_or_else(|| format!("unit `{unit}`: known are m, dm, cm, mm, in and ft"))?;
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(source);
     let header = reader.headers().map_err(|error| error.to_string())?.clone();
     let column = |name: &str| header.iter().position(|cell| cell == name);
@@ -49,7 +51,7 @@ fn parse(source: impl std::io::Read) -> Result<MarkerRecording, String> {
         for &[x, y, z] in &columns {
             let point = [number(x)?, number(y)?, number(z)?];
             let seen = point.iter().all(|coordinate| coordinate.is_finite());
-            positions_m.push(if seen { point } else { [f64::NAN; 3] });
+            positions_m.push(if seen { point.map(|x| x * unit_m) } else { [f64::NAN; 3] });
         }
     }
     Ok(MarkerRecording { rate_hz: rate_hz(&times)?, labels, positions_m })
@@ -74,7 +76,11 @@ fn rate_hz(times: &[f64]) -> Result<f64, String> {
             row + 2,
             times[row] - times[row - 1]
         )),
-        None => Ok(1.0 / step),
+        None if RATES_HZ.contains(&(1.0 / step)) => Ok(1.0 / step),
+        None => Err(format!(
+            "`t` goes in steps of {step} s, a rate of {} Hz, no camera's (1 Hz to 100 kHz); give `t` in seconds",
+            1.0 / step
+        )),
     }
 }
 
@@ -85,7 +91,8 @@ mod tests {
     #[test]
     fn points_are_read_by_name_and_gaps_stay_gaps() {
         let recording =
-            parse("t,b.z,b.y,b.x,note.x ,note.y,note.z\n0,3,2,1,,,\n0.01,3,,1,4,5,6\n".as_bytes()).unwrap();
+            parse("t,b.z,b.y,b.x,note.x ,note.y,note.z\n0,3,2,1,,,\n0.01,3,,1,4,5,6\n".as_bytes(), None)
+                .unwrap();
         assert_eq!(recording.labels, ["b", "note"]);
         assert!((recording.rate_hz - 100.0).abs() < 1e-9);
         assert_eq!(recording.position_m(0, 0), [1.0, 2.0, 3.0]);
@@ -94,7 +101,7 @@ mod tests {
     }
 
     fn check_refused(text: &str, part: &str) {
-        let message = parse(text.as_bytes()).unwrap_err();
+        let message = parse(text.as_bytes(), None).unwrap_err();
         assert!(message.contains(part), "{message}");
     }
 
@@ -108,5 +115,24 @@ mod tests {
         check_refused("t,a.x,a.y,a.z\n0,1,1,1\n1,1,1,1\n3,1,1,1\n", "line 3: 1 s after");
         check_refused("t,a.x,a.y,a.z\n0,1,1,1\n0,1,1,1\n", "must be finite and grow");
         check_refused("t,a.x,a.y,a.z\n0,1,1,1\n1,1,1\n", "");
+    }
+
+    /// A table in millimetres was refused with the advice to say so in the map, which changed nothing.
+    #[test]
+    fn units_of_the_map_were_not_those_of_a_table() {
+        let read = |units| parse("t,a.x,a.y,a.z\n0,1000,2000,-500\n0.01,,,\n".as_bytes(), units);
+        assert_eq!(read(None).unwrap().position_m(0, 0), [1000.0, 2000.0, -500.0]);
+        assert_eq!(read(Some("mm")).unwrap().position_m(0, 0), [1.0, 2.0, -0.5]);
+        assert!(read(Some("mm")).unwrap().position_m(1, 0)[0].is_nan());
+        let error = read(Some("furlong")).unwrap_err();
+        assert!(error.contains("`furlong`") && error.contains("mm"), "{error}");
+    }
+
+    /// Times in milliseconds made a motion a thousand times as long, and as many times the control points.
+    #[test]
+    fn tables_had_any_rate() {
+        check_refused("t,a.x,a.y,a.z\n0,1,1,1\n10,1,1,1\n20,1,1,1\n", "0.1 Hz, no camera's");
+        check_refused("t,a.x,a.y,a.z\n0,1,1,1\n1e-9,1,1,1\n", "give `t` in seconds");
+        check_refused("t,a.x,a.y,a.z\n0,1,1,1\n1e300,1,1,1\n", "no camera's");
     }
 }

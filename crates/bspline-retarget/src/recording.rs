@@ -2,6 +2,7 @@
 
 use crate::c3d::C3dError;
 use phiw_limits::Limits;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// Positions of named markers over time.
@@ -55,7 +56,13 @@ impl MarkerRecording {
     }
 }
 
-/// Reads a recording: C3D, or CSV of named points if the name ends so. `units` replaces what the file says of its unit.
+/// Rates that cameras have \[Hz\]. Any other is a mistake of whoever wrote the file, and would stretch the motion with it.
+pub(crate) const RATES_HZ: RangeInclusive<f64> = 1.0..=100_000.0;
+
+/// Reads a recording as it is: C3D, or CSV of named points if the name ends so. `units` replaces what the file says of its unit; a CSV says
+/// nothing and is in metres.
+///
+/// [`crate::Retargeter::read`] looks at the numbers, too.
 ///
 /// # Errors
 /// [`RecordingError`], which names the file, the place and the mend.
@@ -68,25 +75,23 @@ pub fn read_recording(path: &Path, units: Option<&str>) -> Result<MarkerRecordin
         let source = std::io::Error::other(format!("it is {what}; check the path"));
         return Err(RecordingError::Unreadable { path: path.to_owned(), source });
     }
-    let recording = if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
-        crate::point_csv::read_point_csv(path)?
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
+        crate::point_csv::read_point_csv(path, units)
     } else {
-        crate::c3d::read_c3d_file(path, units)?
-    };
-    check_extent(path, &recording)?;
-    Ok(recording)
+        crate::c3d::read_c3d_file(path, units)
+    }
 }
 
-/// How large the box around a person's markers is, from corner to corner \[m\]: those of one arm alone, and of the tallest with arms stretched.
-const PERSON_M: std::ops::RangeInclusive<f64> = 0.2..=4.0;
-
-/// A box around all markers that is no person's: the numbers are in another unit, or no positions.
-fn check_extent(path: &Path, recording: &MarkerRecording) -> Result<(), RecordingError> {
-    match recording.extent_m() {
-        Some(extent_m) if !PERSON_M.contains(&extent_m) => {
-            Err(RecordingError::Extent { path: path.to_owned(), extent_m })
-        }
-        _ => Ok(()),
+/// Length of a unit \[m\].
+pub(crate) fn metres(units: &str) -> Option<f64> {
+    match units.trim().to_ascii_lowercase().as_str() {
+        "m" | "meter" | "meters" | "metre" | "metres" => Some(1.0),
+        "dm" => Some(0.1),
+        "cm" => Some(0.01),
+        "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => Some(0.001),
+        "in" | "inch" | "inches" => Some(0.0254),
+        "ft" | "feet" => Some(0.3048),
+        _ => None,
     }
 }
 
@@ -116,14 +121,16 @@ pub enum RecordingError {
     },
     /// The markers are no person's.
     #[error(
-        "{}: the markers span {extent_m:.3e} m, a person's 0.2 to 4 m: the unit is another; set `units` in the map{}",
-        path.display(), fitting_unit(*extent_m)
+        "{}: the markers span {extent_m:.3e} m, a person's {} to {} m: the unit is another; set `units` in the map{}",
+        path.display(), person_m.start(), person_m.end(), fitting_unit(*extent_m, person_m)
     )]
     Extent {
         /// The file.
         path: PathBuf,
         /// The box around all markers, from corner to corner, median over the frames \[m\].
         extent_m: f64,
+        /// A person's \[m\].
+        person_m: RangeInclusive<f64>,
     },
     /// It is no table of points.
     #[error("{}: {what}", path.display())]
@@ -136,8 +143,8 @@ pub enum RecordingError {
 }
 
 /// The unit in which the numbers would be a person's, in words.
-fn fitting_unit(extent_m: f64) -> String {
+fn fitting_unit(extent_m: f64, person_m: &RangeInclusive<f64>) -> String {
     let factors = [(1000.0, "m, not mm"), (0.001, "mm, not m"), (100.0, "m, not cm"), (0.01, "cm, not m")];
-    let fits = |(factor, _): &&(f64, &str)| PERSON_M.contains(&(extent_m * factor));
+    let fits = |(factor, _): &&(f64, &str)| person_m.contains(&(extent_m * factor));
     factors.iter().find(fits).map_or_else(String::new, |(_, words)| format!(" (as if they were in {words})"))
 }

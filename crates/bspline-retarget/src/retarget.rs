@@ -1,18 +1,23 @@
 //! From a recording to a motion of the robot: calibration, start, solution, and what it is worth.
 
 use crate::Problem;
-use crate::bspline::{Basis, BasisError, Curve, CurveError};
-use crate::human::{HumanBody, MapError, MarkerMap, Placed};
+use crate::artefacts::Artefact;
+use crate::bspline::{Basis, Curve};
+use crate::human::{HumanBody, MarkerMap, Placed};
 use crate::human_start::human_start;
+use crate::marker_settings::MarkerSettings;
 use crate::quality::{Quality, quality};
-use crate::recording::MarkerRecording;
+use crate::recording::{MarkerRecording, RecordingError, read_recording};
+use crate::retarget_error::{RetargetError, check_near};
 use crate::robot::{RobotError, RobotModel};
 use crate::robot_start::robot_start;
 use crate::solver::{Iterations, Solution, Stop, solve};
 use crate::start::{align, start};
 use crate::weights::{Cost, Weights};
 use phiw_dynamics::{Tree, Vec3};
+use phiw_limits::Limits;
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// How recordings are retargeted.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +36,8 @@ pub struct RetargetOptions {
     /// The largest RMS distance \[m\] of the markers from the person that is still a fit. The worst of 302 recordings has 0.0098
     /// (`cargo xtask retarget databases`).
     pub largest_marker_rms_m: f64,
+    /// What tells samples that are no measurements.
+    pub markers: MarkerSettings,
 }
 
 impl Default for RetargetOptions {
@@ -42,6 +49,7 @@ impl Default for RetargetOptions {
             iterations: Iterations::default(),
             torso_from_reach: false,
             largest_marker_rms_m: 0.1,
+            markers: MarkerSettings::default(),
         }
     }
 }
@@ -125,43 +133,6 @@ pub struct Retargeted {
     pub rate_hz: f64,
 }
 
-/// Why a recording can not be retargeted.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum RetargetError {
-    /// The map does not fit the recording.
-    #[error(transparent)]
-    Map(#[from] MapError),
-    /// The robot can not follow.
-    #[error(transparent)]
-    Robot(#[from] RobotError),
-    /// No spline fits the recording.
-    #[error("{0}; the recording is too short or its interval of control points too long")]
-    Basis(#[from] BasisError),
-    /// A single frame is no motion.
-    #[error("the recording holds {0} frames; a motion needs at least 2")]
-    TooShort(usize),
-    /// The solver's numbers do not make curves.
-    #[error(transparent)]
-    Curve(#[from] CurveError),
-    /// A motion was found, but the markers are far from it.
-    #[error(
-        "no person fits: markers are {:.0} mm from where they would be (RMS), `{marker}` {:.0} mm; look for markers that are swapped, frozen or \
-         in another unit", 1e3 * rms_m, 1e3 * marker_rms_m
-    )]
-    FarOff {
-        /// Over all markers \[m\].
-        rms_m: f64,
-        /// The worst.
-        marker: String,
-        /// Its distance, RMS \[m\].
-        marker_rms_m: f64,
-    },
-    /// Nothing fits.
-    #[error("no motion fits: the objective is {0}; look for markers that are swapped or far off")]
-    NoFit(f64),
-}
-
 impl Retargeter {
     /// Takes a robot and a map together.
     ///
@@ -182,6 +153,33 @@ impl Retargeter {
     /// The options.
     pub fn options(&self) -> &RetargetOptions {
         &self.options
+    }
+
+    /// Reads a recording, a motion or a static trial, in the map's unit; what is no measurement is taken out, and comes back as a list.
+    ///
+    /// # Errors
+    /// [`RecordingError`]: the file cannot be read, or the map's markers are no person's by [`MarkerSettings::person_m`].
+    pub fn read(&self, path: &Path) -> Result<(MarkerRecording, Vec<Artefact>), RecordingError> {
+        let mut recording = read_recording(path, self.map.units.as_deref())?;
+        let (markers, settings) = (self.map.markers(&recording), &self.options.markers);
+        let artefacts = recording.remove_artefacts(&markers, settings);
+        match recording.extent_m(&markers) {
+            Some(extent_m) if !settings.person_m.contains(&extent_m) => {
+                let person_m = settings.person_m.clone();
+                Err(RecordingError::Extent { path: path.to_owned(), extent_m, person_m })
+            }
+            _ => Ok((recording, artefacts)),
+        }
+    }
+
+    /// Where most of the map's markers are frozen there is no motion, whatever the others do.
+    fn check_moves(&self, recording: &MarkerRecording) -> Result<(), RetargetError> {
+        let (markers, settings) = (self.map.markers(recording), &self.options.markers);
+        if !recording.is_still(&markers, settings) {
+            return Ok(());
+        }
+        let seen = markers.iter().filter(|&&marker| recording.is_ever_seen(marker)).count();
+        Err(RetargetError::Frozen { frozen: recording.frozen(&markers, settings).len(), seen })
     }
 
     /// What a static trial tells: the lengths and the pose that fit the markers whose place the map gives, and from them the
@@ -227,13 +225,19 @@ impl Retargeter {
     /// The spline basis for a recording: control points every `interval_s`.
     ///
     /// # Errors
-    /// The recording is too short.
+    /// The recording is too short, or so long that its control points exceed [`Limits`].
     pub fn basis(&self, recording: &MarkerRecording) -> Result<Basis, RetargetError> {
         if recording.frames() < 2 {
             return Err(RetargetError::TooShort(recording.frames()));
         }
         let duration = recording.duration_s();
-        let spans = (duration / self.options.interval_s).round().max(1.0) as usize;
+        let spans = (duration / self.options.interval_s).round().max(1.0);
+        let most = Limits::default().control_points;
+        if spans > most.saturating_sub(self.options.degree) as f64 {
+            let (duration_s, interval_s) = (duration, self.options.interval_s);
+            return Err(RetargetError::TooManyControlPoints { duration_s, interval_s, most });
+        }
+        let spans = spans as usize;
         Ok(Basis::uniform(self.options.degree, spans + self.options.degree, 0.0, duration)?)
     }
 
@@ -324,6 +328,7 @@ impl Retargeter {
         recording: &MarkerRecording,
         calibration: Option<&Calibration>,
     ) -> Result<Retargeted, RetargetError> {
+        self.check_moves(recording)?;
         let person = self.person(recording, calibration)?;
         let mut problem = self.problem(&person, recording);
         if self.options.torso_from_reach {
@@ -339,11 +344,7 @@ impl Retargeter {
             return Err(RetargetError::NoFit(solution.cost.total()));
         }
         let motion = self.retargeted(&problem, recording, solution)?;
-        if motion.quality.marker_rms_m > self.options.largest_marker_rms_m {
-            let each = motion.quality.each_marker_rms_m.iter().filter(|(_, rms_m)| rms_m.is_finite());
-            let (marker, marker_rms_m) = each.max_by(|a, b| a.1.total_cmp(&b.1)).cloned().unwrap_or_default();
-            return Err(RetargetError::FarOff { rms_m: motion.quality.marker_rms_m, marker, marker_rms_m });
-        }
+        check_near(&motion.quality, self.options.largest_marker_rms_m)?;
         Ok(motion)
     }
 

@@ -24,6 +24,8 @@ pub struct Limits {
     pub log_columns: usize,
     /// Bytes of a marker recording, which is held in memory.
     pub recording_bytes: u64,
+    /// Control points of the splines of one recording: 20 minutes at one every 0.2 s. A robot of 18 joints takes 0.13 MB for each.
+    pub control_points: usize,
     /// Bytes of a TOML file: marker map, support.
     pub toml_bytes: u64,
     /// Bytes of a `model.json`.
@@ -44,6 +46,7 @@ impl Default for Limits {
             log_line_bytes: 256 << 10,
             log_columns: 10_000,
             recording_bytes: 256 << 20,
+            control_points: 6_000,
             toml_bytes: 1 << 20,
             model_bytes: 64 << 20,
             factor_bytes: 2 << 30,

@@ -65,7 +65,7 @@ pub struct RetargetArguments {
     /// The robot's URDF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
-    /// Recordings: C3D, or CSV of named points (`t`, `<point>.x`, `<point>.y`, `<point>.z` in metres).
+    /// Recordings: C3D, or CSV of named points (`t`, `<point>.x`, `<point>.y`, `<point>.z` in metres, or in the map's `units`).
     #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
     pub c3d: Vec<PathBuf>,
     /// Which marker sits where; by default the built-in map that names most markers of the recordings.

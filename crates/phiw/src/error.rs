@@ -220,6 +220,14 @@ pub enum Error {
     /// The identified parameters cannot be written as a URDF.
     #[error("identified.urdf: {0}")]
     IdentifiedUrdf(UrdfError),
+    /// All logs of the training together.
+    #[error("{logs}: {source}")]
+    TrainingLogs {
+        /// Their names.
+        logs: String,
+        /// What is wrong with them.
+        source: InputError,
+    },
     /// The logs, the effects or the fit.
     #[error(transparent)]
     Identification(#[from] IdentificationError),
@@ -261,6 +269,7 @@ impl Error {
             | Error::NothingSafe { .. }
             | Error::OutIsFolder { .. }
             | Error::MotionNamedJson { .. }
+            | Error::TrainingLogs { .. }
             | Error::Output(ResultError::Busy { .. } | ResultError::IsInput { .. })
             | Error::OutIsFile { .. } => 2,
             Error::Identification(IdentificationError::Regressor(_)) => 1,

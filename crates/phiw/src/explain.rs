@@ -137,7 +137,8 @@ fn draws_in_words(draws: &DrawsJson) -> String {
 fn start(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Result<Start, Error> {
     let cutoffs = (session.logs.conditioning().cutoff_hz, session.logs.conditioning().parallel_cutoff_hz);
     let Some(path) = &arguments.model else {
-        let identified: Identified = identify(&session.tree, session.effects()?, data)?;
+        let identified: Identified = identify(&session.tree, session.effects()?, data)
+            .map_err(|error| session.of_training_logs(error))?;
         session.joints_without_held_out_motion(&identified.held_out_folds)?;
         let Identified { design, fit, .. } = &identified;
         return Ok(Start {

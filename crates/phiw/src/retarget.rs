@@ -73,9 +73,8 @@ fn check_names(files: &[PathBuf]) -> Result<(), Error> {
 /// The built-in map that names most markers of the first recording that can be read.
 fn default_map(files: &[PathBuf]) -> Result<MarkerMap, MapError> {
     let (seated, embedded) = (MarkerMap::ue_adl()?, MarkerMap::embedded()?);
-    // Only the names count here: whatever unit the numbers are in, one of these makes them a person's.
-    let named =
-        |file: &PathBuf| read_recording(file, Some("m")).or_else(|_| read_recording(file, Some("mm"))).ok();
+    // Only the names count here, whatever unit the numbers are in.
+    let named = |file: &PathBuf| read_recording(file, Some("m")).ok();
     let recording = files.iter().find_map(named);
     let share = |map: &MarkerMap| recording.as_ref().map_or(0.0, |recording| share_named(map, recording));
     Ok(if share(&embedded) > share(&seated) { embedded } else { seated })
@@ -83,11 +82,8 @@ fn default_map(files: &[PathBuf]) -> Result<MarkerMap, MapError> {
 
 /// Share of a map's markers that a recording has.
 fn share_named(map: &MarkerMap, recording: &MarkerRecording) -> f64 {
-    let segments = map.segments.values();
-    let names: Vec<&String> =
-        segments.flat_map(|s| s.cluster.iter().chain(s.at.keys()).chain(s.at_end.keys())).collect();
-    let found = names.iter().filter(|name| recording.marker(name).is_some()).count();
-    found as f64 / names.len().max(1) as f64
+    let found = map.names().filter(|name| recording.marker(name).is_some()).count();
+    found as f64 / map.names().count().max(1) as f64
 }
 
 /// A file's name without folder and extension.

@@ -13,6 +13,7 @@ use phiw_limits::Limits;
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_residual::{Catalogue, SignalRanges};
 use phiw_telemetry::ConditioningOptions;
+use std::path::PathBuf;
 
 /// Robot, logs and declared effects, read and checked.
 pub struct Session {
@@ -39,7 +40,8 @@ impl Session {
     /// An input is wrong: robot, effect, or log.
     pub fn open(arguments: &SessionArguments, progress: Progress<'_>) -> Result<Self, Error> {
         let session = Self::open_unexcited(arguments, progress)?;
-        check_excitation(&session.tree, session.logs.training())?;
+        check_excitation(&session.tree, session.logs.training())
+            .map_err(|error| session.of_training_logs(error.into()))?;
         Ok(session)
     }
 
@@ -58,6 +60,11 @@ impl Session {
         };
         let logs = LogSet::open_unexcited(&tree, &arguments.train, &arguments.validate, &options, progress)?;
         Ok(Session { tree, xml, findings, declared, catalogue, logs, arguments: arguments.clone() })
+    }
+
+    /// The same error, with the training logs' names if it is about all of them.
+    pub fn of_training_logs(&self, error: IdentificationError) -> Error {
+        of_training_logs(error, &self.arguments.train)
     }
 
     /// The declared effects, each with the constants that the data choose from.
@@ -97,6 +104,25 @@ impl Session {
         if self.tree.joint(joint).joint_type == JointType::Prismatic { "N" } else { "N·m" }
     }
 }
+
+/// The same error, with the names of `logs` if it is about all of them.
+pub(crate) fn of_training_logs(error: IdentificationError, logs: &[PathBuf]) -> Error {
+    match error {
+        IdentificationError::Input(
+            source @ (InputError::TooShort { .. } | InputError::NotExcited { .. }),
+        ) => {
+            let names: Vec<String> =
+                logs.iter().take(LOGS_NAMED).map(|log| log.display().to_string()).collect();
+            let more = logs.len().saturating_sub(LOGS_NAMED);
+            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            Error::TrainingLogs { logs: names.join(", ") + &more, source }
+        }
+        error => error.into(),
+    }
+}
+
+/// Logs that a message names.
+const LOGS_NAMED: usize = 5;
 
 /// Each declared kind once, if all are known.
 pub(crate) fn declared(names: &[String], catalogue: &Catalogue) -> Result<Vec<String>, EffectError> {

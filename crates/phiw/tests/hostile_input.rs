@@ -122,3 +122,23 @@ fn a_pipe_in_the_place_of_a_file_is_refused() {
         refused(run(&folder), "no regular file");
     }
 }
+
+/// Starting a thread for each core panicked.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_small_address_space_is_no_panic() {
+    for (kilobytes, threads) in [(200_000, "1"), (200_000, ""), (80_000, "1"), (80_000, "64")] {
+        let folder = TempDir::new().unwrap();
+        fs::write(folder.path().join("robot.urdf"), synthetic::URDF).unwrap();
+        fs::write(folder.path().join("train.csv"), synthetic::csv(&synthetic::recording(1, 15.0))).unwrap();
+        let words = "identify --urdf robot.urdf --train train.csv --out out --quiet";
+        let script = format!("ulimit -v {kilobytes}; exec {} {words}", env!("CARGO_BIN_EXE_phiw"));
+        let mut shell = std::process::Command::new("sh");
+        let output =
+            shell.args(["-c", &script]).env("RAYON_NUM_THREADS", threads).current_dir(folder.path()).output();
+        let output = output.unwrap();
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(message.lines().count() <= 1 && !message.contains("panicked"), "{kilobytes} kB: {message}");
+        assert_eq!(output.status.code(), Some(0), "{kilobytes} kB: {message}");
+    }
+}

@@ -81,6 +81,61 @@ fn a_bad_file_does_not_stop_the_rest_and_what_is_done_is_not_done_again() {
     assert!(facts.contains("\"torso_and_head\":\"from_reach\""), "{facts}");
 }
 
+/// The map of the embedded motions, changed, as a file beside them.
+fn map(folder: &TempDir, top: &str) -> Vec<String> {
+    let path = folder.path().join("map.toml");
+    let map = include_str!("../../bspline-retarget/maps/embedded.toml");
+    std::fs::write(&path, format!("{top}\n{map}")).unwrap();
+    vec!["--map".to_owned(), path.display().to_string()]
+}
+
+/// What was taken out of a static trial, which places the markers of all its motions, went unsaid.
+#[test]
+fn artefacts_of_static_trials_were_dropped_without_a_word() {
+    let folder = scene();
+    let mut trial = embedded_motions(5).unwrap().next().unwrap();
+    let markers = trial.recording.labels.len();
+    trial.recording.positions_m.truncate(20 * markers);
+    trial.recording.positions_m[6 * markers + 2] = [0.0; 3];
+    let label = trial.recording.labels[2].clone();
+    std::fs::write(folder.path().join("m0_static.c3d"), trial.to_c3d()).unwrap();
+    let map = map(&folder, "static_suffix = \"_static\"");
+    let more: Vec<&str> = map.iter().map(String::as_str).collect();
+    let files = motions(&folder);
+    let (status, _, errors) = run(&folder, &files, &more);
+    assert_eq!(status, 0, "{errors}");
+    let told = format!("m0_static.c3d: marker `{label}` is at exactly 0, 0, 0 in 1 frames (first 7)");
+    assert_eq!(errors.matches(&told).count(), 1, "{errors}");
+    let facts = |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).unwrap();
+    assert!(facts("m0.json").contains(&format!("static trial: marker `{label}` is at exactly")));
+    assert!(facts("m1.json").contains("\"artefacts\":[]"));
+}
+
+/// The message told to set `units` in the map, which tables took no notice of.
+#[test]
+fn a_table_in_millimetres_could_not_be_retargeted() {
+    let folder = scene();
+    let recording = embedded_motions(5).unwrap().next().unwrap().recording;
+    let mut text = "t".to_owned();
+    for label in &recording.labels {
+        text += &format!(",{label}.x,{label}.y,{label}.z");
+    }
+    for (frame, positions) in recording.positions_m.chunks(recording.labels.len()).take(60).enumerate() {
+        text += &format!("\n{}", frame as f64 / recording.rate_hz);
+        positions.iter().flatten().for_each(|x| text += &format!(",{}", 1e3 * x));
+    }
+    let file = folder.path().join("table.csv");
+    std::fs::write(&file, text).unwrap();
+    let (status, _, errors) = run(&folder, std::slice::from_ref(&file), &[]);
+    assert_eq!(status, 2, "{errors}");
+    assert!(errors.contains("set `units` in the map (as if they were in mm, not m)"), "{errors}");
+    let map = map(&folder, "units = \"mm\"");
+    let more: Vec<&str> = map.iter().map(String::as_str).collect();
+    let (status, summary, errors) = run(&folder, &[file], &more);
+    assert_eq!(status, 0, "{errors}");
+    assert!(summary.starts_with("1 motions"), "{summary}");
+}
+
 /// One message with all parts, exit status 2, nothing written.
 fn check_refused(spoil: impl FnOnce(&TempDir) -> (Vec<PathBuf>, Vec<String>), parts: &[&str]) {
     let folder = scene();
@@ -110,6 +165,21 @@ fn wrong_input_is_named() {
     check_refused(
         map("name = \"m\"\n[segments.chest]\ncluster = [\"STRN\"]\n"),
         &["m0.c3d: nothing says where marker `STRN` sits", "static trial"],
+    );
+    check_refused(
+        |folder| (motions(folder), vec!["--interval".to_owned(), "1e-7".to_owned()]),
+        &["m0.c3d: ", "more than 6000 of them", "a longer interval"],
+    );
+    check_refused(
+        |folder| {
+            let mut motion = embedded_motions(5).unwrap().next().unwrap();
+            let frame = motion.recording.positions_m[..motion.recording.labels.len()].to_vec();
+            motion.recording.positions_m = frame.repeat(50);
+            let file = folder.path().join("hung.c3d");
+            std::fs::write(&file, motion.to_c3d()).unwrap();
+            (vec![file], vec![])
+        },
+        &["hung.c3d: most markers are frozen: "],
     );
     check_refused(|folder| (vec![folder.path().join("none.c3d")], vec![]), &["none.c3d: no such file"]);
     check_refused(

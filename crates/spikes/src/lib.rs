@@ -1,11 +1,13 @@
 #![doc = include_str!("../README.md")]
 
 /// The most samples in a row that are taken for one spike.
-pub const LONGEST: usize = 3;
+pub const LONGEST: usize = 5;
 /// Samples that a spike is judged by. Where a signal begins with one there are more behind it than another can have.
 pub const WINDOW: usize = 2 * LONGEST + 1;
-/// Fewer samples that differ from the mean of their neighbours than this say nothing of what is usual in a signal.
-pub const FEWEST: usize = 16;
+/// Fewer differences than this say nothing of what is usual in a signal.
+const FEWEST: usize = 16;
+/// Differences from the mean of the neighbours that one spike makes in a signal that is constant but for it.
+const OF_ONE_SPIKE: usize = 4;
 
 /// When a sample is a spike.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,7 +15,7 @@ pub struct SpikeSettings {
     /// How far a signal must leave the line between the samples before and behind, and come back to it, to be a spike: a multiple of what is
     /// usual, see [`SpikeSettings::usual_share`].
     ///
-    /// On six sets of real logs the largest multiple is 8.4 for a position, 7.3 for a velocity, 10.6 for a torque (`cargo test -p phiw-telemetry
+    /// On six sets of real logs the largest multiple is 8.4 for a position, 13.0 for a velocity, 7.3 for a torque (`cargo test -p phiw-telemetry
     /// real_logs -- --nocapture` prints them); normal noise reaches 2.5 in 10⁷ samples.
     pub multiple: f64,
     /// What is usual: of the samples that differ from the mean of their neighbours, this share differs by less. What is left to 1 is the share
@@ -33,6 +35,17 @@ impl Default for SpikeSettings {
 const OF_FOUR_SPIKES: usize = 12;
 
 impl SpikeSettings {
+    /// What an excursion must exceed to be a spike. `count` samples of the signal differ from the mean of their neighbours, and `quantile` gives
+    /// what a share of them differ by at most.
+    pub fn bound(&self, count: usize, quantile: impl FnOnce(f64) -> f64) -> f64 {
+        match count {
+            // Constant but for a spike.
+            0..=OF_ONE_SPIKE => self.smallest,
+            _ if count < FEWEST => f64::INFINITY,
+            _ => self.smallest.max(self.multiple * quantile(self.share_of(count))),
+        }
+    }
+
     /// The share of `count` differences that tells what is usual: [`SpikeSettings::usual_share`], and in a short signal less, so that four
     /// spikes are left out of it.
     pub fn share_of(&self, count: usize) -> f64 {
@@ -47,7 +60,7 @@ pub fn bend(samples: [f64; 3]) -> f64 {
 }
 
 /// By how much the samples behind the first of a window (of three or more) leave the line from it to the sample behind them, less what that
-/// line rises: the most of one, two and three samples, and of how many. A step gives less than nothing, since it does not come back.
+/// line rises: the most of one to [`LONGEST`] samples, and of how many. A step gives less than nothing, since it does not come back.
 pub fn excursion(window: &[f64]) -> (f64, usize) {
     let mut most = (f64::NEG_INFINITY, 1);
     let Some(&before) = window.first() else { return most };
@@ -116,12 +129,10 @@ pub fn find_spikes(samples: &[f64], settings: SpikeSettings) -> Vec<usize> {
         .map(|three| bend([three[0], three[1], three[2]]).abs())
         .filter(|&b| b > 0.0)
         .collect();
-    let bound = if bends.len() < FEWEST {
-        0.0
-    } else {
-        let place = ((settings.share_of(bends.len()) * bends.len() as f64) as usize).min(bends.len() - 1);
-        settings.multiple * *bends.select_nth_unstable_by(place, f64::total_cmp).1
-    };
+    let bound = settings.bound(bends.len(), |share| {
+        let place = ((share * bends.len() as f64) as usize).min(bends.len() - 1);
+        *bends.select_nth_unstable_by(place, f64::total_cmp).1
+    });
     let mut spikes = Vec::new();
     let mut start = 0;
     for piece in samples.split(|sample| !sample.is_finite()) {
@@ -129,7 +140,7 @@ pub fn find_spikes(samples: &[f64], settings: SpikeSettings) -> Vec<usize> {
         let mut at = 0;
         while at < piece.len() {
             let ahead = &piece[at..piece.len().min(at + WINDOW)];
-            let length = spike_length(before, ahead, bound.max(settings.smallest));
+            let length = spike_length(before, ahead, bound);
             if length == 0 {
                 before = [Some(piece[at]), before[0]];
                 at += 1;

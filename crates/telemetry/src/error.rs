@@ -115,15 +115,21 @@ pub enum LogError {
         /// The stamp, in seconds.
         stamp: f64,
     },
+    /// The time stands still.
+    #[error("{}, column `t`: it is {stamp} in all {rows} rows; log the time of each row in seconds", path.display())]
+    ConstantTime {
+        /// The log.
+        path: PathBuf,
+        /// The stamp \[s\].
+        stamp: f64,
+        /// Rows of the log.
+        rows: u64,
+    },
     /// The log is not what it was when it was surveyed.
-    #[error("{}: the file changed while it was read: {before} rows before, {now} now; run again when nothing writes to it", path.display())]
+    #[error("{}: the file changed while it was read; run again when nothing writes to it", path.display())]
     Changed {
         /// The log.
         path: PathBuf,
-        /// Rows when it was surveyed.
-        before: u64,
-        /// Rows now.
-        now: u64,
     },
     /// Every row is a gap.
     #[error("{}: no usable row of {rows}{reasons}", path.display())]

@@ -40,6 +40,24 @@ pub(crate) trait Rows {
     fn path(&self) -> &Path;
 }
 
+impl<R: Rows + ?Sized> Rows for &mut R {
+    fn layout(&self) -> &Layout {
+        (**self).layout()
+    }
+
+    fn next(&mut self, values: &mut [f64]) -> Result<Row, LogError> {
+        (**self).next(values)
+    }
+
+    fn progress(&self) -> (u64, u64) {
+        (**self).progress()
+    }
+
+    fn path(&self) -> &Path {
+        (**self).path()
+    }
+}
+
 /// Rows of a CSV file.
 pub(crate) struct LogReader {
     path: PathBuf,

@@ -132,7 +132,7 @@ impl Recording {
             blocks.push(block);
             ControlFlow::Continue(())
         };
-        stream_rows(RecordingRows::new(self), &survey, conditioning, &mut |_, _| {}, &mut sink)?;
+        stream_rows(&mut RecordingRows::new(self), &survey, conditioning, &mut |_, _| {}, &mut sink)?;
         Ok(blocks)
     }
 

@@ -5,7 +5,7 @@ use crate::histogram::Histogram;
 use crate::reader::{Row, Rows};
 use crate::segments::GapReason;
 use crate::{LogError, SpikeCount};
-use phiw_spikes::{FEWEST, SpikeSettings, WINDOW, bend, excursion, excursion_at_edge, spike_length};
+use phiw_spikes::{SpikeSettings, WINDOW, bend, excursion, excursion_at_edge, spike_length};
 use std::collections::VecDeque;
 use std::path::Path;
 
@@ -49,10 +49,7 @@ impl SpikeFinder {
             // Stamps are judged by the segments; a temperature is no part of the fit.
             0 => f64::INFINITY,
             place if layout.may_be_missing(place) => f64::INFINITY,
-            _ if usual.total() < FEWEST as u64 => settings.smallest,
-            _ => settings
-                .smallest
-                .max(settings.multiple * usual.quantile(settings.share_of(usual.total() as usize))),
+            _ => settings.bound(usual.total() as usize, |share| usual.quantile(share)),
         };
         let bounds: Vec<f64> =
             self.columns.iter().enumerate().map(|(place, column)| bound(place, column)).collect();
@@ -61,9 +58,9 @@ impl SpikeFinder {
 
     /// The largest excursion of each column but the time, as a multiple of what is usual; 0 where that is not known.
     pub fn multiples(&self, settings: SpikeSettings) -> Vec<f64> {
-        let multiple = |(usual, most): &(Histogram, f64)| match usual.total() >= FEWEST as u64 {
-            true => most.max(0.0) / usual.quantile(settings.share_of(usual.total() as usize)),
-            false => 0.0,
+        let multiple = |(usual, most): &(Histogram, f64)| {
+            let bound = settings.bound(usual.total() as usize, |share| usual.quantile(share));
+            if bound.is_finite() && bound > 0.0 { settings.multiple * most.max(0.0) / bound } else { 0.0 }
         };
         self.columns.iter().skip(1).map(multiple).collect()
     }

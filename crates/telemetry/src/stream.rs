@@ -41,12 +41,16 @@ pub fn stream(
     sink: &mut dyn FnMut(Block) -> ControlFlow<()>,
 ) -> Result<StreamSummary, LogError> {
     let joints: Vec<String> = survey.joints.iter().map(|joint| joint.name.clone()).collect();
-    let rows = LogReader::open(&survey.path, &joints, survey.torque)?;
-    stream_rows(rows, survey, conditioning, progress, sink)
+    let mut rows = LogReader::open(&survey.path, &joints, survey.torque)?;
+    let summary = stream_rows(&mut rows, survey, conditioning, progress, sink)?;
+    if !summary.stopped && rows.content_hash() != survey.content_hash {
+        return Err(LogError::Changed { path: survey.path.clone() });
+    }
+    Ok(summary)
 }
 
 pub(crate) fn stream_rows(
-    rows: impl Rows,
+    rows: &mut dyn Rows,
     survey: &Survey,
     conditioning: &Conditioning,
     progress: &mut dyn FnMut(u64, u64),
@@ -62,11 +66,11 @@ pub(crate) fn stream_rows(
         longest: 0,
     };
     let counts = match survey.spike_bounds.as_slice() {
-        [] => split(&mut { rows }, survey.longest_step, &mut streamer)?,
+        [] => split(rows, survey.longest_step, &mut streamer)?,
         bounds => split(&mut WithoutSpikes::new(rows, bounds.to_vec()), survey.longest_step, &mut streamer)?,
     };
     if !streamer.outlet.summary.stopped && (counts.rows, counts.used) != (survey.rows, survey.used_rows) {
-        return Err(LogError::Changed { path: survey.path.clone(), before: survey.rows, now: counts.rows });
+        return Err(LogError::Changed { path: survey.path.clone() });
     }
     let summary = streamer.outlet.summary;
     if summary.segments == 0 && !summary.stopped {

@@ -8,7 +8,7 @@ use crate::reader::{LogReader, Row, Rows};
 use crate::segments::{RowCounts, SegmentSink, SpikeCount, split};
 use crate::spectrum::SpectrumEstimator;
 use crate::spike::{SpikeFinder, WithoutSpikes};
-use crate::{GapCount, JointSurvey, LogError, Segment, Spectrum};
+use crate::{GapCount, GapReason, JointSurvey, LogError, Segment, Spectrum};
 use phiw_spikes::{SpikeSettings, WINDOW};
 use std::path::{Path, PathBuf};
 
@@ -165,6 +165,12 @@ pub(crate) fn survey_rows<R: Rows>(
         spikes = without.counts(joints);
         spike_bounds = bounds;
         rows = without.into_inner();
+    }
+    let stands_still =
+        |gap: &GapCount| gap.reason == GapReason::DuplicateStamp && gap.count + 1 == counts.rows;
+    if counts.used == 1 && counts.gaps.iter().any(stands_still) {
+        let stamp = collector.last_stamp.unwrap_or(f64::NAN);
+        return Err(LogError::ConstantTime { path: rows.path().into(), stamp, rows: counts.rows });
     }
     if counts.used == 0 {
         return Err(match counts.rows {

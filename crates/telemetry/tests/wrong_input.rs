@@ -179,3 +179,28 @@ fn equal_files_have_equal_hashes() {
     assert_eq!(survey(&text), survey(&text));
     assert_ne!(survey(&text), survey(&format!("{HEADER}{}", rows(0, 61))));
 }
+
+/// It was said to be in milliseconds.
+#[test]
+fn a_time_that_stands_still_is_called_so() {
+    let text =
+        rows(0, 60).lines().map(|row| format!("5,{}\n", row.split_once(',').unwrap().1)).collect::<String>();
+    let message = run(written(&format!("{HEADER}{text}")).path()).unwrap_err().to_string();
+    assert!(message.contains("column `t`: it is 5 in all 60 rows"), "{message}");
+}
+
+/// Half of the rows were of one file, half of another, and nobody knew.
+#[test]
+fn a_log_that_changes_between_the_passes_is_refused() {
+    for now in [rows(0, 100), rows(0, 120).replace("0.5,", "0.500001,")] {
+        let file = written(&format!("{HEADER}{}", rows(0, 120)));
+        let survey = survey(file.path(), &joints(), TorqueColumns::Required, &mut |_, _| {}).unwrap();
+        let options = ConditioningOptions::default();
+        let conditioning = Conditioning::choose(std::slice::from_ref(&survey), &options).unwrap();
+        let again = || stream(&survey, &conditioning, &mut |_, _| {}, &mut |_| ControlFlow::Continue(()));
+        again().unwrap();
+        std::fs::write(file.path(), format!("{HEADER}{now}")).unwrap();
+        let message = again().unwrap_err().to_string();
+        assert!(message.contains("the file changed while it was read"), "{message}");
+    }
+}

@@ -3,11 +3,8 @@
 use super::header::{self, Header};
 use super::parameters::{self, Parameters};
 use super::{BLOCK, C3dError, Processor};
-use crate::recording::{MarkerRecording, RecordingError};
+use crate::recording::{MarkerRecording, RATES_HZ, RecordingError, metres};
 use std::path::Path;
-
-/// Rates that cameras and force plates have \[Hz\]; resampling at another would fill the memory.
-const RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=100_000.0;
 
 /// The points of a C3D file in its own unit, and its parameters.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,19 +99,6 @@ impl C3d {
         let positions_m =
             self.points.iter().map(|point| point.map(|coordinate| coordinate * metres)).collect();
         Ok(MarkerRecording { rate_hz: self.rate_hz, labels: self.labels.clone(), positions_m })
-    }
-}
-
-/// Length of a unit \[m\].
-fn metres(units: &str) -> Option<f64> {
-    match units.trim().to_ascii_lowercase().as_str() {
-        "m" | "meter" | "meters" | "metre" | "metres" => Some(1.0),
-        "dm" => Some(0.1),
-        "cm" => Some(0.01),
-        "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => Some(0.001),
-        "in" | "inch" | "inches" => Some(0.0254),
-        "ft" | "feet" => Some(0.3048),
-        _ => None,
     }
 }
 

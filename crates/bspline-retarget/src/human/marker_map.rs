@@ -1,7 +1,7 @@
 //! The marker map: which marker sits where, in TOML.
 
 use super::skeleton::Segment;
-use crate::recording::MarkerRecording;
+use crate::recording::{MarkerRecording, metres};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 pub struct MarkerMap {
     /// Name of the map.
     pub name: String,
-    /// Unit of length of the recordings, if they do not say it or say it wrong.
+    /// Unit of length of the recordings (m, dm, cm, mm, in, ft), if they do not say it or say it wrong. A CSV is in metres without it.
     #[serde(default)]
     pub units: Option<String>,
     /// How names of static trials end (`_static`); they calibrate the recordings that share the name before it.
@@ -81,9 +81,9 @@ pub enum MapError {
         /// Names like it in the recording.
         nearest: String,
     },
-    /// A marker that is there by name only.
+    /// A marker that is there by name only, or without a measurement.
     #[error(
-        "marker `{name}` is missing in every frame; take it out of the map, or label it in the recording"
+        "marker `{name}` is missing in every frame, or frozen, or zero; take it out of the map, or label it in the recording"
     )]
     NeverSeen {
         /// Name in the map.
@@ -136,6 +136,10 @@ impl MarkerMap {
                 format!("`marker_spread_m` is {}: give a length in metres, 0 or more", map.marker_spread_m);
             return Err(MapError::Toml(message));
         }
+        if let Some(units) = map.units.as_ref().filter(|units| metres(units).is_none()) {
+            let message = format!("`units` is `{units}`: known are m, dm, cm, mm, in and ft");
+            return Err(MapError::Toml(message));
+        }
         for name in map.segments.keys().chain(map.joints.keys()) {
             if Segment::from_name(name).is_none() {
                 let names: Vec<String> = Segment::ALL.iter().map(|segment| segment.name()).collect();
@@ -148,6 +152,22 @@ impl MarkerMap {
     /// How the joint before a segment moves.
     pub fn mode(&self, segment: Segment) -> JointMode {
         self.joints.get(&segment.name()).copied().unwrap_or(JointMode::Free)
+    }
+
+    /// Names of all markers that the map places.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.segments
+            .values()
+            .flat_map(|segment| segment.cluster.iter().chain(segment.at.keys()).chain(segment.at_end.keys()))
+            .map(String::as_str)
+    }
+
+    /// Indices of those of the recording's markers that the map places, in order.
+    pub fn markers(&self, recording: &MarkerRecording) -> Vec<usize> {
+        let mut markers: Vec<usize> = self.names().filter_map(|name| recording.marker(name)).collect();
+        markers.sort_unstable();
+        markers.dedup();
+        markers
     }
 
     /// Index of a marker in the recording.
@@ -193,6 +213,13 @@ mod tests {
             let error = MarkerMap::from_toml(&text).unwrap_err().to_string();
             assert!(error.contains("marker_spread_m") && error.contains("metres"), "{error}");
         }
+    }
+
+    #[test]
+    fn a_unit_that_is_none_was_blamed_on_the_recording() {
+        let text = format!("units = \"yards\"\n{}", include_str!("../../maps/ue_adl.toml"));
+        let error = MarkerMap::from_toml(&text).unwrap_err().to_string();
+        assert!(error.contains("`yards`") && error.contains("mm"), "{error}");
     }
 
     fn without_spread(map: &str) -> String {

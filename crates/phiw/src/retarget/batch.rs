@@ -5,9 +5,7 @@ use super::stem;
 use crate::Error;
 use crate::arguments::RetargetArguments;
 use crate::console::Console;
-use phiw_bspline_retarget::{
-    Artefact, Calibration, Quality, RecordingError, RetargetError, Retargeter, marker_spikes, read_recording,
-};
+use phiw_bspline_retarget::{Artefact, Calibration, Quality, RecordingError, RetargetError, Retargeter};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -51,13 +49,13 @@ pub fn run(
     let suffix = retargeter.map().static_suffix.clone();
     let is_static = |file: &&PathBuf| suffix.as_ref().is_some_and(|suffix| stem(file).ends_with(suffix));
     let (statics, motions): (Vec<&PathBuf>, Vec<&PathBuf>) = arguments.c3d.iter().partition(is_static);
-    let calibrations = calibrations(retargeter, &motions, suffix.as_deref());
+    let trials = static_trials(retargeter, &motions, suffix.as_deref());
     let done = AtomicU64::new(0);
     let total = motions.len() as u64;
     let outcomes: Vec<Result<Done, Error>> = motions
         .par_iter()
         .map(|file| {
-            let outcome = one(arguments, urdf, retargeter, file, &calibrations, suffix.as_deref());
+            let outcome = one(arguments, urdf, retargeter, file, &trials, suffix.as_deref());
             console.progress("retargeting", done.fetch_add(1, Ordering::Relaxed) + 1, total);
             outcome
         })
@@ -66,10 +64,17 @@ pub fn run(
 
     let (mut qualities, mut kept, mut seconds) = (Vec::new(), 0, 0.0);
     let (mut failures, mut warnings) = (Vec::new(), Vec::new());
+    let trial = |file: &Path| suffix.as_deref().and_then(|suffix| static_trial(file, suffix));
+    // What was taken out of a static trial concerns all motions that it calibrates, and is said once.
+    let mut untold = trials;
     for (file, outcome) in motions.iter().zip(outcomes) {
+        let told = if matches!(outcome, Ok(Done::Kept)) { None } else { trial(file) };
+        if let Some((file, trial)) = told.and_then(|trial| untold.remove_entry(&trial)) {
+            warnings.extend(in_words(&file, &trial.artefacts));
+        }
         match outcome {
             Ok(Done::Retargeted(quality, duration_s, artefacts)) => {
-                warnings.extend(artefacts.iter().map(|artefact| format!("{}: {artefact}", file.display())));
+                warnings.extend(in_words(file, &artefacts));
                 seconds += duration_s;
                 qualities.push(quality);
             }
@@ -81,6 +86,27 @@ pub fn run(
     if qualities.is_empty() && kept == 0 {
         return Err(failures.into_iter().next().map_or(Error::NoMotion, |failure| failure.reason));
     }
+    let counts = Counts { kept, statics: statics.len(), failed: failures.len(), seconds };
+    let summary = summary(arguments, retargeter, &qualities, &counts);
+    Ok(RetargetOutcome { summary, warnings, failures })
+}
+
+/// How many recordings became what, and how long the motions last.
+struct Counts {
+    kept: usize,
+    statics: usize,
+    failed: usize,
+    /// \[s\]
+    seconds: f64,
+}
+
+/// What was done, for a terminal.
+fn summary(
+    arguments: &RetargetArguments,
+    retargeter: &Retargeter,
+    qualities: &[Box<Quality>],
+    counts: &Counts,
+) -> String {
     let mut summary = String::new();
     let torso = if arguments.torso_from_reach {
         "; torso and head from the reach, not from the recordings"
@@ -90,12 +116,14 @@ pub fn run(
     // Writing to a string does not fail.
     let _ = writeln!(
         summary,
-        "{} motions ({seconds:.0} s) in {} with the map `{}`{torso}; {kept} kept, {} static trials, {} failed",
+        "{} motions ({:.0} s) in {} with the map `{}`{torso}; {} kept, {} static trials, {} failed",
         qualities.len(),
+        counts.seconds,
         arguments.out.display(),
         retargeter.map().name,
-        statics.len(),
-        failures.len()
+        counts.kept,
+        counts.statics,
+        counts.failed
     );
     if !qualities.is_empty() {
         let median = |value: &dyn Fn(&Quality) -> f64| median(qualities.iter().map(|q| value(q)).collect());
@@ -112,24 +140,39 @@ pub fn run(
             most(&|q| q.limit_excess)
         );
     }
-    Ok(RetargetOutcome { summary, warnings, failures })
+    summary
 }
 
-type Calibrations = BTreeMap<PathBuf, Result<Calibration, String>>;
+/// Warnings of what was taken out of a file.
+fn in_words(file: &Path, artefacts: &[Artefact]) -> Vec<String> {
+    artefacts.iter().map(|artefact| format!("{}: {artefact}", file.display())).collect()
+}
 
-/// What the static trials of these recordings tell.
-fn calibrations(retargeter: &Retargeter, motions: &[&PathBuf], suffix: Option<&str>) -> Calibrations {
-    let Some(suffix) = suffix else { return Calibrations::new() };
+/// What a static trial tells, and what was taken out of it.
+struct StaticTrial {
+    calibration: Result<Calibration, String>,
+    artefacts: Vec<Artefact>,
+}
+
+/// By file.
+type StaticTrials = BTreeMap<PathBuf, StaticTrial>;
+
+/// The static trials of these recordings.
+fn static_trials(retargeter: &Retargeter, motions: &[&PathBuf], suffix: Option<&str>) -> StaticTrials {
+    let Some(suffix) = suffix else { return StaticTrials::new() };
     let mut files: Vec<PathBuf> = motions.iter().filter_map(|file| static_trial(file, suffix)).collect();
     files.sort();
     files.dedup();
     let calibrate = |file: PathBuf| {
-        let recording = read_recording(&file, retargeter.map().units.as_deref()).map_err(|e| e.to_string());
-        let calibration = recording.and_then(|mut recording| {
-            recording.remove_artefacts(marker_spikes());
-            retargeter.calibrate(&recording).map_err(|error| format!("{}: {error}", file.display()))
-        });
-        (file, calibration)
+        let trial = match retargeter.read(&file) {
+            Ok((recording, artefacts)) => {
+                let calibration = retargeter.calibrate(&recording);
+                let calibration = calibration.map_err(|error| format!("{}: {error}", file.display()));
+                StaticTrial { calibration, artefacts }
+            }
+            Err(error) => StaticTrial { calibration: Err(error.to_string()), artefacts: Vec::new() },
+        };
+        (file, trial)
     };
     files.into_par_iter().map(calibrate).collect()
 }
@@ -149,12 +192,11 @@ fn one(
     urdf: &str,
     retargeter: &Retargeter,
     file: &Path,
-    calibrations: &Calibrations,
+    trials: &StaticTrials,
     suffix: Option<&str>,
 ) -> Result<Done, Error> {
     let trial = suffix.and_then(|suffix| static_trial(file, suffix));
-    let mut recording = read_recording(file, retargeter.map().units.as_deref()).map_err(Error::Recording)?;
-    let artefacts = recording.remove_artefacts(marker_spikes());
+    let (recording, artefacts) = retargeter.read(file).map_err(Error::Recording)?;
     let content = std::fs::read(file)
         .map_err(|source| Error::Recording(RecordingError::Unreadable { path: file.to_owned(), source }))?;
     let settings = Settings::new(arguments, urdf, retargeter, &content, trial.as_deref());
@@ -162,16 +204,19 @@ fn one(
     if output.holds(&settings) {
         return Ok(Done::Kept);
     }
-    let calibration = match trial.as_ref().and_then(|trial| calibrations.get(trial)) {
-        Some(Ok(calibration)) => Some(calibration),
-        Some(Err(reason)) => {
-            return Err(Error::StaticTrial { path: file.to_owned(), reason: reason.clone() });
-        }
-        None => None,
-    };
+    let trial = trial.and_then(|trial| trials.get(&trial));
+    let calibration = trial
+        .map(|trial| trial.calibration.as_ref())
+        .transpose()
+        .map_err(|reason| Error::StaticTrial { path: file.to_owned(), reason: reason.clone() })?;
     let wrong = |source: RetargetError| Error::Retarget { path: file.to_owned(), source };
     let motion = retargeter.retarget(&recording, calibration).map_err(wrong)?;
-    output.write(&motion, &artefacts, retargeter, &settings, arguments)?;
+    let of_trial = trial.iter().flat_map(|trial| &trial.artefacts);
+    let told: Vec<String> = of_trial
+        .map(|artefact| format!("static trial: {artefact}"))
+        .chain(artefacts.iter().map(Artefact::to_string))
+        .collect();
+    output.write(&motion, &told, retargeter, &settings, arguments)?;
     Ok(Done::Retargeted(Box::new(motion.quality), recording.duration_s(), artefacts))
 }
 

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::arguments::{Derivatives, RetargetArguments};
-use phiw_bspline_retarget::{Artefact, Retargeted, Retargeter, backward_differences};
+use phiw_bspline_retarget::{Retargeted, Retargeter, backward_differences};
 use phiw_result_folder::{Disk, ResultError, replace_vouched};
 use phiw_telemetry::{LogColumns, LogWriter};
 use serde_json::json;
@@ -58,7 +58,7 @@ impl MotionFile {
     pub fn write(
         &self,
         motion: &Retargeted,
-        artefacts: &[Artefact],
+        artefacts: &[String],
         retargeter: &Retargeter,
         settings: &Settings,
         arguments: &RetargetArguments,
@@ -108,7 +108,7 @@ fn log(motion: &Retargeted, retargeter: &Retargeter, derivatives: Derivatives) -
 
 fn facts(
     motion: &Retargeted,
-    artefacts: &[Artefact],
+    artefacts: &[String],
     retargeter: &Retargeter,
     settings: &Settings,
 ) -> serde_json::Value {
@@ -120,7 +120,7 @@ fn facts(
         "torso_and_head": torso,
         "rate_hz": motion.rate_hz,
         "frames": motion.frames,
-        "artefacts": artefacts.iter().map(Artefact::to_string).collect::<Vec<_>>(),
+        "artefacts": artefacts,
         "marker_rms_m": quality.marker_rms_m,
         "elbow_rms_m": quality.elbow_rms_m,
         "hand_rms_m": quality.hand_rms_m,
@@ -139,4 +139,43 @@ fn facts(
         "parameters": motion.parameters.iter().cloned().collect::<std::collections::BTreeMap<_, _>>(),
         "settings": settings.0,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use phiw_bspline_retarget::human::MarkerMap;
+    use phiw_bspline_retarget::{MarkerSettings, RetargetOptions};
+    use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+
+    /// A motion made with other bounds of what a spike is was kept as if it were the same.
+    #[test]
+    fn settings_of_the_markers_were_not_part_of_what_a_motion_depends_on() {
+        let urdf = include_str!("../../../../models/upper_body18.urdf");
+        let arguments = RetargetArguments {
+            urdf: PathBuf::new(),
+            c3d: Vec::new(),
+            map: None,
+            hold: Vec::new(),
+            torso_from_reach: false,
+            velocity_limits: false,
+            interval: 0.2,
+            derivatives: Derivatives::Analytic,
+            out: PathBuf::new(),
+            quiet: true,
+        };
+        let settings = |markers: MarkerSettings| {
+            let tree = read_urdf(urdf, &UrdfOptions::default()).unwrap().tree;
+            let options = RetargetOptions { markers, ..RetargetOptions::default() };
+            let retargeter = Retargeter::new(tree, MarkerMap::embedded().unwrap(), options).unwrap();
+            Settings::new(&arguments, urdf, &retargeter, &[], None).0
+        };
+        let usual = settings(MarkerSettings::default());
+        assert_eq!(settings(MarkerSettings::default()), usual);
+        let mut spikes = MarkerSettings::default();
+        spikes.spikes.smallest = 0.1;
+        assert_ne!(settings(spikes), usual);
+        assert_ne!(settings(MarkerSettings { person_m: 0.1..=9.0, ..MarkerSettings::default() }), usual);
+        assert_ne!(settings(MarkerSettings { frozen_share: 0.8, ..MarkerSettings::default() }), usual);
+    }
 }

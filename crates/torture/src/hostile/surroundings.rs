@@ -38,7 +38,7 @@ fn streams(ground: &Ground, random: &mut ChaCha8Rng) -> Case {
 
 fn memory(ground: &Ground, random: &mut ChaCha8Rng) -> Case {
     let mut case = any_run(ground, Expectation::Starved, random);
-    let kilobytes = random.random_range(150_000..600_000);
+    let kilobytes = random.random_range(40_000..600_000);
     case.shell = format!("export RAYON_NUM_THREADS=1; ulimit -v {kilobytes}; {}", Case::PLAIN);
     case.story += &format!(" in {kilobytes} kB of address space, one thread");
     case

@@ -174,7 +174,7 @@ impl Trial {
         }
         // clap's own message has a usage line and a tip.
         let usage = self.stderr.contains("try '--help'") || self.stderr.contains("Usage:");
-        if !usage && case.shell == Case::PLAIN && self.stderr.lines().count() != 1 {
+        if !usage && !case.shell.contains('>') && self.stderr.lines().count() != 1 {
             return Some(format!("{} lines in the place of one message", self.stderr.lines().count()));
         }
         let lengthy = self.stderr.chars().count() > 1200;

@@ -28,6 +28,15 @@ pub struct KillScore {
     pub leftovers: usize,
 }
 
+impl KillScore {
+    fn mix(&mut self, subject: &Subject) -> Result<(), SubjectError> {
+        self.mixed += 1;
+        let story = subject.story()?;
+        self.first_mixed.get_or_insert(story);
+        Ok(())
+    }
+}
+
 /// Between two looks at a run.
 const POLL: Duration = Duration::from_micros(50);
 
@@ -41,8 +50,9 @@ pub fn kill(subject: &Subject, count: usize, seed: u64) -> Result<KillScore, Sub
     finish(subject, 1)?;
     subject.clear()?;
     let start = Instant::now();
+    let there = subject.temporary_names();
     let mut run = subject.start(0)?;
-    while run.try_wait()?.is_none() && !subject.is_committing() {}
+    while run.try_wait()?.is_none() && subject.temporary_names().is_subset(&there) {}
     let committing = Instant::now();
     run.wait()?;
     let (duration, commit) = (start.elapsed(), committing.elapsed());
@@ -51,13 +61,15 @@ pub fn kill(subject: &Subject, count: usize, seed: u64) -> Result<KillScore, Sub
             subject.clear()?;
         }
         let before = subject.state()?;
-        let which = usize::from(before == State::Whole(0));
+        let which = usize::from(before == State::Whole(0) && !subject.resumes());
+        // A killed run's names may still be there.
+        let there = subject.temporary_names();
         let mut run = subject.start(which)?;
         let at = Instant::now() + duration.mul_f64(random.random_range(0.0..1.05));
         let aimed = number % 2 == 1;
         if aimed {
             // Without a pause: a commit takes less than a millisecond.
-            while run.try_wait()?.is_none() && !subject.is_committing() {}
+            while run.try_wait()?.is_none() && subject.temporary_names().is_subset(&there) {}
             let until = Instant::now() + commit.mul_f64(random.random_range(0.0..1.0));
             while Instant::now() < until {}
         } else {
@@ -72,20 +84,19 @@ pub fn kill(subject: &Subject, count: usize, seed: u64) -> Result<KillScore, Sub
         run.kill()?;
         run.wait()?;
         match subject.state()? {
-            State::Whole(now) if now == which && before != State::Whole(which) => score.new += 1,
-            state if state == before => score.old += 1,
+            State::Whole(now) if now == which => score.new += 1,
+            state @ State::Whole(_) if state == before => score.old += 1,
             State::Undone => {
                 // What is left of it must not stand in the way.
                 finish(subject, which)?;
                 match subject.state()? {
                     State::Whole(now) if now == which => score.undone += 1,
-                    _ => score.mixed += 1,
+                    _ => score.mix(subject)?,
                 }
             }
             _ => {
-                score.mixed += 1;
-                let story = subject.story()?;
-                score.first_mixed.get_or_insert(story);
+                score.mix(subject)?;
+                finish(subject, which)?;
             }
         }
     }

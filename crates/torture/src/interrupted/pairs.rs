@@ -23,19 +23,19 @@ pub fn pair(subject: &Subject, count: usize) -> Result<PairScore, SubjectError> 
     let mut score = PairScore { tried: count, ..PairScore::default() };
     for _ in 0..count {
         let runs = [subject.start(0)?, subject.start(1)?];
-        let mut refused = 0;
-        let mut orderly = true;
-        for run in runs {
+        let pids = runs.each_ref().map(std::process::Child::id);
+        let (mut done, mut refused, mut orderly) = (Vec::new(), 0, true);
+        for (which, run) in runs.into_iter().enumerate() {
             let output = run.wait_with_output()?;
             let message = String::from_utf8_lossy(&output.stderr).into_owned();
-            let named = message.contains("another run") && message.contains("pid");
+            let other = format!("(pid {}, `phiw {}`", pids[1 - which], subject.name);
             match output.status.code() {
-                Some(0) => {}
-                Some(2) if named => refused += 1,
+                Some(0) => done.push(which),
+                Some(2) if message.contains(&other) => refused += 1,
                 _ => orderly = false,
             }
         }
-        let whole = matches!(subject.state()?, State::Whole(_));
+        let whole = matches!(subject.state()?, State::Whole(which) if done.contains(&which));
         match (orderly && whole, refused) {
             (true, 0) => score.both += 1,
             (true, 1) => score.refused += 1,

@@ -1,12 +1,15 @@
 //! A command in a folder of its own, with two inputs that give different results.
 
 use crate::hostile::{Ground, GroundError};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use tempfile::TempDir;
+
+/// Where the files of a plan live, beside the links to them.
+const GENERATIONS: &str = ".plan.csv.phiw";
 
 /// Result files by their path.
 pub(super) type Results = BTreeMap<PathBuf, Vec<u8>>;
@@ -16,10 +19,19 @@ pub(super) type Results = BTreeMap<PathBuf, Vec<u8>>;
 pub(super) enum State {
     /// What one of the two runs gives, all of it.
     Whole(usize),
-    /// Nothing, or less than a result that is claimed to be one: the next run makes it.
+    /// Nothing that is claimed to be a result: the next run has to make it.
     Undone,
     /// Files of both, or of neither.
     Mixed,
+}
+
+/// What `results` are, beside those of the two runs. `claims` says whether a file that is there claims a result.
+fn state_of(results: &Results, references: &[Results; 2], claims: impl Fn(&Path, &[u8]) -> bool) -> State {
+    match references.iter().position(|reference| reference == results) {
+        Some(which) => State::Whole(which),
+        None if results.iter().any(|(path, content)| claims(path, content)) => State::Mixed,
+        None => State::Undone,
+    }
 }
 
 /// A command in a folder of its own, with two inputs that give different results.
@@ -134,23 +146,17 @@ impl Subject {
 
     /// What is in the results.
     pub(super) fn state(&self) -> io::Result<State> {
-        let results = self.results()?;
-        if let Some(which) = self.references.iter().position(|reference| *reference == results) {
-            return Ok(State::Whole(which));
-        }
-        // A motion without its facts is not claimed to be one; a run file is a JSON at any moment.
-        let claimed =
-            results.keys().any(|path| path.ends_with("recording.json") || path.ends_with("plan.json"));
-        let run_file = |(path, content): (&PathBuf, &Vec<u8>)| {
-            path.extension().is_none_or(|extension| extension != "json")
-                || serde_json::from_slice::<serde_json::Value>(content).is_ok()
+        let claims = |path: &Path, content: &[u8]| match self.name {
+            // A motion without its facts is a whole motion, of which nobody says how it came about.
+            "retarget" => path.ends_with("recording.json"),
+            // Run files grow from iteration to iteration, and are whole at any moment; motions are made before them.
+            "paper" => {
+                path.extension().is_some_and(|extension| extension == "json")
+                    && serde_json::from_slice::<serde_json::Value>(content).is_err()
+            }
+            _ => true,
         };
-        let undone = match self.name {
-            "retarget" => !claimed,
-            "paper" => results.iter().all(run_file),
-            _ => results.is_empty(),
-        };
-        Ok(if undone { State::Undone } else { State::Mixed })
+        Ok(state_of(&self.results()?, &self.references, claims))
     }
 
     /// Which result files are of which run, in words.
@@ -169,24 +175,21 @@ impl Subject {
         Ok(results.iter().map(of_file).collect::<Vec<_>>().join(", "))
     }
 
-    /// Whether a commit is under way: a temporary name is there.
-    pub(super) fn is_committing(&self) -> bool {
-        let hidden = |folder: &Path| {
-            let entries = folder.read_dir().into_iter().flatten().flatten();
-            let name = |entry: std::fs::DirEntry| entry.file_name().to_string_lossy().into_owned();
-            // A lock is there all the time.
-            entries
-                .map(name)
-                .any(|name| name.starts_with('.') && !name.contains("lock") && name != ".plan.csv.phiw")
-        };
+    /// Temporary names that are there: those of a commit that is under way, or of one that was killed. Locks are none.
+    pub(super) fn temporary_names(&self) -> BTreeSet<PathBuf> {
         let root = self.folder.path();
-        let generations = root.join(".plan.csv.phiw").read_dir().map_or(0, Iterator::count);
-        let run = root.join("out/runs");
-        let runs = run.read_dir().into_iter().flatten().flatten().map(|entry| entry.path());
-        generations > 2
-            || hidden(root)
-            || hidden(&root.join("out"))
-            || runs.into_iter().any(|run| hidden(&run))
+        let entries =
+            |folder: PathBuf| folder.read_dir().into_iter().flatten().flatten().map(|entry| entry.path());
+        let runs = entries(root.join("out/runs")).collect::<Vec<_>>();
+        let folders = [root.to_owned(), root.join("out")].into_iter().chain(runs);
+        let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let is_temporary = |path: &PathBuf| {
+            let name = name(path);
+            name.starts_with('.') && !name.ends_with("lock") && name != GENERATIONS
+        };
+        let mut names: BTreeSet<PathBuf> = folders.flat_map(entries).filter(is_temporary).collect();
+        names.extend(entries(root.join(GENERATIONS)));
+        names
     }
 
     /// Takes all results away.
@@ -216,7 +219,7 @@ impl Subject {
             for entry in folder.read_dir()? {
                 let path = entry?.path();
                 let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                if name == ".plan.csv.phiw" {
+                if name == GENERATIONS {
                     // The files of a plan live here: one generation, and the link to it.
                     let extra = path.read_dir()?.count().saturating_sub(2);
                     left.extend((0..extra).map(|_| path.clone()));
@@ -244,17 +247,57 @@ impl Subject {
             for entry in folder.read_dir().into_iter().flatten() {
                 let path = entry?.path();
                 let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
-                // A report has the time of day in it.
-                let dated =
-                    self.name == "paper" && path.extension().is_some_and(|extension| extension == "html");
                 if path.is_dir() && !hidden {
                     folders.push(path);
-                } else if !hidden && !dated {
-                    results
-                        .insert(path.strip_prefix(root).unwrap_or(&path).to_owned(), std::fs::read(&path)?);
+                } else if !hidden {
+                    let name = path.strip_prefix(root).unwrap_or(&path).to_owned();
+                    results.insert(name, without_time(std::fs::read(&path)?));
                 }
             }
         }
         Ok(results)
+    }
+}
+
+/// A page without the moment at which it was made.
+fn without_time(content: Vec<u8>) -> Vec<u8> {
+    let Ok(text) = std::str::from_utf8(&content) else { return content };
+    match (text.find("<time"), text.find("</time>")) {
+        (Some(start), Some(end)) if start < end => format!("{}{}", &text[..start], &text[end..]).into_bytes(),
+        _ => content,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn results(files: &[(&str, &str)]) -> Results {
+        files.iter().map(|(name, content)| (PathBuf::from(name), content.as_bytes().to_vec())).collect()
+    }
+
+    #[test]
+    fn whole_undone_and_mixed_results_are_told_apart() {
+        let references = [results(&[("a", "1"), ("b", "1")]), results(&[("a", "2"), ("b", "2")])];
+        let claims = |path: &Path, _: &[u8]| path.ends_with("b");
+        let cases: [(&[(&str, &str)], State); 7] = [
+            (&[("a", "1"), ("b", "1")], State::Whole(0)),
+            (&[("a", "2"), ("b", "2")], State::Whole(1)),
+            (&[], State::Undone),
+            (&[("a", "2")], State::Undone),
+            (&[("a", "2"), ("b", "1")], State::Mixed),
+            (&[("b", "1")], State::Mixed),
+            (&[("a", "1"), ("b", "1"), ("c", "1")], State::Mixed),
+        ];
+        for (files, expected) in cases {
+            assert_eq!(state_of(&results(files), &references, claims), expected, "{files:?}");
+        }
+    }
+
+    #[test]
+    fn the_moment_of_a_page_does_not_count() {
+        let page = |time: &str, body: &str| format!("<p><time>{time}</time>{body}</p>").into_bytes();
+        assert_eq!(without_time(page("10:01", "x")), without_time(page("10:02", "x")));
+        assert_ne!(without_time(page("10:01", "x")), without_time(page("10:01", "y")));
     }
 }
