@@ -229,6 +229,7 @@ fn sensors(clock: Clock, correlation_time: f64) -> Sensors {
         quantum: vec![1e-4, 3e-5],
         angle_noise: 0.0,
         clock,
+        logging: None,
     }
 }
 

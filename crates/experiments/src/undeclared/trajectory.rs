@@ -10,6 +10,10 @@ const UNLIMITED_REACH: f64 = 2.8;
 const FADE: f64 = 1.2;
 /// Fastest speed asked of any joint \[rad/s, m/s\].
 const FASTEST: f64 = 3.0;
+/// Shortest and longest rest between moves \[s\].
+const SHORT_RESTS: [f64; 2] = [0.1, 0.7];
+/// The same where joints rest for long.
+const LONG_RESTS: [f64; 2] = [0.8, 3.0];
 
 /// Position, velocity, acceleration of one joint.
 pub type JointState = [f64; 3];
@@ -98,6 +102,49 @@ impl Motion {
         duration: f64,
         reach: Option<Reach>,
     ) -> Self {
+        Self::moves(tree, dice, start, duration, reach, SHORT_RESTS)
+    }
+
+    /// Moves from pose to pose with long rests: all joints together, or one after the other in their own time.
+    pub fn with_rests(
+        tree: &Tree,
+        dice: &mut Dice,
+        start: f64,
+        duration: f64,
+        reach: Option<Reach>,
+        together: bool,
+    ) -> Self {
+        let mut motion = Self::moves(tree, dice, start, duration, reach, LONG_RESTS);
+        if !together {
+            for joint in 0..tree.joint_count() {
+                let mut own = Self::moves(tree, dice, start, duration, reach, LONG_RESTS);
+                motion.joints[joint] = own.joints.swap_remove(joint);
+            }
+        }
+        motion
+    }
+
+    /// A periodic excitation of two to five harmonics of 0.2 to 0.5 Hz.
+    pub fn periodic(tree: &Tree, dice: &mut Dice, start: f64, duration: f64, reach: Option<Reach>) -> Self {
+        let fundamental = dice.uniform(0.2, 0.5);
+        let highest = fundamental * (2 + dice.index(4)) as f64;
+        let joints = (0..tree.joint_count())
+            .map(|joint| {
+                let reach = reach.filter(|reach| reach.joint == joint);
+                fourier_joint(room(tree, joint), dice, fundamental, highest, duration, reach)
+            })
+            .collect();
+        Motion { start, duration, joints, excess: None }
+    }
+
+    fn moves(
+        tree: &Tree,
+        dice: &mut Dice,
+        start: f64,
+        duration: f64,
+        reach: Option<Reach>,
+        rests: [f64; 2],
+    ) -> Self {
         let rooms: Vec<Room> = (0..tree.joint_count()).map(|joint| room(tree, joint)).collect();
         let pose = |dice: &mut Dice, number: usize| -> Vec<f64> {
             let inside = |(joint, room): (usize, &Room)| match reach {
@@ -128,11 +175,20 @@ impl Motion {
             for (moves, (from, to)) in joints.iter_mut().zip(from.iter().zip(&to)) {
                 moves.push([clock, end, *from, *to]);
             }
-            clock = end + dice.uniform(0.1, 0.7);
+            clock = end + dice.uniform(rests[0], rests[1]);
             from = to;
         }
         let joints = joints.into_iter().map(|moves| JointMotion::PointToPoint { moves }).collect();
         Motion { start, duration, joints, excess: None }
+    }
+
+    /// The same sinusoids, `factor` times as slow.
+    pub fn slow_down(&mut self, factor: f64) {
+        for joint in &mut self.joints {
+            if let JointMotion::Fourier { terms, .. } = joint {
+                terms.iter_mut().for_each(|term| term[1] /= factor);
+            }
+        }
     }
 
     /// The same motion around the same place, `factor` times as wide.
