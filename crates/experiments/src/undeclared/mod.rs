@@ -57,6 +57,8 @@ mod truth;
 mod visibility;
 mod wide;
 mod wide_table;
+#[cfg(test)]
+mod wide_tests;
 mod write;
 
 use anyhow::Context;

@@ -366,6 +366,37 @@ mod tests {
         check(viscous, &with_rival("quadratic_friction", "joint_spring", 0.4), &[WrongKind], 1);
     }
 
+    /// A family is right with and without the joints where it is immaterial; a secret that is only a refinement, and a name that the situation makes true,
+    /// are neither right nor false.
+    #[test]
+    fn what_is_immaterial_may_be_named_or_not() {
+        use Outcome::*;
+        let mut truth = truth(&[(Kind::ViscousFriction, &["a", "b", "c"])]);
+        truth.secrets[0].optional = vec!["c".to_owned()];
+        truth.allowed = vec![Kind::TimeDelay];
+        let family = |joints: &str| {
+            format!(r#"{{"kind": "viscous_friction", "joints": [{joints}], "confidence": 0.9}}"#)
+        };
+        let check = |effects: &str, outcome: Outcome, false_names: usize, judged: &[bool]| {
+            let score = score(&truth, &report(effects), None);
+            assert_eq!(score.outcomes, [outcome], "{effects}");
+            assert_eq!(score.false_names.len(), false_names, "{effects}");
+            let found: Vec<bool> = score.judged.iter().map(|(_, is_true)| *is_true).collect();
+            assert_eq!(found, judged, "{effects}");
+        };
+        check(&family(r#""a", "b""#), Right, 0, &[true]);
+        check(&family(r#""a", "b", "c""#), Right, 0, &[true]);
+        check(&format!("{}, {}", family(r#""a""#), family(r#""b", "c""#)), Right, 0, &[true, true]);
+        check(&family(r#""a""#), WrongJoints, 0, &[true]);
+        check(&family(r#""a", "b", "d""#), WrongJoints, 0, &[false]);
+        let delay = family(r#""b""#).replace("viscous_friction", "time_delay");
+        check(&delay, Missed, 0, &[true]);
+        check(&delay.replace("time_delay", "joint_spring"), WrongKind, 1, &[false]);
+        let mut refined = report("");
+        refined.refinements = report(&family(r#""a", "b""#)).effects;
+        assert_eq!(score(&truth, &refined, None).outcomes, [Refined]);
+    }
+
     #[test]
     fn error_closed_is_the_share_above_the_floor() {
         let score = score(&truth(&[]), &report(VISCOUS), None);

@@ -101,7 +101,7 @@ fn suites_and_seeds_do_not_overlap() {
             }
         }
     }
-    assert_eq!(seen.len(), 2 * 1000);
+    assert_eq!(seen.len(), 2 * (1000 + 1170));
 }
 
 /// Without its secrets, a robot's torque is M(q)·q̈ + h(q, q̇) and the declared friction, term by term.
