@@ -12,8 +12,8 @@ use std::fmt::Write;
 
 /// Share of outliers and their size, for [`Tails::Contaminated`].
 const OUTLIERS: [f64; 2] = [0.02, 8.0];
-/// What velocity columns are multiplied by when somebody took the wrong unit: degrees, revolutions a minute, the other direction.
-const WRONG_UNITS: [f64; 3] = [57.295_779_5, 9.549_296_6, -1.0];
+/// What velocity columns are multiplied by when somebody took the wrong unit: revolutions a minute, the other direction. Degrees are refused as such.
+const WRONG_UNITS: [f64; 2] = [9.549_296_6, -1.0];
 
 /// The shape of the noise's innovations, all of unit variance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -10,7 +10,7 @@ use super::draw::{Survey, catalogue, outside};
 use super::family::Family;
 use super::kind::{Kind, Name};
 use super::logging::Logging;
-use super::plant::{Ordinary, Record, record};
+use super::plant::{Ordinary, Record, States, record};
 use super::robot::Robot;
 use super::secret::{Form, Secret};
 use super::sensors::Sensors;
@@ -111,7 +111,10 @@ fn motions(
                 .into_iter()
                 .map(|start| tamed(robot, Motion::fourier(tree, dice, start, DURATION, reach), reach))
                 .collect();
-            motions[..2].iter_mut().for_each(|motion| motion.slow_down(factor));
+            let fast = speed(robot, &motions[2]);
+            for motion in &mut motions[..2] {
+                motion.slow_down(factor * (speed(robot, motion) / fast).max(1.0));
+            }
             motions
         }
         Situation::Periodic => {
@@ -133,6 +136,17 @@ fn motions(
         // Bristles hold a force at rest: that belongs to the situations with rests.
         _ => draw_motions(robot, reach, spec.has(Kind::StribeckFriction), dice),
     }
+}
+
+/// Root mean square over joints and time of the speed as a share of each joint's limit.
+pub fn speed(robot: &Robot, motion: &Motion) -> f64 {
+    let states = States::of_motion(motion, &even_times(motion, 25.0));
+    let square = |sample: usize| -> f64 {
+        let share = |joint| states.v(sample, joint) / robot.tree.joint(joint).limits.velocity;
+        (0..robot.joints()).map(|joint| share(joint).powi(2)).sum()
+    };
+    let sum: f64 = (0..states.samples()).map(square).sum();
+    (sum / (states.samples() * robot.joints()) as f64).sqrt()
 }
 
 /// A family on all joints; an undeclared one also on the proximal joints only, or on all but one.
