@@ -57,6 +57,13 @@ pub enum JointMotion {
         /// Beginning and end in time, start and goal, ascending in time.
         moves: Vec<[f64; 4]>,
     },
+    /// Another motion, so many times as slow.
+    Slowed {
+        /// The motion.
+        motion: Box<JointMotion>,
+        /// How many times.
+        factor: f64,
+    },
     /// Simulated on an even grid of this step \[s\].
     Simulated {
         /// Step of the grid \[s\].
@@ -182,13 +189,10 @@ impl Motion {
         Motion { start, duration, joints, excess: None }
     }
 
-    /// The same sinusoids, `factor` times as slow.
+    /// The same motion `factor` times as slow: as much of it as there is time for.
     pub fn slow_down(&mut self, factor: f64) {
-        for joint in &mut self.joints {
-            if let JointMotion::Fourier { terms, .. } = joint {
-                terms.iter_mut().for_each(|term| term[1] /= factor);
-            }
-        }
+        let slowed = |motion: &JointMotion| JointMotion::Slowed { motion: Box::new(motion.clone()), factor };
+        self.joints = self.joints.iter().map(slowed).collect();
     }
 
     /// The same motion around the same place, `factor` times as wide.
@@ -203,7 +207,7 @@ impl Motion {
                         *to = center + factor * (*to - center);
                     }
                 }
-                JointMotion::Simulated { .. } => {}
+                JointMotion::Slowed { .. } | JointMotion::Simulated { .. } => {}
             }
         }
     }
@@ -232,6 +236,10 @@ impl JointMotion {
                     }
                     None => [moves.first().map_or(0.0, |first| first[2]), 0.0, 0.0],
                 }
+            }
+            JointMotion::Slowed { motion, factor } => {
+                let [q, v, a] = motion.state(time / factor, duration);
+                [q, v / factor, a / (factor * factor)]
             }
             JointMotion::Simulated { step, states } => hermite(states, time / step, *step),
         }
