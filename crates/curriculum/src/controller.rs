@@ -70,9 +70,7 @@ impl TorqueModel for ModelTorque {
         scratch.begin(&block)?;
         scratch.evaluate(&block, 0, &mut self.evaluation)?;
         for (torque, layout) in torque.iter_mut().zip(self.design.rows()) {
-            let columns = &self.evaluation[layout.range.clone()];
-            *torque =
-                columns.iter().zip(&layout.parameters).map(|(column, &k)| column * self.parameters[k]).sum();
+            *torque = layout.torque(&self.evaluation, &self.parameters);
         }
         Ok(())
     }

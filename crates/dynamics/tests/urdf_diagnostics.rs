@@ -185,6 +185,10 @@ fn mimics() {
     assert_eq!((thumb.ratio, thumb.offset, thumb.velocity_index), (-6.0, -0.5, 0));
 
     let none = UrdfOptions::default();
+    // Two multipliers that are numbers, and a product that is none.
+    let steep =
+        chain.replace("multiplier='-3'", "multiplier='1e40'").replace("multiplier='2'", "multiplier='1e40'");
+    refuses(&steep, &none, "joint `thumb`: what the chain of its mimics multiplies up to is not");
     finds(&pair("<mimic joint='pivot' multiplier='0' offset='0.2'/>"), &["taken as fixed at 0.2"]);
     refuses(
         &pair("<mimic joint='pivott'/>"),

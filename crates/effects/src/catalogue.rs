@@ -11,7 +11,7 @@ pub struct Catalogue {
 }
 
 impl Default for Catalogue {
-    /// The 23 kinds that phiw knows.
+    /// All kinds that phiw knows.
     fn default() -> Self {
         Catalogue {
             kinds: vec![

@@ -76,6 +76,7 @@ pub struct OwnTorque<F> {
     joint: usize,
     parameters: Vec<EffectParameter>,
     needs: Needs,
+    linear_in_motion: bool,
     formula: F,
 }
 
@@ -105,6 +106,7 @@ impl<F: Formula> OwnTorque<F> {
             },
             joint,
             needs: Needs::default(),
+            linear_in_motion: false,
             formula,
         }
     }
@@ -112,6 +114,12 @@ impl<F: Formula> OwnTorque<F> {
     /// The same with what its columns need beside the signals.
     pub fn needing(mut self, needs: Needs) -> Self {
         self.needs = needs;
+        self
+    }
+
+    /// The same with columns that are all linear in the motion ([`Effect::is_linear_in_motion`]).
+    pub fn linear_in_motion(mut self) -> Self {
+        self.linear_in_motion = true;
         self
     }
 }
@@ -128,6 +136,9 @@ impl<F: Formula> Effect for OwnTorque<F> {
     }
     fn needs(&self) -> Needs {
         self.needs
+    }
+    fn is_linear_in_motion(&self, _parameter: usize) -> bool {
+        self.linear_in_motion
     }
     fn evaluator(&self) -> Box<dyn Evaluator + '_> {
         Box::new(FormulaEvaluator { formula: &self.formula, memory: F::Memory::default() })

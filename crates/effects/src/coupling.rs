@@ -213,6 +213,10 @@ impl Effect for Coupling {
         };
         self.terms.iter().enumerate().flat_map(of_term).collect()
     }
+    /// Terms with a sign, whose parameters are torques, are not.
+    fn is_linear_in_motion(&self, parameter: usize) -> bool {
+        self.terms.get(parameter).is_some_and(|term| term.dimension != ParameterKind::Torque)
+    }
     fn evaluator(&self) -> Box<dyn Evaluator + '_> {
         Box::new(CouplingColumns {
             site: self.site,

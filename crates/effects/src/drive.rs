@@ -33,7 +33,8 @@ impl EffectKind for RotorInertia {
         let joint = site[0];
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = sample.qdd()[joint];
         let parameters = [("Ia", ParameterKind::Inertia, 0.0)];
-        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+        let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
+        Box::new(effect.linear_in_motion())
     }
 }
 

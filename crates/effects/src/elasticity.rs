@@ -81,6 +81,9 @@ impl Effect for Elastic {
         let compliance = (self.compliance + fitted.first().copied().unwrap_or_default()).max(0.0);
         Some(Box::new(Elastic { compliance, ..self.clone() }))
     }
+    fn is_causal(&self) -> bool {
+        false
+    }
     fn evaluator(&self) -> Box<dyn Evaluator + '_> {
         Box::new(ElasticColumns { joint: self.joint, joints: self.joints })
     }

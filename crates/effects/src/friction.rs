@@ -49,11 +49,15 @@ impl EffectKind for Viscous {
     fn joint_property(&self) -> Option<JointProperty> {
         Some(JointProperty::Damping)
     }
+    fn dissipates(&self) -> bool {
+        true
+    }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = sample.qd()[joint];
         let parameters = [("fv", ParameterKind::PerVelocity, 0.0)];
-        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+        let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
+        Box::new(effect.linear_in_motion())
     }
 }
 
@@ -87,6 +91,9 @@ impl EffectKind for Coulomb {
     }
     fn constants_of_the_site(&self) -> &'static [&'static str] {
         &[WIDTH]
+    }
+    fn dissipates(&self) -> bool {
+        true
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));
@@ -209,6 +216,9 @@ impl EffectKind for Stribeck {
             found.constant(STRIBECK_VELOCITY)
         )
     }
+    fn dissipates(&self) -> bool {
+        true
+    }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));
         let speed = constant(constants, STRIBECK_VELOCITY, 0.1);
@@ -253,6 +263,9 @@ impl EffectKind for LoadDependent {
     }
     fn seen_against(&self) -> Signal {
         Signal::Torque
+    }
+    fn dissipates(&self) -> bool {
+        true
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));

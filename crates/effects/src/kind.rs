@@ -35,9 +35,10 @@ pub enum JointProperty {
     Armature,
 }
 
-/// A kind of effect: where it can act, which constants to try, and how to build it.
+/// A kind of effect: where it can act, which constants to try, how to build it, and what the rest of the program needs to know of it.
 ///
-/// Implement it for an effect of your own and add it with [`crate::Catalogue::with`].
+/// What it says of its parameters (units, physical bounds) and columns (linear in the motion, causal) the [`Effect`] says that it builds.
+/// Implement it for an effect of your own and add it with [`crate::Catalogue::with`]: see the recipe on the crate's front page.
 pub trait EffectKind: Send + Sync {
     /// Its name, as in `report.json`.
     fn name(&self) -> &str;
@@ -108,6 +109,11 @@ pub trait EffectKind: Send + Sync {
     /// The property of a joint that holds its only parameter, in a URDF or a simulator; none if neither can express it.
     fn joint_property(&self) -> Option<JointProperty> {
         None
+    }
+
+    /// Whether it always takes energy from the motion: its power is that of a brake at every moment, whatever its parameters are within their bounds.
+    fn dissipates(&self) -> bool {
+        false
     }
 
     /// Whether it changes with the time since the session began, so that logs whose clocks each begin anew cannot tell it.

@@ -67,6 +67,9 @@ impl Effect for Delay {
     fn needs(&self) -> Needs {
         Needs { torque: true, ..Needs::default() }
     }
+    fn is_causal(&self) -> bool {
+        false
+    }
     fn evaluator(&self) -> Box<dyn Evaluator + '_> {
         Box::new(DelayColumns(self))
     }

@@ -26,7 +26,8 @@ pub fn identified_urdf(analysis: &Analysis<'_>) -> Result<String, Error> {
         })
     };
     let declared: Vec<JointFriction> = (0..tree.joint_count()).filter_map(friction).collect();
-    write_identified_urdf(&analysis.session.xml, &tree, &declared).map_err(Error::IdentifiedUrdf)
+    write_identified_urdf(&analysis.session.xml, &tree, &declared)
+        .map_err(|source| Error::IdentifiedUrdf(Box::new(source)))
 }
 
 /// Kinds of effects in the model that the URDF lacks.

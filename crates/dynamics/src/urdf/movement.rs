@@ -1,6 +1,7 @@
 //! Which joints move by themselves, which follow another, and which stand still.
 
 use super::error::nearest;
+use super::joint::is_usable;
 use super::robot::{Joint, JointKind, Robot};
 use super::{UrdfError, UrdfOptions};
 use std::collections::HashMap;
@@ -28,7 +29,7 @@ pub(super) fn movements(robot: &Robot, options: &UrdfOptions) -> Result<Vec<Move
                 nearest: nearest(name, indices.keys().copied()),
             });
         };
-        if !position.is_finite() {
+        if !is_usable(*position) {
             return Err(UrdfError::NotFinite {
                 line: None,
                 kind: "joint",
@@ -88,6 +89,15 @@ fn movement(
         })?;
         offset += ratio * mimic.offset;
         ratio *= mimic.multiplier;
+        let own_are_usable = is_usable(mimic.multiplier) && is_usable(mimic.offset);
+        if own_are_usable && !(is_usable(ratio) && is_usable(offset)) {
+            return Err(UrdfError::NotFinite {
+                line: Some(robot.joints[follower].line),
+                kind: "joint",
+                name: robot.joints[follower].name.clone(),
+                field: "what the chain of its mimics multiplies up to",
+            });
+        }
     }
     Err(UrdfError::MimicLoop {
         line: robot.joints[follower].line,

@@ -42,7 +42,7 @@ pub fn read(folder: &Path, tree: &Tree, progress: Progress<'_>) -> Result<Motion
         let log = |source| Error::from(IdentificationError::from(source));
         let recording = Recording::from_csv(path, &joints, TorqueColumns::Absent).map_err(log)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        let wrong = |source: CurriculumError| Error::Motion { path: path.clone(), source };
+        let wrong = |source: CurriculumError| Error::Motion { path: path.clone(), source: Box::new(source) };
         let motion = Motion::from_recording(&name, "", &recording).map_err(wrong)?;
         motion.check_steps(&joints, &speed_limits, &StepTolerance::default()).map_err(wrong)?;
         progress("reading motions", done.fetch_add(1, Ordering::Relaxed) + 1, total);
