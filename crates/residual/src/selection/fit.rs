@@ -73,10 +73,8 @@ impl Fit {
             prior_weight: rows.iter().sum::<f64>() / all_rows.max(1.0),
         };
         for _ in 0..ITERATIONS {
-            let weight = |((torque, rows), rss): ((&Torque, &f64), &f64)| {
-                rows / (torque.variance(*rss) * torque.whole.rows().max(1.0))
-            };
-            fit.weights = problem.torques.iter().zip(rows).zip(&fit.rss).map(weight).collect();
+            fit.weights =
+                rows.iter().zip(&fit.rss).map(|(rows, rss)| rows / rss.max(f64::MIN_POSITIVE)).collect();
             fit.solve(problem);
             let rss: Vec<f64> = (0..problem.torques.len()).map(|torque| fit.residual(problem, torque)).collect();
             let change = rss.iter().zip(&fit.rss).map(|(new, old)| (new / old - 1.0).abs()).fold(0.0, f64::max);

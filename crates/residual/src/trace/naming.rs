@@ -38,6 +38,10 @@ struct Judged {
     folds: f64,
     /// Whether another effect is a form of it.
     required: bool,
+    /// Whether it polishes a simpler one.
+    kin: bool,
+    /// Torques that it acts on.
+    torques: Vec<usize>,
     named: bool,
 }
 
@@ -48,24 +52,60 @@ impl Search<'_> {
     pub(super) fn name(&mut self) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
         loop {
             let trial = self.trial()?;
-            let judged = self.judge(&trial)?;
+            let mut judged = self.judge(&trial)?;
             let harmful = judged.iter().filter(|judged| judged.gain <= 0.0 && !judged.required);
             match harmful.min_by(|a, b| a.gain.total_cmp(&b.gain)) {
                 Some(harmful) => {
                     let place = harmful.place;
                     self.leave_out(place)?;
                 }
-                None => return self.in_order(&trial, judged),
+                None => {
+                    self.judge_polish(&trial, &mut judged)?;
+                    return self.in_order(&trial, judged);
+                }
             }
         }
     }
 
+    /// Asks again of all that polishes simpler effects, now that these have had their constants refined without it: a sign that turns over another speed is no
+    /// effect of its own.
+    fn judge_polish(&self, trial: &Trial, judged: &mut [Judged]) -> Result<(), IdentificationError> {
+        let mut places: Vec<usize> =
+            judged.iter().filter(|judged| judged.named && judged.kin).map(|judged| judged.place).collect();
+        if places.is_empty() {
+            return Ok(());
+        }
+        let mut branch = self.clone();
+        places.sort_unstable();
+        for &place in places.iter().rev() {
+            branch.remove(place)?;
+        }
+        branch.refine()?;
+        let refined = branch.trial()?;
+        let without = refined.held_out_squares(&refined.fit);
+        let with = trial.held_out_squares(&trial.fit);
+        for judged in judged.iter_mut().filter(|judged| places.contains(&judged.place)) {
+            judged.named = judged.torques.iter().any(|&torque| {
+                let taken = (without[torque] - with[torque]).max(0.0);
+                let whole = trial.held_out[torque].right_hand_side().max(f64::MIN_POSITIVE);
+                taken >= self.options.least_share_of_kin * without[torque]
+                    && (taken / whole).sqrt() >= self.options.least_size
+            });
+        }
+        Ok(())
+    }
+
     fn leave_out(&mut self, place: usize) -> Result<(), IdentificationError> {
+        self.remove(place)?;
+        self.refine()
+    }
+
+    fn remove(&mut self, place: usize) -> Result<(), IdentificationError> {
         let design = self.design()?;
         self.parameters.drain(design.effect_parameters(place));
         self.specs.remove(place);
         self.chosen.alternatives.remove(place - self.declared);
-        self.refine()
+        Ok(())
     }
 
     fn trial(&self) -> Result<Trial, IdentificationError> {
@@ -144,6 +184,8 @@ impl Search<'_> {
             judged.push(Judged {
                 place,
                 required: is_form_of_it(&place),
+                kin,
+                torques: trial.problem.hypotheses[member.hypothesis].torques.clone(),
                 significance: certainty.significance,
                 gain,
                 folds: trial.better_folds(&without_fit),
