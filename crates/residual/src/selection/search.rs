@@ -161,36 +161,41 @@ impl<'a> Search<'a> {
     /// A model fitted, with what its members require; members that break their bounds, or say nothing, are left out.
     fn evaluate(&self, mut members: Vec<Member>, start: &Fit) -> Model {
         self.add_required(&mut members, start);
+        self.within_bounds(members, start)
+    }
+
+    /// The same with nothing added.
+    fn within_bounds(&self, mut members: Vec<Member>, start: &Fit) -> Model {
         loop {
             let fit = Fit::new(self.problem, self.problem.active(&members), &self.rows, Some(start));
-            let stays = |member: &Member| self.is_declared(member) || self.is_within_bounds(&fit, member);
-            if members.iter().all(stays) {
+            let breaks = |member: &Member| !self.is_declared(member) && !self.is_within_bounds(&fit, member);
+            let broken: Vec<Member> = members.iter().filter(|member| breaks(member)).copied().collect();
+            if broken.is_empty() {
                 let value = criterion(self.problem, &members, &fit, &self.rows);
                 return Model { members, fit, value };
             }
-            members = self.without_what_breaks(&fit, members);
-        }
-    }
-
-    /// Without the members that break their bounds. Where a required one does, and not by chance, what requires it goes: it would be the form of something that
-    /// cannot be.
-    fn without_what_breaks(&self, fit: &Fit, mut members: Vec<Member>) -> Vec<Member> {
-        let breaks =
-            |member: &Member| !self.is_declared(member) && !self.is_within_bounds(fit, member);
-        let broken: Vec<Member> = members.iter().filter(|member| breaks(member)).copied().collect();
-        for member in &broken {
-            let dependant = |other: &Member| {
+            let depends = |other: &Member, on: &Member| {
                 let other = &self.problem.hypotheses[other.hypothesis];
-                !other.declared && other.requires.contains(&member.hypothesis)
+                !other.declared && other.requires.contains(&on.hypothesis)
             };
-            let squares = squares_of(self.problem, fit, *member);
-            if squares > BY_CHANCE && members.iter().any(dependant) {
-                members.retain(|other| !dependant(other));
-                return members;
+            let required = broken.iter().find(|broken| members.iter().any(|other| depends(other, broken)));
+            let without_broken: Vec<Member> =
+                members.iter().filter(|member| !broken.contains(member)).copied().collect();
+            let Some(required) = required else {
+                members = without_broken;
+                continue;
+            };
+            let without_forms: Vec<Member> =
+                members.iter().filter(|member| !depends(member, required)).copied().collect();
+            // What requires something that cannot be goes; where that may be by chance, what the criterion is smaller without.
+            if squares_of(self.problem, &fit, *required) > BY_CHANCE {
+                members = without_forms;
+                continue;
             }
+            let options = [without_forms, without_broken].map(|members| self.within_bounds(members, &fit));
+            let [without_forms, without_broken] = options;
+            return if without_forms.value <= without_broken.value { without_forms } else { without_broken };
         }
-        members.retain(|member| !broken.contains(member));
-        members
     }
 
     /// Whether another member requires it, or is made of it: then it stays as long as that does.

@@ -44,7 +44,7 @@ impl Default for TraceOptions {
             false_name_probability: 0.01,
             false_refinement_probability: 0.01,
             least_share: 0.2,
-            least_share_of_kin: 0.6,
+            least_share_of_kin: 0.75,
             least_of_others: 0.025,
             least_size: 0.01,
             negligible_share: 0.003,
