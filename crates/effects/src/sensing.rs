@@ -173,7 +173,9 @@ impl Effect for Offset {
     }
     fn parameters(&self) -> Vec<EffectParameter> {
         let joint = self.spec.joints.first().cloned().unwrap_or_default();
-        let bounds = (f64::NEG_INFINITY, f64::INFINITY);
+        // A joint that turns is off by half a turn at most; where the torque hardly depends on its angle, a fit would say anything.
+        let most = if self.unit == "rad" { std::f64::consts::PI } else { f64::INFINITY };
+        let bounds = (-most, most);
         vec![EffectParameter { joint, name: OFFSET.to_owned(), unit: self.unit.to_owned(), bounds }]
     }
     fn entries(&self) -> Vec<Entry> {

@@ -225,6 +225,21 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// What is known to first order only must not be larger than the torque itself: there the first order says nothing.
+    fn is_small_enough(&self, fit: &Fit, member: &Member) -> bool {
+        let hypothesis = &self.problem.hypotheses[member.hypothesis];
+        let parameters = &self.problem.variant(*member).parameters;
+        !hypothesis.linearised
+            || hypothesis.torques.iter().all(|&torque| {
+                let rows = &self.problem.torques[torque];
+                let values: Vec<(usize, f64)> = parameters
+                    .iter()
+                    .filter_map(|&parameter| Some((rows.column(parameter)?, fit.values[parameter])))
+                    .collect();
+                rows.whole.size_of(&values) <= rows.whole.right_hand_side()
+            })
+    }
+
     fn is_within_bounds(&self, fit: &Fit, member: &Member) -> bool {
         let variant = self.problem.variant(*member);
         let heard = |parameter: usize| fit.place[parameter].is_some_and(|place| fit.heard[place]);
@@ -232,7 +247,8 @@ impl<'a> Search<'a> {
             let value = fit.values[parameter];
             !heard(parameter) || (*low <= value && value <= *high)
         };
-        variant.parameters.iter().any(|&parameter| heard(parameter))
+        self.is_small_enough(fit, member)
+            && variant.parameters.iter().any(|&parameter| heard(parameter))
             && variant.parameters.iter().zip(&variant.bounds).all(within)
     }
 
