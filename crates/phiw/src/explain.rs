@@ -250,7 +250,9 @@ fn families(effects: impl Iterator<Item = EffectJson>) -> Vec<EffectJson> {
     for effect in effects {
         let single = effect.joints.len() == 1;
         match families.last_mut() {
-            Some(family) if single && family.kind == effect.kind && family.parameters.len() == family.joints.len() => {
+            Some(family)
+                if single && family.kind == effect.kind && family.parameters.len() == family.joints.len() =>
+            {
                 family.joints.extend(effect.joints);
                 family.parameters.extend(effect.parameters);
                 family.validate_relative = effect.validate_relative;

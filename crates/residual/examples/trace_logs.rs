@@ -67,7 +67,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let tracing = trace(input, &TraceOptions::default())?;
     let found = [("named", &tracing.effects), ("refinement", &tracing.refinements)];
-    for (how, effect) in found.iter().flat_map(|(how, effects)| effects.iter().map(move |effect| (how, effect))) {
+    for (how, effect) in
+        found.iter().flat_map(|(how, effects)| effects.iter().map(move |effect| (how, effect)))
+    {
         println!(
             "{how} {} {:?} {:?}: {:.2} % -> {:.2} %, explains {:.2}, z {:.1}, folds {:.2}, confidence {:.3}",
             effect.spec.kind,

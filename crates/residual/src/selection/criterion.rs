@@ -39,7 +39,8 @@ pub(super) fn price_of(rows: f64, count: usize) -> f64 {
 /// What it costs to have chosen these among all hypotheses.
 pub(super) fn choices(problem: &Problem, members: &[Member]) -> f64 {
     let kinds = problem.hypotheses.iter().map(|hypothesis| hypothesis.kind).max().map_or(0, |kind| kind + 1);
-    let (mut sites, mut chosen, mut familiar) = (vec![0_usize; kinds], vec![0_usize; kinds], vec![false; kinds]);
+    let (mut sites, mut chosen, mut familiar) =
+        (vec![0_usize; kinds], vec![0_usize; kinds], vec![false; kinds]);
     for hypothesis in problem.hypotheses.iter().filter(|hypothesis| !hypothesis.declared) {
         sites[hypothesis.kind] += 1;
         familiar[hypothesis.kind] |= hypothesis.familiar;

@@ -70,7 +70,8 @@ fn design_effect(problem: &Problem, fit: &Fit, torque: usize) -> f64 {
                 .collect();
             let mean = scores.iter().sum::<f64>() / folds as f64;
             let spread: f64 = scores.iter().map(|score| (score - mean).powi(2)).sum();
-            effects.push(spread * folds as f64 / (folds as f64 - 1.0) / (left / fit.weights[torque] * variance));
+            effects
+                .push(spread * folds as f64 / (folds as f64 - 1.0) / (left / fit.weights[torque] * variance));
         }
     }
     median(effects).unwrap_or(1.0)

@@ -2,7 +2,7 @@
 
 /// P(F > `value`) for Fisher's distribution with `numerator` and `denominator` degrees of freedom.
 pub(super) fn fisher_tail(value: f64, numerator: f64, denominator: f64) -> f64 {
-    if !(value > 0.0) {
+    if value.is_nan() || value <= 0.0 {
         return 1.0;
     }
     incomplete_beta(denominator / (denominator + numerator * value), 0.5 * denominator, 0.5 * numerator)

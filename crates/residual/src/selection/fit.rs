@@ -76,8 +76,10 @@ impl Fit {
             fit.weights =
                 rows.iter().zip(&fit.rss).map(|(rows, rss)| rows / rss.max(f64::MIN_POSITIVE)).collect();
             fit.solve(problem);
-            let rss: Vec<f64> = (0..problem.torques.len()).map(|torque| fit.residual(problem, torque)).collect();
-            let change = rss.iter().zip(&fit.rss).map(|(new, old)| (new / old - 1.0).abs()).fold(0.0, f64::max);
+            let rss: Vec<f64> =
+                (0..problem.torques.len()).map(|torque| fit.residual(problem, torque)).collect();
+            let change =
+                rss.iter().zip(&fit.rss).map(|(new, old)| (new / old - 1.0).abs()).fold(0.0, f64::max);
             fit.rss = rss;
             if change < SETTLED {
                 break;
@@ -88,7 +90,8 @@ impl Fit {
 
     /// (column, value) of all parameters with a value in a torque.
     pub fn columns(&self, torque: usize) -> Vec<(usize, f64)> {
-        let fitted = self.own[torque].iter().map(|&(column, place)| (column, self.values[self.active[place]]));
+        let fitted =
+            self.own[torque].iter().map(|&(column, place)| (column, self.values[self.active[place]]));
         let valued = fitted.filter(|(_, value)| *value != 0.0);
         valued.chain(self.absent[torque].iter().copied()).collect()
     }
@@ -98,7 +101,13 @@ impl Fit {
     }
 
     /// Products of a parameter's columns with those of the active ones, and with the right-hand side less what is absent.
-    pub fn products(&self, problem: &Problem, parameter: usize, torques: &[usize], out: &mut [f64]) -> (f64, f64) {
+    pub fn products(
+        &self,
+        problem: &Problem,
+        parameter: usize,
+        torques: &[usize],
+        out: &mut [f64],
+    ) -> (f64, f64) {
         out.fill(0.0);
         let (mut own, mut right) = (0.0, 0.0);
         for &torque in torques {
@@ -213,8 +222,12 @@ impl Fit {
     /// What the prior says against the values: its weighted squares.
     pub fn prior_squares(&self, problem: &Problem) -> f64 {
         let Some(prior) = &problem.prior else { return 0.0 };
-        let values: Vec<(usize, f64)> =
-            prior.parameters.iter().enumerate().map(|(at, &parameter)| (at, self.values[parameter])).collect();
+        let values: Vec<(usize, f64)> = prior
+            .parameters
+            .iter()
+            .enumerate()
+            .map(|(at, &parameter)| (at, self.values[parameter]))
+            .collect();
         self.prior_weight * prior.products.residual(&values)
     }
 }

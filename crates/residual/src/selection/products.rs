@@ -65,7 +65,8 @@ impl Products {
 
     /// ‖Φw‖².
     pub fn size_of(&self, w: &[(usize, f64)]) -> f64 {
-        let along = |products: &[f64]| -> f64 { w.iter().map(|&(other, value)| products[other] * value).sum() };
+        let along =
+            |products: &[f64]| -> f64 { w.iter().map(|&(other, value)| products[other] * value).sum() };
         w.iter().map(|&(column, value)| value * along(self.column(column))).sum::<f64>().max(0.0)
     }
 

@@ -101,7 +101,11 @@ pub(super) fn gain_of(squares: f64, rows: f64) -> f64 {
 pub(super) fn most_of(problem: &Problem, fit: &Fit, rows: &[f64], torques: &[usize]) -> f64 {
     let of_torque = |&torque: &usize| {
         let own = &problem.torques[torque];
-        if own.least > 0.0 { rows[torque] * (own.variance(fit.rss[torque]) / own.least).ln() } else { f64::INFINITY }
+        if own.least > 0.0 {
+            rows[torque] * (own.variance(fit.rss[torque]) / own.least).ln()
+        } else {
+            f64::INFINITY
+        }
     };
     torques.iter().map(of_torque).sum()
 }
@@ -120,9 +124,10 @@ pub(super) fn screen(problem: &Problem, fit: &Fit, rows: &[f64], open: &[usize])
             let beside = Beside::new(problem, fit, &own.variants[variant].parameters, &own.torques);
             let (squares, values) = beside.solve(fit);
             let bounds = own.variants[variant].bounds.iter();
-            let within = values.iter().zip(bounds).all(|(value, (low, high))| {
-                value.is_none_or(|value| *low <= value && value <= *high)
-            });
+            let within = values
+                .iter()
+                .zip(bounds)
+                .all(|(value, (low, high))| value.is_none_or(|value| *low <= value && value <= *high));
             let gain = gain_of(squares, effective).min(most) - price(problem, member, None, rows);
             (within && values.iter().any(Option::is_some) && gain > 0.0).then_some(Screened { member, gain })
         };

@@ -108,7 +108,8 @@ impl<'a> Search<'a> {
             .collect();
         let fit = Fit::new(problem, problem.active(&start), &rows, None);
         let model = Model { members: start, fit, value: 0.0 };
-        let mut search = Search { problem, policy, closed: vec![false; problem.hypotheses.len()], rows, model };
+        let mut search =
+            Search { problem, policy, closed: vec![false; problem.hypotheses.len()], rows, model };
         search.renew();
         search
     }
@@ -121,26 +122,16 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn say(&self, what: &str) {
-        if std::env::var("SAY").is_ok() {
-            let names: Vec<String> = self.model.members.iter().map(|m| { let h=&self.problem.hypotheses[m.hypothesis]; format!("{}{}@{:?}v{}", if h.declared {"!"} else {""}, h.kind/2, h.torques, m.variant)}).collect();
-            eprintln!("{what} J {:.1} n_e {:.0?} {}", self.model.value, self.rows, names.join(" "));
-        }
-    }
-
     fn run(&mut self) {
         for _ in 0..ROUNDS {
             let before = self.model.members.clone();
-            self.say("start");
             // What the textbook has first, or a form of it takes its place.
-            while self.forward(true) {self.say("textbook");}
-            while self.forward(false) {self.say("forward");}
-            while self.prune() {self.say("prune");}
+            while self.forward(true) {}
+            while self.forward(false) {}
+            while self.prune() {}
             self.sweep();
-            self.say("swapped");
-            while self.prune() {self.say("prune");}
+            while self.prune() {}
             self.doubt();
-            self.say("doubted");
             if self.model.members == before {
                 break;
             }
@@ -203,7 +194,8 @@ impl<'a> Search<'a> {
         let own = &self.problem.hypotheses[member.hypothesis];
         self.model.members.iter().filter(|other| *other != member).any(|other| {
             let other = &self.problem.hypotheses[other.hypothesis];
-            let made_of_it = other.made_of_model && own.torques.iter().any(|torque| other.torques.contains(torque));
+            let made_of_it =
+                other.made_of_model && own.torques.iter().any(|torque| other.torques.contains(torque));
             made_of_it || !other.declared && other.requires.contains(&member.hypothesis)
         })
     }
@@ -285,7 +277,9 @@ impl<'a> Search<'a> {
             .collect();
         let best = models.into_iter().min_by(|a, b| a.value.total_cmp(&b.value));
         match best {
-            Some(best) if best.value < self.model.value - LEAST_STEP && best.members != self.model.members => {
+            Some(best)
+                if best.value < self.model.value - LEAST_STEP && best.members != self.model.members =>
+            {
                 self.accept(best);
                 true
             }
@@ -339,9 +333,9 @@ impl<'a> Search<'a> {
     fn pairs(&self, fit: &Fit, screened: &[Screened]) -> Vec<(f64, [Member; 2])> {
         let of_torque = |torque: usize| -> Vec<(f64, [Member; 2])> {
             let hypothesis = |screened: &&Screened| &self.problem.hypotheses[screened.member.hypothesis];
-            let own = screened.iter().filter(|screened| {
-                hypothesis(screened).torques == [torque] && hypothesis(screened).familiar
-            });
+            let own = screened
+                .iter()
+                .filter(|screened| hypothesis(screened).torques == [torque] && hypothesis(screened).familiar);
             let own: Vec<&Screened> = own.take(PAIRED).collect();
             let mut pairs = Vec::new();
             for (place, first) in own.iter().enumerate() {
@@ -354,10 +348,9 @@ impl<'a> Search<'a> {
                     let beside = Beside::new(self.problem, fit, &parameters, &[torque]);
                     let (squares, values) = beside.solve(fit);
                     let bounds = members.iter().flat_map(|&member| &self.problem.variant(member).bounds);
-                    let within = values
-                        .iter()
-                        .zip(bounds)
-                        .all(|(value, (low, high))| value.is_none_or(|value| *low <= value && value <= *high));
+                    let within = values.iter().zip(bounds).all(|(value, (low, high))| {
+                        value.is_none_or(|value| *low <= value && value <= *high)
+                    });
                     let prices: f64 =
                         members.iter().map(|&member| price(self.problem, member, None, &self.rows)).sum();
                     let most = most_of(self.problem, fit, &self.rows, &[torque]);
@@ -399,7 +392,8 @@ impl<'a> Search<'a> {
             .collect();
         singles.sort_by(|a, b| a.0.total_cmp(&b.0));
         let worst = 2.0 * choice(self.problem) + NEAR.0;
-        let singles = singles.into_iter().take_while(|(loss, _)| *loss < worst).take(self.policy.finalists / 2);
+        let singles =
+            singles.into_iter().take_while(|(loss, _)| *loss < worst).take(self.policy.finalists / 2);
         let moves: Vec<Vec<Member>> = singles.map(|(_, member)| vec![member]).chain(families).collect();
         let models: Vec<Model> = moves
             .into_par_iter()
@@ -468,7 +462,8 @@ impl<'a> Search<'a> {
         });
         pairs.retain(|(gain, _)| *gain >= least);
         pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let singles = screened.iter().map(|screened| vec![screened.member]).filter(|single| *single != [member]);
+        let singles =
+            screened.iter().map(|screened| vec![screened.member]).filter(|single| *single != [member]);
         let singles = singles.take(self.policy.finalists / 2);
         let pairs = pairs.iter().map(|(_, pair)| pair.to_vec()).take(self.policy.finalists / 4);
         let moves: Vec<Vec<Member>> = singles.chain(pairs).collect();

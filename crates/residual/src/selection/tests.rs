@@ -7,7 +7,13 @@ use phiw_regressor::factor::Factor;
 const POLICY: Policy = Policy { finalists: 12, keep_tail: 0.01, most_members: 40 };
 
 /// Torques of 400 rows in 10 folds. Columns of each: one of the model, then `kinds` candidates of one column each; all smooth random motion. `truth` names (torque, kind, value).
-fn problem(random: &mut RandomNumbers, torques: usize, kinds: usize, truth: &[(usize, usize, f64)], colour: f64) -> Problem {
+fn problem(
+    random: &mut RandomNumbers,
+    torques: usize,
+    kinds: usize,
+    truth: &[(usize, usize, f64)],
+    colour: f64,
+) -> Problem {
     let per_torque = 1 + kinds;
     let noise = |random: &mut RandomNumbers| (0..4).map(|_| random.uniform(-1.0, 1.0)).sum::<f64>() * 0.866;
     let of_torque = |torque: usize| {
@@ -38,7 +44,8 @@ fn problem(random: &mut RandomNumbers, torques: usize, kinds: usize, truth: &[(u
     for kind in 0..kinds {
         for torque in 0..torques {
             let parameters = vec![torque * per_torque + 1 + kind];
-            let variant = Variant { parameters, bounds: vec![(f64::NEG_INFINITY, f64::INFINITY)], constants: 0 };
+            let variant =
+                Variant { parameters, bounds: vec![(f64::NEG_INFINITY, f64::INFINITY)], constants: 0 };
             hypotheses.push(Hypothesis {
                 kind,
                 textbook: false,
@@ -82,12 +89,22 @@ fn what_is_there_is_found_and_nothing_else_from_any_start() {
         &[(0, 2, 0.8)],
         &[(0, 2, 0.8), (1, 2, 1.0), (2, 2, 0.7), (3, 2, 0.9)],
         &[(0, 0, 2.0), (0, 1, -2.0), (0, 3, 1.0), (2, 5, 0.8)],
-        &[(0, 0, 1.0), (1, 0, 1.0), (2, 0, 1.0), (3, 0, 1.0), (0, 1, 1.0), (1, 1, 1.0), (2, 1, 1.0), (3, 1, 1.0)],
+        &[
+            (0, 0, 1.0),
+            (1, 0, 1.0),
+            (2, 0, 1.0),
+            (3, 0, 1.0),
+            (0, 1, 1.0),
+            (1, 1, 1.0),
+            (2, 1, 1.0),
+            (3, 1, 1.0),
+        ],
     ];
     for (case, truth) in table.iter().enumerate() {
         let mut random = RandomNumbers::new(case as u64 + 1);
         let problem = problem(&mut random, 4, 8, truth, 0.0);
-        let mut expected: Vec<(usize, usize)> = truth.iter().map(|&(torque, kind, _)| (torque, kind)).collect();
+        let mut expected: Vec<(usize, usize)> =
+            truth.iter().map(|&(torque, kind, _)| (torque, kind)).collect();
         expected.sort_unstable();
         for start in [vec![], vec![0, 9], vec![3, 17, 20, 30]] {
             let start = start.into_iter().map(|hypothesis| Member { hypothesis, variant: 0 }).collect();

@@ -86,7 +86,7 @@ fn solve_block(own: &[usize], inverse: &[Vec<f64>], x: &[f64]) -> Option<Vec<f64
             let known: f64 = (0..column).map(|k| l[row * count + k] * l[column * count + k]).sum();
             let rest = inverse[row][own[column]] - known;
             if row == column {
-                if !(rest > 0.0) {
+                if rest.is_nan() || rest <= 0.0 {
                     return None;
                 }
                 l[row * count + row] = rest.sqrt();

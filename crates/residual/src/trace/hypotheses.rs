@@ -79,13 +79,13 @@ impl Candidates {
                 }
                 let constants = scan(fixed.catalogue, kind, &site, ranges, present.specs, &joints);
                 let place = present.specs.iter().position(is_this);
-                let changed = held && kind.may_change() && place.is_some_and(|place| place < present.declared);
+                let changed =
+                    held && kind.may_change() && place.is_some_and(|place| place < present.declared);
                 match place.filter(|_| !changed) {
                     Some(place) => {
-                        let specs = constants.into_iter().map(|constants| EffectSpec {
-                            constants,
-                            ..present.specs[place].clone()
-                        });
+                        let specs = constants
+                            .into_iter()
+                            .map(|constants| EffectSpec { constants, ..present.specs[place].clone() });
                         all.add_variants(fixed, present, place, specs.collect())?;
                     }
                     None => all.push(fixed, present, rank, kind, &site, constants),

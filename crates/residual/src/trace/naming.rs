@@ -325,8 +325,10 @@ impl Search<'_> {
     fn reorder(&mut self, order: &[usize]) -> Result<(), IdentificationError> {
         let design = self.design()?;
         let of_effects = order.iter().flat_map(|&place| design.effect_parameters(place));
-        self.parameters =
-            (0..self.fixed.base.count()).chain(of_effects).map(|parameter| self.parameters[parameter]).collect();
+        self.parameters = (0..self.fixed.base.count())
+            .chain(of_effects)
+            .map(|parameter| self.parameters[parameter])
+            .collect();
         self.specs = order.iter().map(|&place| self.specs[place].clone()).collect();
         Ok(())
     }
@@ -339,9 +341,7 @@ impl Trial {
             .members
             .iter()
             .zip(&self.places)
-            .filter(|(member, place)| {
-                self.problem.hypotheses[member.hypothesis].declared || stays(**place)
-            })
+            .filter(|(member, place)| self.problem.hypotheses[member.hypothesis].declared || stays(**place))
             .map(|(member, _)| *member)
             .collect();
         Fit::new(&self.problem, self.problem.active(&members), &self.rows, Some(&self.fit))

@@ -186,7 +186,12 @@ impl Search<'_> {
     fn replace(&mut self, place: usize, spec: EffectSpec) -> Result<(), IdentificationError> {
         let own = self.design()?.effect_parameters(place);
         self.specs[place] = spec;
-        let count = self.fixed.build(&self.specs[place..=place])?.iter().map(|effect| effect.parameters().len()).sum();
+        let count = self
+            .fixed
+            .build(&self.specs[place..=place])?
+            .iter()
+            .map(|effect| effect.parameters().len())
+            .sum();
         self.parameters.splice(own, vec![0.0; count]);
         Ok(())
     }
@@ -205,7 +210,8 @@ impl Search<'_> {
         let mut ranges = self.input.ranges.clone();
         let positions: Vec<(f64, f64)> = ranges.joints.iter().map(|joint| joint.position).collect();
         let data = self.fixed.data;
-        let shape = residual_shape(&self.design()?, &self.parameters, &data.train, &data.sources, &positions)?;
+        let shape =
+            residual_shape(&self.design()?, &self.parameters, &data.train, &data.sources, &positions)?;
         ranges.ripple_frequencies = shape.ripple_frequencies;
         Ok(ranges)
     }

@@ -18,12 +18,7 @@ const FINE: f64 = 0.05;
 const FAR: f64 = 3.0;
 
 /// Shapes over the own signals of the joint `row`; `lines` are the angular frequencies \[rad/s\] at which its residual swings.
-pub(super) fn own_shapes(
-    fixed: &Fixed<'_>,
-    row: usize,
-    ranges: &SignalRanges,
-    lines: &[f64],
-) -> Vec<Shape> {
+pub(super) fn own_shapes(fixed: &Fixed<'_>, row: usize, ranges: &SignalRanges, lines: &[f64]) -> Vec<Shape> {
     let lines: Vec<f64> = lines.iter().copied().take(LINES).collect();
     let range = &ranges.joints[row];
     let speed = range.velocity_rms.max(1e-9);

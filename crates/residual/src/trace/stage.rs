@@ -48,7 +48,11 @@ pub(super) struct Stage {
 }
 
 impl<'a> Fixed<'a> {
-    pub fn new(input: &TraceInput<'a>, data: &'a Data<'a>, options: &TraceOptions) -> Result<Self, RegressorError> {
+    pub fn new(
+        input: &TraceInput<'a>,
+        data: &'a Data<'a>,
+        options: &TraceOptions,
+    ) -> Result<Self, RegressorError> {
         let prior = input.held.as_ref().map(|held| Prior {
             factor: held.factor.clone(),
             parameters: held.determined.clone(),
@@ -132,11 +136,18 @@ impl<'a> Fixed<'a> {
         }
         let undetermined = builder.factor().undetermined_columns();
         let places = prior.parameters.iter().enumerate();
-        Ok(places.filter(|(place, _)| !undetermined.contains(place)).map(|(_, &parameter)| parameter).collect())
+        Ok(places
+            .filter(|(place, _)| !undetermined.contains(place))
+            .map(|(_, &parameter)| parameter)
+            .collect())
     }
 
     /// What is to be chosen from, as plain data; hypotheses and their variants are those of `candidates`, in their order.
-    pub fn problem(&self, stage: &Stage, candidates: &mut Candidates) -> Result<selection::Problem, IdentificationError> {
+    pub fn problem(
+        &self,
+        stage: &Stage,
+        candidates: &mut Candidates,
+    ) -> Result<selection::Problem, IdentificationError> {
         self.leave_out_what_is_not_finite(stage, candidates);
         let design = &stage.design;
         let mut absent = vec![0.0; design.parameter_count()];

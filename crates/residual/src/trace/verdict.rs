@@ -85,7 +85,8 @@ impl Search<'_> {
         if large.is_empty() {
             return Ok(Remaining { silent: self.chosen.silent.clone(), ..Remaining::default() });
         }
-        let positions: Vec<(f64, f64)> = self.input.ranges.joints.iter().map(|joint| joint.position).collect();
+        let positions: Vec<(f64, f64)> =
+            self.input.ranges.joints.iter().map(|joint| joint.position).collect();
         let data = self.fixed.data;
         let folds = [data.train.as_slice(), &data.held_out].concat();
         let shape = residual_shape(&self.design()?, &self.parameters, &folds, &data.sources, &positions)?;
