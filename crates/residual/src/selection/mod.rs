@@ -7,10 +7,12 @@
 //! The criterion is that of Schwarz (1978) over torques whose noise is unknown and whose rows are correlated, with the price of a choice among many
 //! (Chen & Chen 2008): see [`criterion`].
 
+mod admissible;
 mod criterion;
 mod design_effect;
 mod distribution;
 mod fit;
+mod moves;
 mod problem;
 mod products;
 mod screening;

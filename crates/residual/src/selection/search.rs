@@ -1,10 +1,10 @@
 //! Forward to the end, then prune, then swap, until nothing is better.
 
-use super::criterion::{choice, choices, criterion, price};
+use super::criterion::{choice, criterion, price};
 use super::design_effect::effective_rows;
 use super::fit::Fit;
 use super::problem::{Member, Problem};
-use super::screening::{Beside, Screened, gain_of, most_of, screen, silent};
+use super::screening::{screen, silent};
 use super::wald::{certainty, squares_of};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -49,19 +49,19 @@ pub(crate) struct Variants {
 
 /// A model on its way.
 #[derive(Clone)]
-struct Model {
-    members: Vec<Member>,
-    fit: Fit,
-    value: f64,
+pub(super) struct Model {
+    pub members: Vec<Member>,
+    pub fit: Fit,
+    pub value: f64,
 }
 
-struct Search<'a> {
-    problem: &'a Problem,
-    policy: Policy,
+pub(super) struct Search<'a> {
+    pub problem: &'a Problem,
+    pub policy: Policy,
     /// Hypotheses that were in and were not sure.
     closed: Vec<bool>,
-    rows: Vec<f64>,
-    model: Model,
+    pub rows: Vec<f64>,
+    pub model: Model,
 }
 
 /// Sweeps of swaps; each accepts whatever is better.
@@ -70,14 +70,10 @@ const SWEEPS: usize = 4;
 const ROUNDS: usize = 6;
 /// The criterion must fall by this much for a step: less is rounding.
 const LEAST_STEP: f64 = 1e-3;
-/// Squared standard deviations beyond its bounds up to which a member that is required may be there by chance.
-const BY_CHANCE: f64 = 9.0;
 /// By how much, and by which share, a hypothesis may gain less than the member whose place it would take, to first order, and still be fitted in full.
 const NEAR: (f64, f64) = (20.0, 0.03);
 /// Share of a member's gain that one in its place must have that is known to first order only.
 const FIRST_ORDER: f64 = 0.5;
-/// Hypotheses of a torque whose pairs are looked at.
-const PAIRED: usize = 6;
 
 /// The set of members at which the criterion is smallest, from `start`.
 pub(crate) fn select(problem: &Problem, start: Vec<Member>, policy: Policy) -> Outcome {
@@ -145,103 +141,8 @@ impl<'a> Search<'a> {
         self.model = self.evaluate(members, &self.model.fit);
     }
 
-    fn is_declared(&self, member: &Member) -> bool {
+    pub(super) fn is_declared(&self, member: &Member) -> bool {
         self.problem.hypotheses[member.hypothesis].declared
-    }
-
-    /// A model fitted, with what its members require; members that break their bounds, or say nothing, are left out.
-    fn evaluate(&self, mut members: Vec<Member>, start: &Fit) -> Model {
-        self.add_required(&mut members, start);
-        self.within_bounds(members, start)
-    }
-
-    /// The same with nothing added.
-    fn within_bounds(&self, mut members: Vec<Member>, start: &Fit) -> Model {
-        loop {
-            let fit = Fit::new(self.problem, self.problem.active(&members), &self.rows, Some(start));
-            let breaks = |member: &Member| !self.is_declared(member) && !self.is_within_bounds(&fit, member);
-            let broken: Vec<Member> = members.iter().filter(|member| breaks(member)).copied().collect();
-            if broken.is_empty() {
-                let value = criterion(self.problem, &members, &fit, &self.rows);
-                return Model { members, fit, value };
-            }
-            let depends = |other: &Member, on: &Member| {
-                let other = &self.problem.hypotheses[other.hypothesis];
-                !other.declared && other.requires.contains(&on.hypothesis)
-            };
-            let required = broken.iter().find(|broken| members.iter().any(|other| depends(other, broken)));
-            let without_broken: Vec<Member> =
-                members.iter().filter(|member| !broken.contains(member)).copied().collect();
-            let Some(required) = required else {
-                members = without_broken;
-                continue;
-            };
-            let without_forms: Vec<Member> =
-                members.iter().filter(|member| !depends(member, required)).copied().collect();
-            // What requires something that cannot be goes; where that may be by chance, what the criterion is smaller without.
-            if squares_of(self.problem, &fit, *required) > BY_CHANCE {
-                members = without_forms;
-                continue;
-            }
-            let options = [without_forms, without_broken].map(|members| self.within_bounds(members, &fit));
-            let [without_forms, without_broken] = options;
-            return if without_forms.value <= without_broken.value { without_forms } else { without_broken };
-        }
-    }
-
-    /// Whether another member requires it, or is made of it: then it stays as long as that does.
-    fn is_required(&self, member: &Member) -> bool {
-        let own = &self.problem.hypotheses[member.hypothesis];
-        self.model.members.iter().filter(|other| *other != member).any(|other| {
-            let other = &self.problem.hypotheses[other.hypothesis];
-            let made_of_it =
-                other.made_of_model && own.torques.iter().any(|torque| other.torques.contains(torque));
-            made_of_it || !other.declared && other.requires.contains(&member.hypothesis)
-        })
-    }
-
-    fn add_required(&self, members: &mut Vec<Member>, start: &Fit) {
-        let mut place = 0;
-        while place < members.len() {
-            let hypothesis = &self.problem.hypotheses[members[place].hypothesis];
-            for &required in hypothesis.requires.iter().filter(|_| !hypothesis.declared) {
-                if members.iter().all(|member| member.hypothesis != required) {
-                    // The variant that says most now; in the middle where none says anything.
-                    let says = screen(self.problem, start, &self.rows, &[required]);
-                    let middle = self.problem.hypotheses[required].variants.len() / 2;
-                    let middle = Member { hypothesis: required, variant: middle };
-                    members.push(says.first().map_or(middle, |screened| screened.member));
-                }
-            }
-            place += 1;
-        }
-    }
-
-    /// What is known to first order only must not be larger than the torque itself: there the first order says nothing.
-    fn is_small_enough(&self, fit: &Fit, member: &Member) -> bool {
-        let hypothesis = &self.problem.hypotheses[member.hypothesis];
-        let parameters = &self.problem.variant(*member).parameters;
-        !hypothesis.linearised
-            || hypothesis.torques.iter().all(|&torque| {
-                let rows = &self.problem.torques[torque];
-                let values: Vec<(usize, f64)> = parameters
-                    .iter()
-                    .filter_map(|&parameter| Some((rows.column(parameter)?, fit.values[parameter])))
-                    .collect();
-                rows.whole.size_of(&values) <= rows.whole.right_hand_side()
-            })
-    }
-
-    fn is_within_bounds(&self, fit: &Fit, member: &Member) -> bool {
-        let variant = self.problem.variant(*member);
-        let heard = |parameter: usize| fit.place[parameter].is_some_and(|place| fit.heard[place]);
-        let within = |(&parameter, (low, high)): (&usize, &(f64, f64))| {
-            let value = fit.values[parameter];
-            !heard(parameter) || (*low <= value && value <= *high)
-        };
-        self.is_small_enough(fit, member)
-            && variant.parameters.iter().any(|&parameter| heard(parameter))
-            && variant.parameters.iter().zip(&variant.bounds).all(within)
     }
 
     fn is_in(&self, hypothesis: usize) -> bool {
@@ -285,86 +186,6 @@ impl<'a> Search<'a> {
             }
             _ => false,
         }
-    }
-
-    /// What may be added in one step: one hypothesis, two that act on one torque, and either on all torques where it says something.
-    fn moves(&self, screened: &[Screened]) -> Vec<Vec<Member>> {
-        let now = choices(self.problem, &self.model.members);
-        let worth = |added: &[Member], gain: f64| {
-            let members: Vec<Member> = self.model.members.iter().chain(added).copied().collect();
-            gain - (choices(self.problem, &members) - now)
-        };
-        let mut moves: Vec<(f64, Vec<Member>)> = Vec::new();
-        let mut families: BTreeMap<Vec<usize>, (f64, Vec<Member>)> = BTreeMap::new();
-        let mut join = |kinds: Vec<usize>, gain: f64, members: &[Member]| {
-            let family = families.entry(kinds).or_default();
-            family.0 += gain;
-            for member in members {
-                if !family.1.iter().any(|other| other.hypothesis == member.hypothesis) {
-                    family.1.push(*member);
-                }
-            }
-        };
-        let of = |screened: &Screened| &self.problem.hypotheses[screened.member.hypothesis];
-        for screened in screened {
-            moves.push((worth(&[screened.member], screened.gain), vec![screened.member]));
-            if of(screened).familiar {
-                join(vec![of(screened).kind], screened.gain, &[screened.member]);
-            }
-        }
-        for (gain, pair) in self.pairs(&self.model.fit, screened) {
-            moves.push((worth(&pair, gain), pair.to_vec()));
-            let kinds = pair.map(|member| self.problem.hypotheses[member.hypothesis].kind);
-            join(kinds.to_vec(), gain, &pair);
-        }
-        moves.sort_by(|a, b| b.0.total_cmp(&a.0));
-        moves.truncate(self.policy.finalists);
-        let mut families: Vec<(f64, Vec<Member>)> = families
-            .into_values()
-            .filter(|(_, members)| members.len() > 1)
-            .map(|(gain, members)| (worth(&members, gain), members))
-            .collect();
-        families.sort_by(|a, b| b.0.total_cmp(&a.0));
-        families.truncate(self.policy.finalists);
-        moves.into_iter().chain(families).map(|(_, members)| members).collect()
-    }
-
-    /// On each torque the best pair of each two kinds among the best few hypotheses, where the two say more than either.
-    fn pairs(&self, fit: &Fit, screened: &[Screened]) -> Vec<(f64, [Member; 2])> {
-        let of_torque = |torque: usize| -> Vec<(f64, [Member; 2])> {
-            let hypothesis = |screened: &&Screened| &self.problem.hypotheses[screened.member.hypothesis];
-            let own = screened
-                .iter()
-                .filter(|screened| hypothesis(screened).torques == [torque] && hypothesis(screened).familiar);
-            let own: Vec<&Screened> = own.take(PAIRED).collect();
-            let mut pairs = Vec::new();
-            for (place, first) in own.iter().enumerate() {
-                for second in &own[place + 1..] {
-                    let members = [first.member, second.member];
-                    let parameters: Vec<usize> = members
-                        .iter()
-                        .flat_map(|&member| self.problem.variant(member).parameters.iter().copied())
-                        .collect();
-                    let beside = Beside::new(self.problem, fit, &parameters, &[torque]);
-                    let (squares, values) = beside.solve(fit);
-                    let bounds = members.iter().flat_map(|&member| &self.problem.variant(member).bounds);
-                    let within = values.iter().zip(bounds).all(|(value, (low, high))| {
-                        value.is_none_or(|value| *low <= value && value <= *high)
-                    });
-                    let prices: f64 =
-                        members.iter().map(|&member| price(self.problem, member, None, &self.rows)).sum();
-                    let most = most_of(self.problem, fit, &self.rows, &[torque]);
-                    let gain = gain_of(squares, self.rows[torque]).min(most) - prices;
-                    if within && gain > first.gain && gain > second.gain {
-                        let mut members = members;
-                        members.sort_by_key(|member| self.problem.hypotheses[member.hypothesis].kind);
-                        pairs.push((gain, members));
-                    }
-                }
-            }
-            pairs
-        };
-        (0..self.problem.torques.len()).into_par_iter().flat_map_iter(of_torque).collect()
     }
 
     /// Leaves out what the criterion is better without: one member, or all of a kind.
