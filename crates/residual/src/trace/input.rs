@@ -47,7 +47,7 @@ impl Default for TraceOptions {
             least_share_of_kin: 0.75,
             least_of_others: 0.025,
             least_size: 0.01,
-            negligible_share: 0.003,
+            negligible_share: 0.005,
             floor_margin: 1.15,
             structured_share: 0.01,
             torques: None,

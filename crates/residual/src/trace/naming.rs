@@ -27,6 +27,22 @@ pub(super) struct Trial {
     places: Vec<usize>,
 }
 
+/// The model without all that is a form of something simpler.
+struct Simple {
+    trial: Trial,
+    /// What it leaves of each torque on motion held out.
+    squares: Vec<f64>,
+    /// The forms' places among the effects of the whole model.
+    forms: Vec<usize>,
+}
+
+impl Simple {
+    /// The place in it of an effect at `place` in the whole model.
+    fn place(&self, place: usize) -> usize {
+        place - self.forms.iter().filter(|form| **form < place).count()
+    }
+}
+
 /// What leaving out an effect does.
 struct Judged {
     /// Place among the model's effects.
@@ -38,10 +54,6 @@ struct Judged {
     folds: f64,
     /// Whether another effect is a form of it.
     required: bool,
-    /// Whether it polishes a simpler one.
-    kin: bool,
-    /// Torques that it acts on.
-    torques: Vec<usize>,
     named: bool,
 }
 
@@ -52,47 +64,39 @@ impl Search<'_> {
     pub(super) fn name(&mut self) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
         loop {
             let trial = self.trial()?;
-            let mut judged = self.judge(&trial)?;
+            let simple = self.simple(&trial)?;
+            let judged = self.judge(&trial, simple.as_ref())?;
             let harmful = judged.iter().filter(|judged| judged.gain <= 0.0 && !judged.required);
             match harmful.min_by(|a, b| a.gain.total_cmp(&b.gain)) {
                 Some(harmful) => {
                     let place = harmful.place;
                     self.leave_out(place)?;
                 }
-                None => {
-                    self.judge_polish(&trial, &mut judged)?;
-                    return self.in_order(&trial, judged);
-                }
+                None => return self.in_order(&trial, judged),
             }
         }
     }
 
-    /// Asks again of all that polishes simpler effects, now that these have had their constants refined without it: a sign that turns over another speed is no
-    /// effect of its own.
-    fn judge_polish(&self, trial: &Trial, judged: &mut [Judged]) -> Result<(), IdentificationError> {
-        let mut places: Vec<usize> =
-            judged.iter().filter(|judged| judged.named && judged.kin).map(|judged| judged.place).collect();
-        if places.is_empty() {
-            return Ok(());
+    /// The model without all that is a form of something simpler, constants refined; `None` if nothing is. A sign that turns over another speed is no effect of
+    /// its own.
+    fn simple(&self, trial: &Trial) -> Result<Option<Simple>, IdentificationError> {
+        let is_form = |member: &Member| {
+            let hypothesis = &trial.problem.hypotheses[member.hypothesis];
+            !hypothesis.declared && !hypothesis.requires.is_empty()
+        };
+        let forms = trial.members.iter().zip(&trial.places).filter(|(member, _)| is_form(member));
+        let mut forms: Vec<usize> = forms.map(|(_, place)| *place).collect();
+        if forms.is_empty() {
+            return Ok(None);
         }
+        forms.sort_unstable();
         let mut branch = self.clone();
-        places.sort_unstable();
-        for &place in places.iter().rev() {
+        for &place in forms.iter().rev() {
             branch.remove(place)?;
         }
         branch.refine()?;
-        let refined = branch.trial()?;
-        let without = refined.held_out_squares(&refined.fit);
-        let with = trial.held_out_squares(&trial.fit);
-        for judged in judged.iter_mut().filter(|judged| places.contains(&judged.place)) {
-            judged.named = judged.torques.iter().any(|&torque| {
-                let taken = (without[torque] - with[torque]).max(0.0);
-                let whole = trial.held_out[torque].right_hand_side().max(f64::MIN_POSITIVE);
-                taken >= self.options.least_share_of_kin * without[torque]
-                    && (taken / whole).sqrt() >= self.options.least_size
-            });
-        }
-        Ok(())
+        let trial = branch.trial()?;
+        Ok(Some(Simple { squares: trial.held_out_squares(&trial.fit), trial, forms }))
     }
 
     fn leave_out(&mut self, place: usize) -> Result<(), IdentificationError> {
@@ -127,14 +131,10 @@ impl Search<'_> {
         })
     }
 
-    fn judge(&self, trial: &Trial) -> Result<Vec<Judged>, IdentificationError> {
+    fn judge(&self, trial: &Trial, simple: Option<&Simple>) -> Result<Vec<Judged>, IdentificationError> {
         let limit = self.options.false_name_probability / self.chosen.hypotheses.max(1) as f64;
         let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
         let all = trial.held_out_squares(&trial.fit);
-        let is_textbook = |spec: &EffectSpec| {
-            self.fixed.catalogue.kind(&spec.kind).map(|kind| kind.joint_property().is_some())
-        };
-        let textbook_of: Vec<bool> = self.specs.iter().map(is_textbook).collect::<Result<_, _>>()?;
         let mut judged = Vec::new();
         for (index, &member) in trial.members.iter().enumerate() {
             let place = trial.places[index];
@@ -147,45 +147,27 @@ impl Search<'_> {
             let gain: f64 = (0..all.len())
                 .map(|torque| trial.held_out[torque].rows() * (without[torque] / all[torque]).ln())
                 .sum();
-            // Whether it has a name is asked beside what is simpler: its kin of less simple a kind polish it, or, as forms of it, go with it.
-            let textbook = textbook_of[place];
-            let mut later = self.kin_of(place, |own, other| other > own)?;
-            // Of two that the textbook has, neither is a form of the other.
-            later.retain(|other| *other >= self.declared && !textbook_of[*other]);
-            let has_simpler = !self.kin_of(place, |own, other| other < own)?.is_empty();
-            let [with, without] = match later.is_empty() {
-                true => [all.clone(), without],
-                false => {
-                    let fit = |left_out: &[usize]| trial.fit_with(|other| !left_out.contains(&other));
-                    let both = [later.as_slice(), &[place]].concat();
-                    let beside = if textbook { all.clone() } else { trial.held_out_squares(&fit(&later)) };
-                    [beside, trial.held_out_squares(&fit(&both))]
+            let required = trial.members.iter().any(|other| {
+                let requires = &trial.problem.hypotheses[other.hypothesis].requires;
+                requires.contains(&member.hypothesis)
+            });
+            let material = match simple {
+                Some(simple) if simple.forms.contains(&place) => {
+                    let [beside, without] = self.beside_simpler(trial, &simple.forms, place)?;
+                    self.is_form_material(trial, member, [&simple.squares, &without, &beside, &all])
                 }
-            };
-            let kin = has_simpler && !textbook;
-            // What polishes must be worth it together: two that undo each other take away much from each other only.
-            let bare = match kin {
-                true => {
-                    let mut polish = self.kin_of(place, |own, other| other >= own)?;
-                    polish.extend(self.kin_of(place, |own, other| other < own)?);
-                    let stays = |other: &usize| *other < self.declared || textbook_of[*other];
-                    polish.retain(|other| !stays(other));
-                    trial.held_out_squares(&trial.fit_with(|other| !polish.contains(&other)))
+                // What others are forms of is judged without these.
+                Some(simple) if required => {
+                    let place = simple.place(place);
+                    let without = simple.trial.fit_with(|other| other != place);
+                    let without = simple.trial.held_out_squares(&without);
+                    self.is_material(trial, member, [&initial, &without, &simple.squares])
                 }
-                false => initial.clone(),
-            };
-            let material = self.is_material(trial, member, kin, [&initial, &bare, &without, &with, &all]);
-            let is_form_of_it = |&place: &usize| {
-                trial.places.iter().zip(&trial.members).any(|(other, member)| {
-                    let requires = &trial.problem.hypotheses[member.hypothesis].requires;
-                    *other != place && requires.contains(&trial.members[index].hypothesis)
-                })
+                _ => self.is_material(trial, member, [&initial, &without, &all]),
             };
             judged.push(Judged {
                 place,
-                required: is_form_of_it(&place),
-                kin,
-                torques: trial.problem.hypotheses[member.hypothesis].torques.clone(),
+                required,
                 significance: certainty.significance,
                 gain,
                 folds: trial.better_folds(&without_fit),
@@ -195,26 +177,44 @@ impl Search<'_> {
         Ok(judged)
     }
 
-    /// Places of effects of the model that follow the same signal of the same joint as the one at `place`, and whose kind's place in the catalogue `stands` so to its own.
-    fn kin_of(
+    /// What is left without a form beside the simpler ones on its joints: with it and without.
+    fn beside_simpler(
         &self,
+        trial: &Trial,
+        forms: &[usize],
         place: usize,
-        stands: impl Fn(usize, usize) -> bool,
-    ) -> Result<Vec<usize>, IdentificationError> {
-        let catalogue = self.fixed.catalogue;
-        let rank = |spec: &EffectSpec| catalogue.kinds().position(|kind| kind.name() == spec.kind);
-        let own = &self.specs[place];
-        let signal = catalogue.kind(&own.kind)?.seen_against();
-        let mut kin = Vec::new();
-        for (other, spec) in self.specs.iter().enumerate() {
-            if spec.joints == own.joints
-                && catalogue.kind(&spec.kind)?.seen_against() == signal
-                && stands(rank(own).unwrap_or_default(), rank(spec).unwrap_or_default())
-            {
-                kin.push(other);
-            }
-        }
-        Ok(kin)
+    ) -> Result<[Vec<f64>; 2], IdentificationError> {
+        let rank = |place: usize| {
+            let kind = &self.specs[place].kind;
+            self.fixed.catalogue.kinds().position(|other| other.name() == kind)
+        };
+        let later = |other: usize| {
+            forms.contains(&other)
+                && self.specs[other].joints == self.specs[place].joints
+                && rank(other) > rank(place)
+        };
+        let with = trial.held_out_squares(&trial.fit_with(|other| !later(other)));
+        let without = trial.held_out_squares(&trial.fit_with(|other| other != place && !later(other)));
+        Ok([with, without])
+    }
+
+    /// Whether a form of something simpler is worth a name of its own: it must take away most of what that leaves, and all the forms together must be a share of the torque.
+    fn is_form_material(
+        &self,
+        trial: &Trial,
+        member: Member,
+        [simple, without, with, all]: [&[f64]; 4],
+    ) -> bool {
+        let options = self.options;
+        trial.problem.hypotheses[member.hypothesis].torques.iter().any(|&torque| {
+            let whole = trial.held_out[torque].right_hand_side().max(f64::MIN_POSITIVE);
+            let taken = (simple[torque] - all[torque]).max(0.0);
+            let own = (without[torque] - with[torque]).max(0.0);
+            !self.is_as_it_was(torque, (simple[torque] / trial.held_out[torque].rows().max(1.0)).sqrt())
+                && taken >= options.least_share_of_kin * simple[torque]
+                && own >= options.least_share_of_kin * without[torque]
+                && (taken / whole).sqrt() >= options.least_size
+        })
     }
 
     /// Whether a torque's residual is no larger than it was when the held model was fitted: then nothing has changed there since.
@@ -224,17 +224,10 @@ impl Search<'_> {
 
     /// Whether what an effect takes away on motion held out is worth a name.
     ///
-    /// More is asked of what polishes a simpler effect of the model, its `kin`. It must take away a share of the residual of a torque that it acts on, and be a share of that torque. Where the other parameters have taken up most of it,
+    /// It must take away a share of the residual of a torque that it acts on, and be a share of that torque. Where the other parameters have taken up most of it,
     /// it is to be seen on any torque, and must be a share of its torque by itself.
-    fn is_material(
-        &self,
-        trial: &Trial,
-        member: Member,
-        kin: bool,
-        [initial, bare, without, with, all]: [&[f64]; 5],
-    ) -> bool {
+    fn is_material(&self, trial: &Trial, member: Member, [initial, without, with]: [&[f64]; 3]) -> bool {
         let options = self.options;
-        let least_share = if kin { options.least_share_of_kin } else { options.least_share };
         let hypothesis = &trial.problem.hypotheses[member.hypothesis];
         let (mut largest_share, mut size): (f64, f64) = (0.0, 0.0);
         let mut seen = false;
@@ -249,15 +242,15 @@ impl Search<'_> {
             let share = taken / before;
             largest_share = largest_share.max(share);
             let by_others = (initial[torque] - before).max(0.0);
-            let together = ((bare[torque] - all[torque]).max(0.0) / whole).sqrt();
+            let together = ((initial[torque] - with[torque]).max(0.0) / whole).sqrt();
             seen |= hypothesis.torques.contains(&torque)
                 && together >= options.least_size
-                && share >= least_share
+                && share >= options.least_share
                 && taken >= options.least_of_others * by_others
                 && (taken / whole).sqrt() >= options.least_size;
             size = size.max((held_out.size_of(&trial.values_of(member, torque)) / whole).sqrt());
         }
-        seen || !kin && largest_share >= least_share && size >= ABSORBED_SIZE * options.least_size
+        seen || largest_share >= options.least_share && size >= ABSORBED_SIZE * options.least_size
     }
 
     /// Puts the effects into the order in which they count, and says what each has explained.

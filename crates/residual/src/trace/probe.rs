@@ -1,6 +1,6 @@
 //! What a residual follows, without a name: shapes over each signal, fitted on some folds, judged on the others.
 
-use super::signal_shapes::{Shape, neighbours, other_shapes, own_shapes};
+use super::signal_shapes::{SWINGS, Shape, neighbours, other_shapes, own_shapes};
 use super::stage::{Fixed, Stage};
 use phiw_effects::SignalRanges;
 use phiw_identification::{EffectSpec, IdentificationError};
@@ -24,6 +24,8 @@ pub struct Dependence {
 /// noise foretell less than nothing: they were fitted on other noise.
 const LEAST_SHARE: f64 = 0.05;
 const LEAST_SIGNIFICANCE: f64 = 2.2;
+/// The same share for swings over the time, whose frequencies are those at which the residual itself is largest.
+const LEAST_SHARE_OF_SWINGS: f64 = 0.25;
 /// Parts that take turns in being left out.
 const PARTS: usize = 5;
 /// A shape's height is drawn to nothing as if this share of all rows had said so: where few rows are, it does not swing out.
@@ -116,8 +118,10 @@ fn probes(
                 squares.iter().map(|square| square.max(f64::MIN_POSITIVE).ln()).collect()
             };
             let t = paired_t(&logarithms(&alone), &logarithms(&after));
-            if share >= LEAST_SHARE && t >= LEAST_SIGNIFICANCE {
-                found.push(Probe { row, signal: signal.clone(), share });
+            let least = if signal == SWINGS { LEAST_SHARE_OF_SWINGS } else { LEAST_SHARE };
+            if share >= least && t >= LEAST_SIGNIFICANCE {
+                let signal = if signal == SWINGS { "t" } else { signal };
+                found.push(Probe { row, signal: signal.to_owned(), share });
             }
         }
         Ok(found)

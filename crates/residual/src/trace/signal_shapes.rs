@@ -11,6 +11,8 @@ pub(super) type Shape = (String, Box<dyn Effect>);
 /// Nodes over the joint's own signals, and over those of other joints.
 const OWN_NODES: usize = 10;
 const OTHER_NODES: usize = 6;
+/// The signal of swings over the time.
+pub(super) const SWINGS: &str = "swings";
 /// Swings over the time that are tried.
 const LINES: usize = 2;
 /// Speeds and torques bend most near nothing: nodes stand evenly over asinh of the signal over this share of its RMS, up to this many times its RMS.
@@ -63,7 +65,7 @@ pub(super) fn own_shapes(fixed: &Fixed<'_>, row: usize, ranges: &SignalRanges, l
         ),
         shape("t", OTHER_NODES, Box::new(move |sample, out| time.write(sample.time(), out))),
         shape(
-            "t",
+            SWINGS,
             2 * lines.len(),
             Box::new(move |sample, out| {
                 for (pair, line) in out.chunks_exact_mut(2).zip(&lines) {

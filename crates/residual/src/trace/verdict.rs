@@ -12,11 +12,6 @@ impl Search<'_> {
         let before = self.declared_error()?;
         let (mut effects, named) = self.name()?;
         let refinements = effects.split_off(named);
-        if effects.is_empty() && refinements.is_empty() {
-            // What was declared is as it was.
-            self.specs.clone_from(&self.input.declared);
-            self.parameters.clone_from(&self.input.parameters);
-        }
         let design = self.design()?;
         let data = self.fixed.data;
         let folds = [data.train.as_slice(), &data.held_out].concat();
