@@ -13,6 +13,8 @@ use std::collections::BTreeMap;
 pub const LEAST_RIVAL: f64 = 0.05;
 /// Share of its torque that an effect must be where the other parameters have taken up most of it, over the least size.
 const ABSORBED_SIZE: f64 = 3.0;
+/// RMS of what an effect takes over the RMS of its torque below which it is asked whether constants of another could do its work.
+const SMALL: f64 = 0.05;
 /// Times the residual that a held model left when it was fitted.
 const AS_IT_WAS: f64 = 1.1;
 
@@ -52,6 +54,8 @@ struct Judged {
     gain: f64,
     /// Share of the stretches of training motion that it makes better.
     folds: f64,
+    /// RMS of what it takes over the RMS of a torque that it acts on, the largest.
+    size: f64,
     /// Whether another effect is a form of it.
     required: bool,
     named: bool,
@@ -72,7 +76,11 @@ impl Search<'_> {
                     let place = harmful.place;
                     self.leave_out(place)?;
                 }
-                None => return self.in_order(&trial, judged),
+                None => {
+                    let mut judged = judged;
+                    self.judge_small(&trial, &mut judged)?;
+                    return self.in_order(&trial, judged);
+                }
             }
         }
     }
@@ -97,6 +105,31 @@ impl Search<'_> {
         branch.refine()?;
         let trial = branch.trial()?;
         Ok(Some(Simple { squares: trial.held_out_squares(&trial.fit), trial, forms }))
+    }
+
+    /// Asks again of small effects on joints where another effect has constants, now that these are refined without it: a sign that turns over another speed looks like
+    /// some viscous friction.
+    fn judge_small(&self, trial: &Trial, judged: &mut [Judged]) -> Result<(), IdentificationError> {
+        let all = trial.held_out_squares(&trial.fit);
+        let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
+        for judged in judged.iter_mut().filter(|judged| judged.named && judged.size < SMALL) {
+            let own = &self.specs[judged.place];
+            let has_constants = |spec: &EffectSpec| spec.joints == own.joints && !spec.constants.is_empty();
+            let mut others = self.specs.iter().enumerate().filter(|(place, _)| *place != judged.place);
+            if !others.any(|(_, spec)| has_constants(spec)) || self.fixed.absent(own)?.is_some() {
+                continue;
+            }
+            let mut branch = self.clone();
+            branch.remove(judged.place)?;
+            branch.refine()?;
+            let refined = branch.trial()?;
+            let without = refined.held_out_squares(&refined.fit);
+            let place = trial.places.iter().position(|place| *place == judged.place);
+            let member = place.map(|place| trial.members[place]);
+            judged.named =
+                member.is_some_and(|member| self.is_material(trial, member, [&initial, &without, &all]));
+        }
+        Ok(())
     }
 
     fn leave_out(&mut self, place: usize) -> Result<(), IdentificationError> {
@@ -165,8 +198,14 @@ impl Search<'_> {
                 }
                 _ => self.is_material(trial, member, [&initial, &without, &all]),
             };
+            let torques = trial.problem.hypotheses[member.hypothesis].torques.iter();
+            let size = |&torque: &usize| {
+                let whole = trial.held_out[torque].right_hand_side().max(f64::MIN_POSITIVE);
+                ((without[torque] - all[torque]).max(0.0) / whole).sqrt()
+            };
             judged.push(Judged {
                 place,
+                size: torques.map(size).fold(0.0, f64::max),
                 required,
                 significance: certainty.significance,
                 gain,
