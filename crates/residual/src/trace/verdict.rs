@@ -92,7 +92,12 @@ impl Search<'_> {
             parameters: &self.parameters,
             ranges: &self.input.ranges,
         };
-        let structured = probe::following(fit, &large)?;
+        let following = probe::following(fit, &large)?;
+        let over = |row: usize| error.rmse[row] / self.input.noise_floor[row];
+        let nearest = (0..error.rmse.len()).map(over).fold(f64::INFINITY, f64::min).max(1.0);
+        let stands_out = |row: usize| over(row) > self.options.structured_ratio * nearest;
+        let structured: Vec<usize> =
+            large.into_iter().filter(|&row| following.contains(&row) || stands_out(row)).collect();
         let depends_on = probe::probe(fit, &structured)?;
         let names: Vec<String> = self.fixed.tree.joint_names().map(str::to_owned).collect();
         Ok(Remaining {
