@@ -16,7 +16,7 @@ const ABSORBED_SIZE: f64 = 3.0;
 /// RMS of what an effect takes over the RMS of its torque below which it is asked whether constants of another could do its work.
 const SMALL: f64 = 0.05;
 /// Times the residual that a held model left when it was fitted.
-const AS_IT_WAS: f64 = 1.1;
+const AS_IT_WAS: f64 = 1.25;
 
 /// The chosen model, fitted to the training motion, and motion held out to judge it.
 pub(super) struct Trial {

@@ -12,6 +12,10 @@ impl Search<'_> {
         let before = self.declared_error()?;
         let (mut effects, named) = self.name()?;
         let refinements = effects.split_off(named);
+        if effects.is_empty() && refinements.is_empty() && self.is_worse_than(&before.1)? {
+            self.specs.clone_from(&self.input.declared);
+            self.parameters.clone_from(&self.input.parameters);
+        }
         let design = self.design()?;
         let data = self.fixed.data;
         let folds = [data.train.as_slice(), &data.held_out].concat();
@@ -45,6 +49,14 @@ impl Search<'_> {
         let not_judged = self.fixed.not_judged.lock().map(|hypotheses| hypotheses.iter().cloned().collect());
         let not_judged = not_judged.unwrap_or_default();
         Ok(Tracing { verdict, specs: self.specs, model, before, effects, refinements, remaining, not_judged })
+    }
+
+    /// Whether other constants of the declared effects make the error on motion held out larger than it was with those that were declared.
+    fn is_worse_than(&self, declared: &TorqueError) -> Result<bool, IdentificationError> {
+        let design = self.design()?;
+        let data = self.fixed.data;
+        let folds = accumulate(&design, &data.held_out, &data.sources)?;
+        Ok(torque_error(&folds, &self.parameters)?.relative > declared.relative)
     }
 
     /// Error of the declared (or held) model: training, held out.
