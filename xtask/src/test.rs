@@ -2,8 +2,9 @@
 
 mod tally;
 
-use crate::{environment, mujoco};
+use crate::mujoco;
 use anyhow::Context;
+use phiw_experiments::environment;
 use std::io::{BufRead, BufReader};
 use std::process::{ExitCode, Stdio};
 use tally::Tally;

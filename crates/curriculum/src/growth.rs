@@ -3,8 +3,8 @@
 use crate::rivalry::torques_along;
 use crate::whiteness::{coloured, residual};
 use crate::{CurriculumError, Measured, Robot, RobotModel};
+use phiw_effects::SignalRanges;
 use phiw_identification::{BlockSource, Data, EffectCatalogue, EffectSpec, Fold, identify};
-use phiw_residual::catalogue::SignalRanges;
 use phiw_residual::trace::{TraceInput, TraceOptions, trace};
 use phiw_telemetry::{Block, Recording, Survey, arrange_session};
 

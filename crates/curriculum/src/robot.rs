@@ -2,9 +2,9 @@
 
 use crate::CurriculumError;
 use phiw_dynamics::{InertialParameters, PARAMETERS_PER_BODY, Tree, check_size};
+use phiw_effects::Catalogue;
 use phiw_identification::{Design, EffectCatalogue, EffectSpec, ReferenceModel};
 use phiw_regressor::BaseParameters;
-use phiw_residual::catalogue::Catalogue;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 

@@ -4,8 +4,8 @@ use crate::growth::{Found, Growth};
 use crate::{
     CurriculumError, Estimator, Evidence, Gain, Measured, MotionLikelihood, Robot, RobotModel, RowsAt,
 };
+use phiw_effects::{Constants, EffectKind, JointRange, SignalRanges};
 use phiw_identification::{EffectCatalogue, EffectSpec};
-use phiw_residual::catalogue::{Constants, JointRange, SignalRanges};
 
 /// Asks of every effect of the catalogue what it would save of −log L ([`MotionLikelihood::gains`]), fits the few best in full, adds the simplest
 /// of those that explain alike if it is worth its price, and asks again.
@@ -25,8 +25,6 @@ pub struct ScoreTest {
     pub least_s: f64,
     /// A rival counts if it has at least this probability beside the effect that is believed.
     pub least_rival: f64,
-    /// Kinds that are not asked for. Every log of a curriculum has a clock of its own: of what changes with the time since a motor was switched on, nothing is known.
-    pub excluded: Vec<String>,
 }
 
 /// An effect of one parameter must then be four standard deviations from nothing. Seventy such effects are asked for after each log of an 18-joint robot: with all of them
@@ -43,14 +41,7 @@ const REFINEMENTS: usize = 2;
 impl ScoreTest {
     /// For a curriculum with this estimator: three effects at most, from 12 s of logs on; a rival is what has a chance of one in ten.
     pub fn new(estimator: MotionLikelihood) -> Self {
-        ScoreTest {
-            estimator,
-            least_merit: LEAST_MERIT,
-            most_effects: 3,
-            least_s: 12.0,
-            least_rival: 0.1,
-            excluded: vec!["thermal_drift".to_owned()],
-        }
+        ScoreTest { estimator, least_merit: LEAST_MERIT, most_effects: 3, least_s: 12.0, least_rival: 0.1 }
     }
 
     /// Every effect of the catalogue on every joint that a fit leaves something of, each with the constants that save most, the best first by gain
@@ -66,8 +57,7 @@ impl ScoreTest {
     ) -> Result<Vec<Gain>, CurriculumError> {
         let ranges = ranges(robot, logs);
         let present = model.specs();
-        let mut candidates = candidates(robot, &ranges, &present);
-        candidates.retain(|effect| !self.excluded.contains(&effect.kind));
+        let candidates = candidates(robot, &ranges, &present);
         let gains = self.estimator.gains(robot, model, logs, &candidates)?;
         let mut best = Vec::new();
         // Constants of one effect on one site follow each other.
@@ -234,11 +224,13 @@ fn is_alike(one: &EffectSpec, other: &EffectSpec) -> bool {
     one.kind == other.kind && one.joints == other.joints
 }
 
-/// Every effect that may be beside `present`, with all constants to try.
+/// Every effect that may be beside `present`, with all constants to try. Every log of a curriculum has a clock of its own: of what changes with the time since a motor
+/// was switched on, nothing is known.
 fn candidates(robot: &Robot, ranges: &SignalRanges, present: &[EffectSpec]) -> Vec<EffectSpec> {
     let tree = robot.tree();
     let mut specs = Vec::new();
-    for kind in robot.catalogue().kinds().filter(|kind| !kind.needs_held_model()) {
+    let can_be_told = |kind: &&dyn EffectKind| !kind.needs_held_model() && !kind.needs_session_time();
+    for kind in robot.catalogue().kinds().filter(can_be_told) {
         for site in kind.sites(tree) {
             let joints: Vec<String> = site.iter().map(|&joint| tree.joint(joint).joint.clone()).collect();
             let spec = |constants: Constants| EffectSpec {

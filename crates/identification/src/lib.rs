@@ -1,5 +1,7 @@
 #![doc = include_str!("../README.md")]
 
+pub mod accuracy;
+
 mod accumulate;
 mod block_source;
 mod checks;

@@ -14,7 +14,7 @@ use crate::output::check_file;
 use crate::{Error, session};
 use estimate::Estimate;
 use phiw_curriculum::Robot;
-use phiw_residual::Catalogue;
+use phiw_effects::Catalogue;
 use phiw_result_folder::{Disk, Lock, ResultFile, check_inputs, replace_files};
 use standing::Standing;
 use std::path::PathBuf;

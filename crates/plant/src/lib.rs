@@ -21,7 +21,10 @@ mod standing;
 mod step_solver;
 mod support;
 
-pub use controller::{ComputedTorque, Gains, RigidBodyModel, TorqueModel, apparent_inertia};
+pub use controller::{
+    ComputedTorque, GainSettings, Gains, RigidBodyModel, TorqueModel, apparent_inertia,
+    least_apparent_inertia,
+};
 pub use effect::{Coupling, Effect};
 pub use error::PlantError;
 pub use friction::Friction;

@@ -87,7 +87,7 @@ impl Evidence {
         let factor = GroupedFactor::new(design.parameter_count(), groups)?;
         let mut foreseen = match rows_at {
             RowsAt::Stamps => Vec::new(),
-            RowsAt::Periods => foresight::foreseen(design)?,
+            RowsAt::Periods => foresight::foreseen(design),
         };
         if !foreseen.contains(&true) {
             foreseen.clear();

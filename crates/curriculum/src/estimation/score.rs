@@ -72,7 +72,7 @@ impl MotionLikelihood {
 
         let design = robot.design_beside(model, candidates)?;
         let mut score = Score::new(&design, present.effects().len(), w, precision);
-        let foreseen = foresight::foreseen(&design)?;
+        let foreseen = foresight::foreseen(&design);
         for log in logs {
             foresight::rows(&design, &foreseen, log, |row| {
                 score.add(row);
@@ -81,7 +81,7 @@ impl MotionLikelihood {
             score.flush();
         }
         self.add_determinants(robot, model, candidates, &foreseen, &evidence, &responses, &mut score)?;
-        let ahead = foresight::looking_ahead(&design)?;
+        let ahead = foresight::looking_ahead(&design);
 
         let (mut own_score, mut cross) = (gradient, std::mem::replace(&mut score.cross, Mat::zeros(0, 0)));
         solve_lower_triangular_in_place(own.L(), own_score.as_mut(), Par::Seq);

@@ -18,6 +18,17 @@ pub struct WrenchNoise {
     pub moment_nm: f64,
 }
 
+impl WrenchNoise {
+    /// Standard deviation of the noise in the rows of the virtual joints \[N, N·m\], for so many feet with `lever_m` \[m\] between their soles and
+    /// the base: by this lever the forces' noise is noise of the moments at the base.
+    pub fn at_base(&self, feet: usize, lever_m: f64) -> [f64; BASE] {
+        let feet = (feet as f64).sqrt();
+        let force = feet * self.force_n;
+        let moment = feet * self.moment_nm.hypot(lever_m * self.force_n);
+        [force, force, force, moment, moment, moment]
+    }
+}
+
 /// Speeds up to which a foot counts as still: of its sole \[m/s\], and turning \[rad/s\]. A foot of a kilogram that goes through them within a
 /// millisecond takes 5 N.
 const STILL: [f64; 2] = [5e-3, 5e-2];

@@ -7,6 +7,7 @@ use crate::model_file::ModelFile;
 use crate::session::{Session, declared};
 use phiw_curriculum::{CurriculumError, KnownEffect, RobotModel};
 use phiw_dynamics::Tree;
+use phiw_effects::Catalogue;
 use phiw_identification::{
     Design, EffectCatalogue, EffectSpec, Fit, IdentificationError, Identified, Progress, check_size_of_robot,
     fit, identify, merge, with_masses,
@@ -15,7 +16,6 @@ use phiw_limits::Limits;
 use phiw_regressor::factor::{Factor, FactorBuilder};
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_regressor::{BaseParameters, RegressorError};
-use phiw_residual::Catalogue;
 use phiw_telemetry::Survey;
 use serde::Serialize;
 

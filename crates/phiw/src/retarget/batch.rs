@@ -5,6 +5,7 @@ use crate::Error;
 use crate::arguments::RetargetArguments;
 use crate::console::Console;
 use phiw_bspline_retarget::{Artefact, Calibration, Quality, RecordingError, RetargetError, Retargeter};
+use phiw_report::statistics::median;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -125,7 +126,8 @@ fn summary(
         counts.failed
     );
     if !qualities.is_empty() {
-        let median = |value: &dyn Fn(&Quality) -> f64| median(qualities.iter().map(|q| value(q)).collect());
+        let median =
+            |value: &dyn Fn(&Quality) -> f64| median(&qualities.iter().map(|q| value(q)).collect::<Vec<_>>());
         let most = |value: &dyn Fn(&Quality) -> f64| qualities.iter().map(|q| value(q)).fold(0.0, f64::max);
         let _ = writeln!(
             summary,
@@ -217,11 +219,6 @@ fn one(
         .collect();
     output.write(&motion, &told, retargeter, &settings, arguments)?;
     Ok(Done::Retargeted(Box::new(motion.quality), recording.duration_s(), artefacts))
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 /// A file's name without folder and extension.
