@@ -6,7 +6,9 @@ use crate::motion::{Controller, Swing, Target};
 use crate::{Builder, Failure, Measured};
 use phiw_dynamics::dense::dot;
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, random_state};
-use phiw_dynamics::{AnalyticBackend, DimensionError, DynamicsBackend, Placement, Tree, Workspace, World};
+use phiw_dynamics::{
+    AnalyticBackend, DimensionError, DynamicsBackend, Placement, SimulationBackend, Tree, Workspace, World,
+};
 
 /// Joints under PD control and gravity compensation, on a smooth motion of 5 s, against the same with a `reference` backend.
 ///
@@ -149,7 +151,7 @@ pub fn position_limits_hold(build: &Builder, tree: &Tree) -> Result<Measured, Fa
 }
 
 /// Kinetic and potential energy \[J\].
-fn energies(tree: &Tree, backend: &dyn DynamicsBackend) -> Result<[f64; 2], Failure> {
+fn energies(tree: &Tree, backend: &dyn SimulationBackend) -> Result<[f64; 2], Failure> {
     let (q, v) = state_of(backend)?;
     let mut mass = vec![0.0; v.len() * v.len()];
     tree.mass_matrix(&q, &mut Workspace::new(tree), &mut mass)?;

@@ -31,6 +31,27 @@ pub enum CurriculumError {
         /// What it must be.
         must_be: &'static str,
     },
+    /// Every motion is expected to topple the robot.
+    #[error(
+        "none of the {motions} motions keeps the ZMP over the support under the present estimate: the safest, {safest}, leaves it by {:.1} mm; \
+         add calmer motions, or start from a better model", 1e3 * outside_m
+    )]
+    NothingSafe {
+        /// How many there are.
+        motions: usize,
+        /// The one that comes nearest.
+        safest: String,
+        /// How far its ZMP is outside \[m\].
+        outside_m: f64,
+    },
+    /// The robot has fallen on every motion.
+    #[error(
+        "the robot has fallen on all of the {motions} motions: add calmer motions, or start from a better model"
+    )]
+    FellOnAll {
+        /// How many there are.
+        motions: usize,
+    },
     /// A saved run is not of this robot or these motions.
     #[error(
         "the saved run does not fit: {0}; use the robot and the motions that it was begun with, or begin anew"

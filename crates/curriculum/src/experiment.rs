@@ -1,7 +1,7 @@
 //! Where measurements come from: a trait, and a simulated robot over any backend.
 
 use crate::{Controller, CurriculumError, Measured, Motion, Robot, RobotModel};
-use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World};
+use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
 use phiw_plant::{Effect, History, Plant, PlantSetup, Reaction, Run as PlantRun, Sensors, Timing};
 use rand_chacha::ChaCha8Rng;
 
@@ -34,7 +34,8 @@ pub trait Experiment: Send + Sync {
 }
 
 /// Makes a backend of the robot as it is built.
-pub type BuildBackend = dyn Fn(&Tree, &World) -> Result<Box<dyn DynamicsBackend>, BackendError> + Send + Sync;
+pub type BuildBackend =
+    dyn Fn(&Tree, &World) -> Result<Box<dyn SimulationBackend>, BackendError> + Send + Sync;
 
 /// A simulated robot: the plant of the paper's Figure 2, over any backend.
 ///
@@ -55,14 +56,30 @@ pub struct SimulatedRobot {
     pub timing: Timing,
     /// Tilt of its base at which it counts as fallen \[rad\].
     pub fall_tilt_rad: f64,
+    /// When what it stands with counts as still.
+    pub stillness: Stillness,
     /// Makes the backend.
     pub build: Box<BuildBackend>,
 }
 
-/// Turning rate up to which a base counts as still \[rad/s\]: what a gyroscope tells from its own noise.
-const STILL_RAD_PER_S: f64 = 0.01;
-/// Time around a movement of the base that does not count either \[s\]: it lands before it rests.
-const SETTLES_S: f64 = 0.1;
+/// When a base or a foot counts as still: rows in which it moves are no rows of a robot that stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stillness {
+    /// Turning rate of a base \[rad/s\]. Default: 0.01, what a gyroscope tells from its own noise.
+    pub base_turning: f64,
+    /// Time around a movement of the base that does not count either, since it lands before it rests \[s\]. Default: 0.1.
+    pub settles_s: f64,
+    /// Speed of a foot's sole \[m/s\]. Default: 0.005. A foot of a kilogram that goes through that within a millisecond takes 5 N.
+    pub foot_speed: f64,
+    /// Turning rate of a foot \[rad/s\]. Default: 0.05, the same over a lever of 0.1 m.
+    pub foot_turning: f64,
+}
+
+impl Default for Stillness {
+    fn default() -> Self {
+        Stillness { base_turning: 0.01, settles_s: 0.1, foot_speed: 5e-3, foot_turning: 5e-2 }
+    }
+}
 
 impl SimulatedRobot {
     /// Lets a plant of its own follow a motion of its motors.
@@ -105,9 +122,9 @@ impl SimulatedRobot {
         };
         let moves: Vec<bool> = (0_u32..)
             .map_while(|row| rate(f64::from(row) * period_s))
-            .map(|rate| rate > STILL_RAD_PER_S)
+            .map(|rate| rate > self.stillness.base_turning)
             .collect();
-        let reach = (SETTLES_S / period_s).round() as usize;
+        let reach = (self.stillness.settles_s / period_s).round() as usize;
         let around = |row: usize| &moves[row.saturating_sub(reach)..(row + reach + 1).min(moves.len())];
         (0..moves.len()).map(|row| !around(row).contains(&true)).collect()
     }

@@ -3,7 +3,7 @@
 use phiw_curriculum::standing::*;
 use phiw_curriculum::*;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
-use phiw_dynamics::{BackendError, DynamicsBackend, Foot, Tree, Workspace, World};
+use phiw_dynamics::{BackendError, Foot, SimulationBackend, Tree, Workspace, World};
 use phiw_plant::{Gains, Timing, feet_from_toml};
 use phiw_regressor::BaseParameters;
 use rand::SeedableRng;
@@ -92,6 +92,7 @@ impl Humanoid {
             actuator_noise: 0.0,
             timing: Timing { control_period_s: 1e-3, longest_step_s: 5e-4, settle_s: 1.0 },
             fall_tilt_rad: 0.3,
+            stillness: Default::default(),
             build,
         };
         let wrench_noise = WrenchNoise { force_n: 0.0, moment_nm: 0.0 };
@@ -99,11 +100,11 @@ impl Humanoid {
     }
 }
 
-fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     Ok(Box::new(phiw_sim_rapier::RapierBackend::new(tree, world)?))
 }
 
-fn mujoco(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+fn mujoco(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     let backend = phiw_sim_mujoco::MujocoBackend::new(tree, world);
     let backend =
         backend.map_err(|error| BackendError::Backend { backend: "mujoco", message: error.to_string() })?;

@@ -3,6 +3,7 @@
 mod analytic;
 mod articulated_body;
 mod backend;
+mod body_kinematics;
 mod configuration;
 pub mod dense;
 mod forward_dynamics;
@@ -20,7 +21,8 @@ mod workspace;
 mod world;
 
 pub use analytic::AnalyticBackend;
-pub use backend::{BackendError, DynamicsBackend};
+pub use backend::{BackendError, DynamicsBackend, SimulationBackend};
+pub use body_kinematics::{BodyJoint, BodyKinematics, MotionSubspace};
 pub use inertia::Inertia;
 pub use motion::BodyMotion;
 pub use scalar::{Dual, Lanes, Scalar};

@@ -5,7 +5,7 @@ use crate::joint_drive::JointDrive;
 use crate::motion::Motion;
 use crate::robot_as_built::robot_as_built;
 use crate::{ComputedTorque, Coupling, Effect, PlantError, Reaction, Reference, Run, Sensors};
-use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World};
+use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -58,7 +58,7 @@ impl PlantSetup {
     }
 }
 
-/// A simulated robot that behaves like a real one, over any [`DynamicsBackend`].
+/// A simulated robot that behaves like a real one, over any [`SimulationBackend`].
 ///
 /// Each control period the controller reads the encoders and commands torques, clipped at the effort limits. The actuators
 /// deliver them with their noise and faults. Between two commands the backend is stepped, under the torque that is left after
@@ -72,7 +72,7 @@ pub struct Plant {
     /// The robot as built.
     pub(crate) tree: Tree,
     pub(crate) world: World,
-    pub(crate) backend: Box<dyn DynamicsBackend>,
+    pub(crate) backend: Box<dyn SimulationBackend>,
     pub(crate) controller: ComputedTorque,
     pub(crate) effects: Vec<Effect>,
     pub(crate) drives: Vec<JointDrive>,
@@ -96,7 +96,7 @@ impl Plant {
         tree: &Tree,
         world: &World,
         setup: PlantSetup,
-        build: impl FnOnce(&Tree, &World) -> Result<Box<dyn DynamicsBackend>, BackendError>,
+        build: impl FnOnce(&Tree, &World) -> Result<Box<dyn SimulationBackend>, BackendError>,
     ) -> Result<Self, PlantError> {
         let PlantSetup { controller, effects, actuator_noise, sensors, timing, fall_tilt_rad } = setup;
         world.check(tree)?;

@@ -2,7 +2,9 @@
 
 mod plants;
 
-use phiw_dynamics::{BackendError, DimensionError, DynamicsBackend, Foot, Placement, Tree, World};
+use phiw_dynamics::{
+    BackendError, DimensionError, DynamicsBackend, Foot, Placement, SimulationBackend, Tree, World,
+};
 use phiw_plant::{
     Clock, ComputedTorque, Coupling, Effect, Friction, Gains, Mechanism, Plant, PlantError, PlantSetup, Run,
     Sensors, Timing, TorqueModel,
@@ -234,27 +236,19 @@ impl DynamicsBackend for Leaning {
     fn name(&self) -> &str {
         "leaning"
     }
+
     fn joint_names(&self) -> &[String] {
         &self.names
     }
+
     fn velocity_size(&self) -> usize {
         self.q.len() - 1
     }
+
     fn configuration_size(&self) -> usize {
         self.q.len()
     }
-    fn state(&self, q: &mut [f64], v: &mut [f64]) -> Result<(), BackendError> {
-        q.copy_from_slice(&self.q);
-        let (sine, cosine) = (0.1 * self.t_s).sin_cos();
-        q[3..7].copy_from_slice(&[0.0, sine, 0.0, cosine]);
-        v.fill(0.0);
-        Ok(())
-    }
-    fn set_state(&mut self, q: &[f64], _: &[f64]) -> Result<(), BackendError> {
-        self.q.copy_from_slice(q);
-        self.t_s = 0.0;
-        Ok(())
-    }
+
     fn inverse_dynamics(
         &mut self,
         _: &[f64],
@@ -264,6 +258,7 @@ impl DynamicsBackend for Leaning {
     ) -> Result<(), BackendError> {
         Ok(())
     }
+
     fn forward_dynamics(
         &mut self,
         _: &[f64],
@@ -273,13 +268,31 @@ impl DynamicsBackend for Leaning {
     ) -> Result<(), BackendError> {
         Ok(())
     }
-    fn step(&mut self, _: &[f64], dt: f64) -> Result<(), BackendError> {
-        self.t_s += dt;
-        Ok(())
-    }
+
     fn base_wrench(&self) -> [f64; 6] {
         // 100 N pressing at x = 0.2 m, y = −0.1 m.
         [0.0, 0.0, 100.0, -10.0, -20.0, 0.0]
+    }
+}
+
+impl SimulationBackend for Leaning {
+    fn state(&self, q: &mut [f64], v: &mut [f64]) -> Result<(), BackendError> {
+        q.copy_from_slice(&self.q);
+        let (sine, cosine) = (0.1 * self.t_s).sin_cos();
+        q[3..7].copy_from_slice(&[0.0, sine, 0.0, cosine]);
+        v.fill(0.0);
+        Ok(())
+    }
+
+    fn set_state(&mut self, q: &[f64], _: &[f64]) -> Result<(), BackendError> {
+        self.q.copy_from_slice(q);
+        self.t_s = 0.0;
+        Ok(())
+    }
+
+    fn step(&mut self, _: &[f64], dt: f64) -> Result<(), BackendError> {
+        self.t_s += dt;
+        Ok(())
     }
 }
 
@@ -288,7 +301,7 @@ fn a_robot_that_leans_too_far_has_fallen() {
     let tree = model("upper_body18", true);
     let sole = vec![[0.1, 0.1, -0.02], [-0.1, 0.1, -0.02], [-0.1, -0.1, -0.02], [0.1, -0.1, -0.02]];
     let world = World { feet: vec![Foot { body: 0, sole }], ..World::default() };
-    let build = |tree: &Tree, _: &World| -> Result<Box<dyn DynamicsBackend>, BackendError> {
+    let build = |tree: &Tree, _: &World| -> Result<Box<dyn SimulationBackend>, BackendError> {
         Ok(Box::new(Leaning {
             names: tree.joint_names().map(str::to_owned).collect(),
             q: tree.neutral_configuration(),

@@ -2,14 +2,14 @@
 
 mod plants;
 
-use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World};
+use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
 use phiw_plant::{
     ComputedTorque, Gains, Plant, PlantSetup, Reference, RigidBodyModel, Run, Timing, feet_from_toml,
 };
 use phiw_sim_rapier::RapierBackend;
 use plants::{model, random};
 
-fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     Ok(Box::new(RapierBackend::new(tree, world)?.with_solver_iterations(4)?))
 }
 

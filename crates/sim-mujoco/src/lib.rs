@@ -2,6 +2,7 @@
 
 mod backend;
 mod base;
+mod body_kinematics;
 mod error;
 mod inertial;
 mod integrator;

@@ -2,7 +2,7 @@
 
 mod robots;
 
-use phiw_dynamics::{BackendError, DynamicsBackend, Placement, Tree, Vec3, World};
+use phiw_dynamics::{BackendError, Placement, SimulationBackend, Tree, Vec3, World};
 use phiw_plant::{ComputedTorque, Gains, Plant, PlantSetup, RigidBodyModel, Run, Timing, feet_from_toml};
 use phiw_sim_rapier::RapierBackend;
 use phiw_zmp::{MotionBalance, Stance, SupportPolygon, ZmpModel, ZmpWorkspace};
@@ -145,7 +145,7 @@ fn a_humanoid_stands_between_its_feet() {
     assert!(zmp[1].abs() < 0.01, "between the feet: {zmp:?}");
 }
 
-fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     Ok(Box::new(RapierBackend::new(tree, world)?.with_solver_iterations(4)?))
 }
 

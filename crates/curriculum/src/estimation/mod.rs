@@ -1,5 +1,6 @@
 //! From what was measured to parameters: equation (4), and estimators that know where the noise comes from.
 
+mod bayesian;
 mod evidence;
 mod foresight;
 mod least_squares;
@@ -8,13 +9,16 @@ mod prior;
 mod response;
 mod score;
 mod sensitivity;
+mod settings;
 mod stored;
 
-pub use evidence::{Evidence, Instant, RowsAt};
+pub use bayesian::{BayesianLeastSquares, LogNoise};
+pub use evidence::{Evidence, EvidenceSettings, Instant, RowsAt};
 pub use least_squares::{LeastSquares, WeightedLeastSquares};
 pub use likelihood::MotionLikelihood;
 pub use prior::Prior;
 pub use score::Gain;
+pub use settings::{NewtonSettings, ScoreSettings};
 
 use crate::triangle::Triangle;
 use crate::{CurriculumError, RobotModel};

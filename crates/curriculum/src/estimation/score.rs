@@ -31,13 +31,6 @@ pub struct Gain {
     pub merit: f64,
 }
 
-/// Price of a parameter: half the logarithm of the rows of one torque in a minute (BIC, Schwarz 1978).
-const PRICE: f64 = 4.0;
-
-/// Share of a column's square that the model must leave of it; of less, nothing can be said.
-const LEFT: f64 = 1e-3;
-/// Of so many instants one counts in a curvature.
-const EVERY: usize = 4;
 /// Rows that are multiplied at a time.
 const CHUNK: usize = 256;
 
@@ -100,13 +93,13 @@ impl MotionLikelihood {
             let squares = range.clone().map(|a| score.own[index][(a - range.start, a - range.start)]);
             let s = Mat::from_fn(range.len(), range.len(), |a, b| left(range.start + a, range.start + b));
             let g: Vec<f64> = range.clone().map(slope).collect();
-            let (gain, parameters) = newton(&s, &g, &squares.collect::<Vec<_>>())?;
+            let (gain, parameters) = newton(&s, &g, &squares.collect::<Vec<_>>(), self.score.least_left)?;
             let bounds = design.effects()[score.effects + index].parameters();
             let within = bounds.iter().zip(&parameters).all(|(parameter, value)| {
                 let (lower, upper) = parameter.bounds;
                 (lower..=upper).contains(value)
             });
-            let merit = gain - PRICE * parameters.len() as f64;
+            let merit = gain - self.score.parameter_price * parameters.len() as f64;
             within.then(|| Gain { effect: effect.clone(), gain, parameters, merit })
         };
         Ok(candidates.iter().enumerate().map(gain).collect())
@@ -138,10 +131,11 @@ impl MotionLikelihood {
         };
         let present = score.present;
         let mut curvature = Mat::zeros(design.parameter_count(), places.len());
+        let every = self.score.instants_every.max(1);
         let instants = || evidence.instants().iter().zip(responses).enumerate();
         let all: f64 = instants().map(|(_, (instant, _))| instant.weight).sum();
         let part: f64 =
-            instants().skip(EVERY / 2).step_by(EVERY).map(|(_, (instant, _))| instant.weight).sum();
+            instants().skip(every / 2).step_by(every).map(|(_, (instant, _))| instant.weight).sum();
         for (index, (instant, response)) in instants() {
             let Some(response) = response else { continue };
             let sensitivity = Sensitivity::of(&design, instant, &self.standing_on, still)?;
@@ -150,7 +144,7 @@ impl MotionLikelihood {
                 score.gradient[parameter] -= sensitivity.weight * slopes[(place, 0)];
             }
             // A part of the instants is enough for a curvature, which is the dearest part.
-            if index % EVERY == EVERY / 2 {
+            if index % every == every / 2 {
                 let (reduced, weight) = (response.reduced(&sensitivity), sensitivity.weight * all / part);
                 let added = reduced.get(.., present..);
                 matmul(&mut curvature, Accum::Add, reduced.transpose(), added, weight, Par::Seq);
@@ -293,10 +287,10 @@ impl<'a> Score<'a> {
     }
 }
 
-/// ½gᵀS⁻¹g and −S⁻¹g; none where the model leaves too little of a column (`squares` are those of the whole columns).
-fn newton(s: &Mat<f64>, g: &[f64], squares: &[f64]) -> Option<(f64, Vec<f64>)> {
+/// ½gᵀS⁻¹g and −S⁻¹g; none where the model leaves less than `least_left` of a column (`squares` are those of the whole columns).
+fn newton(s: &Mat<f64>, g: &[f64], squares: &[f64], least_left: f64) -> Option<(f64, Vec<f64>)> {
     let factor = Cholesky::of(g.len(), |row, column| s[(row, column)])?;
-    let leaves_enough = |(row, square): (usize, &f64)| factor.entry(row, row).powi(2) > LEFT * square;
+    let leaves_enough = |(row, square): (usize, &f64)| factor.entry(row, row).powi(2) > least_left * square;
     if !squares.iter().enumerate().all(leaves_enough) {
         return None;
     }

@@ -29,10 +29,6 @@ impl WrenchNoise {
     }
 }
 
-/// Speeds up to which a foot counts as still: of its sole \[m/s\], and turning \[rad/s\]. A foot of a kilogram that goes through them within a
-/// millisecond takes 5 N.
-const STILL: [f64; 2] = [5e-3, 5e-2];
-
 /// A robot that stands on its feet, over any backend with contacts.
 ///
 /// Rows in which a foot moves (noise of the motors can lift an edge of a sole) are no rows of a robot whose feet stay, and do not count.
@@ -136,7 +132,12 @@ impl StandingRobot {
         for index in 0..boundaries.len() {
             let own = index * joints..(index + 1) * joints;
             let speeds = self.feet.speeds(&measured.q[own.clone()], &measured.qd[own])?;
-            rest.push(speeds.iter().zip(STILL).all(|(speed, still)| *speed <= still));
+            rest.push(
+                speeds
+                    .iter()
+                    .zip([self.plant.stillness.foot_speed, self.plant.stillness.foot_turning])
+                    .all(|(speed, still)| *speed <= still),
+            );
         }
         measured.still =
             (0..rest.len()).map(|row| rest[row] && rest.get(row + 1).copied().unwrap_or(true)).collect();

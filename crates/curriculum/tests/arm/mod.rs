@@ -71,6 +71,7 @@ impl Arm {
             actuator_noise: self.noise,
             timing: Timing { longest_step_s: 1e-3, settle_s: 0.2, ..Timing::default() },
             fall_tilt_rad: 0.3,
+            stillness: Default::default(),
             build: Box::new(|tree, world| Ok(Box::new(AnalyticBackend::in_world(tree.clone(), world)?))),
         }
     }
@@ -101,6 +102,7 @@ impl Arm {
             growth: None,
             end,
             rows_at: RowsAt::Periods,
+            settings: CurriculumSettings::default(),
         }
     }
 }

@@ -166,7 +166,7 @@ impl Setup {
             RelaxationName::Condition => Box::new(ConditionRelaxation::default()),
             RelaxationName::Uncertainty => Box::new(UncertaintyRelaxation::default()),
         };
-        let constraint = ZmpConstraint::new(subject.stance.clone());
+        let constraint = ZmpConstraint::of_the_paper(subject.stance.clone());
         let settings = Settings {
             backend: format!("{:?}", arguments.backend).to_lowercase(),
             robot: arguments.robot,
@@ -252,6 +252,7 @@ impl Setup {
             actuator_noise: noise,
             timing: timing(backend),
             fall_tilt_rad: 0.3,
+            stillness: Default::default(),
             build: Box::new(move |tree, world| backend.build(tree, world)),
         }
     }

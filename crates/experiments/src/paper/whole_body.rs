@@ -15,7 +15,7 @@ use phiw_curriculum::standing::{
 };
 use phiw_curriculum::{Motion, Robot, SimulatedRobot};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
-use phiw_dynamics::{BackendError, DynamicsBackend, Foot, PARAMETERS_PER_BODY, Tree, World};
+use phiw_dynamics::{BackendError, Foot, PARAMETERS_PER_BODY, SimulationBackend, Tree, World};
 use phiw_effects::Catalogue;
 use phiw_identification::EffectSpec;
 use phiw_plant::{Effect, Timing, feet_from_toml};
@@ -178,6 +178,7 @@ impl Subject {
                 ..Timing::default()
             },
             fall_tilt_rad: 0.3,
+            stillness: Default::default(),
             build: Box::new(move |tree, world| build(backend, tree, world)),
         };
         let wrench_noise = if noise > 0.0 { WRENCH_NOISE } else { silent };
@@ -187,7 +188,7 @@ impl Subject {
 
 /// The robot in an engine. MuJoCo tells its contact forces for the beginning of a step; they are those of all of it with the integrator that
 /// looks there only.
-fn build(backend: Engine, tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+fn build(backend: Engine, tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     if backend != Engine::Mujoco {
         return backend.build(tree, world);
     }

@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
-use phiw_dynamics::{AnalyticBackend, BackendError, DynamicsBackend, Tree, Workspace, World};
+use phiw_dynamics::{AnalyticBackend, BackendError, SimulationBackend, Tree, Workspace, World};
 use phiw_plant::{ComputedTorque, Effect, Gains, History, MultiSine, Plant, PlantSetup, RigidBodyModel, Run};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -15,7 +15,7 @@ pub fn model(name: &str, floating_base: bool) -> Tree {
 }
 
 /// The analytic backend, as a plant's builder.
-pub fn analytic(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+pub fn analytic(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     Ok(Box::new(AnalyticBackend::in_world(tree.clone(), world)?))
 }
 
