@@ -1,5 +1,6 @@
 //! Experiments and set-up of the workspace: `cargo xtask <task>`.
 
+mod consumers;
 mod mujoco;
 mod test;
 mod torture;

@@ -121,6 +121,27 @@ pub struct Retargeted {
     pub rate_hz: f64,
 }
 
+impl Retargeted {
+    /// Time between two samples \[s\]: the recording's.
+    pub fn period_s(&self) -> f64 {
+        1.0 / self.rate_hz
+    }
+
+    /// Positions \[rad, m\], velocities and accelerations of the robot at the recording's frames, row-major `[frame × joint]`: what a log of the motion, or a
+    /// motion to choose from, is made of.
+    pub fn signals(&self) -> [Vec<f64>; 3] {
+        let joints = self.robot.dimension();
+        let mut scratch = vec![0.0; self.robot.basis().degree() + 1];
+        let mut signals = [0; 3].map(|_| vec![0.0; self.frames * joints]);
+        for (order, signal) in signals.iter_mut().enumerate() {
+            for (frame, values) in signal.chunks_exact_mut(joints.max(1)).enumerate() {
+                self.robot.evaluate(order, frame as f64 / self.rate_hz, &mut scratch, values);
+            }
+        }
+        signals
+    }
+}
+
 impl Retargeter {
     /// Takes a robot and a map together.
     ///

@@ -2,6 +2,7 @@
 
 use crate::contest::{rivals_to_separate, unconfirmed};
 use crate::estimation::RowsAt;
+use crate::experiment::check_noise;
 use crate::growth::Found;
 use crate::planner::{Belief, MeasuredSoFar, Policy, plan};
 use crate::triangle::Triangle;
@@ -107,6 +108,7 @@ impl Curriculum<'_> {
     /// # Errors
     /// The run is not of this robot, the robot can not be run, or nothing can be estimated.
     pub fn step(&self, run: &mut Run) -> Result<(), CurriculumError> {
+        check_noise(self.robot, self.experiment, self.estimator)?;
         let Some(plan) = self.plan(run)? else { return Ok(()) };
         let motion = &self.dataset.motions()[plan.choice.motion];
         let mut noise = random(run.seed, run.history.len(), Purpose::Experiment);

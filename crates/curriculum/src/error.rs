@@ -52,6 +52,26 @@ pub enum CurriculumError {
         /// How many there are.
         motions: usize,
     },
+    /// Noise is stated twice.
+    #[error(
+        "the estimator counts on a noise of {told} N·m (N) in the torque of {joint}, where the experiment makes {made}: give it the experiment's own torque_noise()"
+    )]
+    Noise {
+        /// The joint.
+        joint: String,
+        /// Standard deviation that the experiment makes \[N·m, N\].
+        made: f64,
+        /// Standard deviation that the estimator was told \[N·m, N\].
+        told: f64,
+    },
+    /// A model's effect has no counterpart in a plant.
+    #[error(
+        "no plant is built with {kind} from a model: leave it out there, and add it to the effects of the simulated robot"
+    )]
+    NotSimulated {
+        /// The kind of the effect.
+        kind: String,
+    },
     /// A saved run is not of this robot or these motions.
     #[error(
         "the saved run does not fit: {0}; use the robot and the motions that it was begun with, or begin anew"

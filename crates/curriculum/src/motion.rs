@@ -39,7 +39,7 @@ pub struct Motion {
 
 impl Motion {
     /// A motion of `joints` joints with a sample every `period_s` \[s\]. `signals` are positions \[rad, m\], velocities and accelerations,
-    /// row-major `[sample × joints]`.
+    /// row-major `[sample × joints]`, as `Retargeted::signals` of `phiw-bspline-retarget` has them.
     ///
     /// # Errors
     /// There are fewer than two samples, the signals do not fit each other, or a number is not finite.
@@ -67,6 +67,27 @@ impl Motion {
             return Err(wrong(format!("sample {sample} has a number that is not finite: fill gaps first")));
         }
         Ok(Motion { name: name.to_owned(), task: task.to_owned(), period_s, joints, signals })
+    }
+
+    /// The first `samples` samples of a reference, one every `period_s` \[s\].
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_reference(
+        name: &str,
+        task: &str,
+        joints: usize,
+        (samples, period_s): (usize, f64),
+        reference: &dyn Reference,
+    ) -> Result<Self, CurriculumError> {
+        let mut signals = [0; 3].map(|_| vec![0.0; samples * joints]);
+        let [q, v, a] = &mut signals;
+        for sample in 0..samples {
+            let row = sample * joints..(sample + 1) * joints;
+            let (q, v, a) = (&mut q[row.clone()], &mut v[row.clone()], &mut a[row]);
+            reference.at(sample as f64 * period_s, q, v, a);
+        }
+        Self::new(name, task, joints, period_s, signals)
     }
 
     /// A motion from a log with positions, velocities and accelerations, as `phiw retarget` writes it.

@@ -90,6 +90,7 @@ impl Humanoid {
             effects: Vec::new(),
             controller: Box::new(controller),
             actuator_noise: 0.0,
+            sensors: phiw_plant::Sensors::exact(1e-3),
             timing: Timing { control_period_s: 1e-3, longest_step_s: 5e-4, settle_s: 1.0 },
             fall_tilt_rad: 0.3,
             stillness: Default::default(),

@@ -17,6 +17,7 @@ mod model;
 mod predict;
 mod rates;
 mod reference;
+mod robot_findings;
 mod sample;
 
 pub use accumulate::{Fold, accumulate};
@@ -35,4 +36,5 @@ pub use model::{
 };
 pub use predict::{Prediction, predict};
 pub use reference::ReferenceModel;
+pub use robot_findings::robot_findings;
 pub use sample::{BlockReference, Needs, Sample};

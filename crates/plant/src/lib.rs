@@ -33,6 +33,6 @@ pub use mechanism::Mechanism;
 pub use plant::{Plant, PlantSetup, Timing};
 pub use presliding::Presliding;
 pub use reference::{FadedSines, MultiSine, Reference};
-pub use run::{Reaction, Run};
-pub use sensors::{Clock, Sensors};
+pub use run::{PlantRun, Reaction};
+pub use sensors::{Clock, Derivatives, Sensors};
 pub use support::{SupportError, feet_from_toml};

@@ -153,6 +153,10 @@ impl Estimator for MotionLikelihood {
         })
     }
 
+    fn torque_noise(&self) -> Option<&[f64]> {
+        Some(&self.torque_noise)
+    }
+
     fn misfit(
         &self,
         design: &Design,

@@ -71,6 +71,11 @@ pub trait Estimator: Send + Sync {
         present_parameters: &[f64],
     ) -> Result<Estimate, CurriculumError>;
 
+    /// Standard deviation of each torque's noise that it counts on \[N·m, N\]; none from an estimator that is not told.
+    fn torque_noise(&self) -> Option<&[f64]> {
+        None
+    }
+
     /// −log L of parameters, but for a constant that is the same for all models of the same logs; none from an estimator that knows no
     /// likelihood. The smaller, the better the model: effects that were found are confirmed by it.
     ///

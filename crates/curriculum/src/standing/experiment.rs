@@ -2,7 +2,7 @@
 
 use super::{Feet, VIRTUAL_JOINTS, base_coordinates};
 use crate::{CurriculumError, Experiment, Measured, Motion, Robot, RobotModel, SimulatedRobot, Trial};
-use phiw_plant::History;
+use phiw_plant::{History, Sensors};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -53,6 +53,10 @@ impl Experiment for StandingRobot {
         motion: &Motion,
         random: &mut ChaCha8Rng,
     ) -> Result<Trial, CurriculumError> {
+        if self.plant.sensors != Sensors::exact(self.plant.timing.control_period_s) {
+            let problem = "motors and base of a robot on its feet are measured exactly: leave its sensors at Sensors::exact, and set wrench_noise".to_owned();
+            return Err(CurriculumError::Motion { name: "as measured".to_owned(), problem });
+        }
         let run = self.plant.run(robot, model, &of_motors(motion)?, random)?;
         let mut noise = ChaCha8Rng::seed_from_u64(random.random());
         Ok(Trial {

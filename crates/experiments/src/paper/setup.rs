@@ -18,7 +18,7 @@ use phiw_curriculum::{
 };
 use phiw_dynamics::{PARAMETERS_PER_BODY, Workspace, World};
 use phiw_identification::{parameter_name, standard_unit};
-use phiw_plant::{Effect, Timing};
+use phiw_plant::{Effect, Sensors, Timing};
 use phiw_regressor::factor::Factor;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -250,6 +250,7 @@ impl Setup {
             effects: self.subject.frictions(),
             controller: Box::new(FeedForward { gains: self.subject.gains.clone() }),
             actuator_noise: noise,
+            sensors: Sensors::exact(timing(backend).control_period_s),
             timing: timing(backend),
             fall_tilt_rad: 0.3,
             stillness: Default::default(),

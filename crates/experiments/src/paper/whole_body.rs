@@ -18,7 +18,7 @@ use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{BackendError, Foot, PARAMETERS_PER_BODY, SimulationBackend, Tree, World};
 use phiw_effects::Catalogue;
 use phiw_identification::EffectSpec;
-use phiw_plant::{Effect, Timing, feet_from_toml};
+use phiw_plant::{Effect, Sensors, Timing, feet_from_toml};
 use phiw_regressor::BaseParameters;
 use phiw_sim_mujoco::{Integrator, MujocoBackend};
 use phiw_zmp::{Stance, SupportPolygon};
@@ -172,6 +172,7 @@ impl Subject {
                 stance: standing.legs.stance().to_vec(),
             }),
             actuator_noise: noise,
+            sensors: Sensors::exact(CONTROL_PERIOD_S),
             timing: Timing {
                 control_period_s: CONTROL_PERIOD_S,
                 longest_step_s: LONGEST_STEP_S,

@@ -15,15 +15,15 @@ use super::visibility::Absorber;
 /// Length of a log \[s\].
 pub const DURATION: f64 = 20.0;
 /// When the logs of a session start \[s\].
-const STARTS: [f64; 3] = [0.0, 25.0, 50.0];
+pub const STARTS: [f64; 3] = [0.0, 25.0, 50.0];
 /// Smallest and largest size of an effect.
 pub const SIZES: [f64; 2] = [0.05, 0.3];
 /// How much of an effect the declared model must leave over, in units of the torque noise.
-const VISIBLE: f64 = 0.5;
+pub const VISIBLE: f64 = 0.5;
 /// The same for what the tracer must not call explained.
-const VISIBLE_OUTSIDE: f64 = 1.0;
+pub const VISIBLE_OUTSIDE: f64 = 1.0;
 /// Rate at which sizes are measured \[Hz\].
-const SIZE_RATE: f64 = 100.0;
+pub const SIZE_RATE: f64 = 100.0;
 /// Friction is drawn in proportion to the rigid body's torque, or to this share of the joint's limit if that is more: a wrist has
 /// next to no load and yet its gears.
 const LEAST_LEVEL: f64 = 0.04;
@@ -50,7 +50,10 @@ pub struct Case<'a> {
     pub clean_motions: Vec<Motion>,
     /// The sensors.
     pub sensors: Sensors,
-    attempt: u64,
+    /// Effects of the wide suites' plants that are declared, in forms of their own.
+    pub plant: Vec<Secret>,
+    /// The attempt that it was drawn in.
+    pub attempt: u64,
 }
 
 /// A secret and what was measured of it when it was drawn.
@@ -61,6 +64,8 @@ pub struct Drawn {
     pub size: f64,
     /// RMS of what the declared model cannot absorb, in units of the noise, where most of it is left.
     pub visible: f64,
+    /// Joints where it is large and certain enough that it has to be named; all of its joints, but in the wide suites.
+    pub material: Vec<usize>,
 }
 
 impl<'a> Case<'a> {
@@ -69,7 +74,10 @@ impl<'a> Case<'a> {
         let attempts = ATTEMPTS_PER_ROBOT * 2 * robots.len() as u64;
         (0..attempts).find_map(|attempt| {
             let robot = &robots[(spec.robot + (attempt / ATTEMPTS_PER_ROBOT) as usize) % robots.len()];
-            Self::attempt(spec, robot, attempt)
+            match spec.situation {
+                Some(situation) => super::wide::draw(spec, situation, robot, attempt),
+                None => Self::attempt(spec, robot, attempt),
+            }
         })
     }
 
@@ -104,6 +112,7 @@ impl<'a> Case<'a> {
             motions,
             clean_motions,
             sensors,
+            plant: Vec::new(),
             attempt,
         };
         for (&name, &joint) in spec.secrets.iter().zip(&joints) {
@@ -155,7 +164,7 @@ impl<'a> Case<'a> {
         let visible = absorber.visible(&records);
         let enough = if self.spec.suite == Suite::Outside { VISIBLE_OUTSIDE } else { VISIBLE };
         (visible >= enough && felt_in_every_log(&secret, tree, ordinary, &self.motions, times))
-            .then_some(Drawn { secret, size, visible })
+            .then(|| Drawn { material: secret.joints.clone(), secret, size, visible })
     }
 
     /// The same case with nothing undeclared: same robot, motions, sensors and noise.
@@ -171,6 +180,7 @@ impl<'a> Case<'a> {
             declared: self.declared.clone(),
             clean_motions: self.clean_motions.clone(),
             sensors: self.sensors.clone(),
+            plant: self.plant.clone(),
             motions,
             ..*self
         }
@@ -179,18 +189,25 @@ impl<'a> Case<'a> {
     /// Names and texts of the logs: training, validation, and those of the clean robot where a model is held.
     pub fn logs(&self) -> Vec<(&'static str, String)> {
         let mut dice = Dice::new(self.spec.seed, self.attempt, Stream::Sensors);
-        let secrets: Vec<&Secret> = self.secrets.iter().map(|drawn| &drawn.secret).collect();
+        let plant: Vec<&Secret> = self.plant.iter().collect();
+        let secrets: Vec<&Secret> =
+            self.plant.iter().chain(self.secrets.iter().map(|drawn| &drawn.secret)).collect();
         let mut log = |motion: &Motion, secrets: &[&Secret]| {
             let [times, stamps] = self.sensors.times(motion.start, motion.duration, &mut dice);
             let record = record(&self.robot.tree, &self.ordinary, secrets, motion, &times);
-            self.sensors.log(&self.robot.tree, &record, &stamps, &mut dice)
+            match &self.sensors.logging {
+                Some(logging) => {
+                    logging.log(&self.sensors, &self.robot.tree, motion, &record, &stamps, &mut dice)
+                }
+                None => self.sensors.log(&self.robot.tree, &record, &stamps, &mut dice),
+            }
         };
         let mut logs = Vec::new();
         for (name, motion) in ["train_a", "train_b", "validate"].into_iter().zip(&self.motions) {
             logs.push((name, log(motion, &secrets)));
         }
         for (name, motion) in ["clean_a", "clean_b", "clean_c"].into_iter().zip(&self.clean_motions) {
-            logs.push((name, log(motion, &[])));
+            logs.push((name, log(motion, &plant)));
         }
         logs
     }
@@ -215,21 +232,26 @@ fn choose_joints(spec: &Spec, robot: &Robot, dice: &mut Dice) -> Option<Vec<usiz
     Some(joints)
 }
 
-fn draw_motions(robot: &Robot, reach: Option<Reach>, restless: bool, dice: &mut Dice) -> Vec<Motion> {
+/// Two training motions and the one that is held out, of periodic excitation, but for at most one from point to point.
+pub fn draw_motions(robot: &Robot, reach: Option<Reach>, restless: bool, dice: &mut Dice) -> Vec<Motion> {
     // At most one of the three is made of moves from point to point.
     let resting = if restless || dice.chance(0.55) { None } else { Some(dice.index(STARTS.len())) };
     let draw = |(number, start): (usize, f64)| {
         let draw = if resting == Some(number) { Motion::point_to_point } else { Motion::fourier };
-        let mut motion = draw(&robot.tree, dice, start, DURATION, reach);
-        for _ in 0..12 {
-            if peak_effort(robot, &motion) < 0.8 || reach.is_some() {
-                break;
-            }
-            motion.shrink(0.85);
-        }
-        motion
+        tamed(robot, draw(&robot.tree, dice, start, DURATION, reach), reach)
     };
     STARTS.into_iter().enumerate().map(draw).collect()
+}
+
+/// The motion, made so small that the joints can deliver it; one that has to come near a limit is left as it is.
+pub fn tamed(robot: &Robot, mut motion: Motion, reach: Option<Reach>) -> Motion {
+    for _ in 0..12 {
+        if peak_effort(robot, &motion) < 0.8 || reach.is_some() {
+            break;
+        }
+        motion.shrink(0.85);
+    }
+    motion
 }
 
 /// Largest torque of the rigid body over the joint's limit.
@@ -243,7 +265,12 @@ fn peak_effort(robot: &Robot, motion: &Motion) -> f64 {
 }
 
 /// Friction and rotors in proportion to what the rigid body needs; what the secret is, only the secret's joints have.
-fn draw_ordinary(spec: &Spec, robot: &Robot, motions: &[Motion], dice: &mut Dice) -> (Ordinary, Vec<Kind>) {
+pub fn draw_ordinary(
+    spec: &Spec,
+    robot: &Robot,
+    motions: &[Motion],
+    dice: &mut Dice,
+) -> (Ordinary, Vec<Kind>) {
     let joints = robot.joints();
     let mut squares = vec![[0.0; 3]; joints];
     let mut samples = 0.0;
@@ -286,7 +313,8 @@ fn draw_ordinary(spec: &Spec, robot: &Robot, motions: &[Motion], dice: &mut Dice
     (ordinary, declared)
 }
 
-fn survey<'r>(
+/// What is known of the motions.
+pub fn survey<'r>(
     robot: &'r Robot,
     ordinary: &Ordinary,
     motions: &[Motion],
@@ -323,7 +351,7 @@ fn survey<'r>(
 }
 
 /// Whether each log shows the effect for a while: a stop that one of them never touches is not to be found there.
-fn felt_in_every_log(
+pub fn felt_in_every_log(
     secret: &Secret,
     tree: &phiw_dynamics::Tree,
     ordinary: &Ordinary,

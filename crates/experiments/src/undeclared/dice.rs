@@ -15,6 +15,8 @@ pub enum Stream {
     Secret,
     /// Noise of the sensors.
     Sensors,
+    /// What is particular about a situation.
+    Situation,
 }
 
 /// A seeded generator with the draws that cases need.

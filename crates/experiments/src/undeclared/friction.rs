@@ -1,6 +1,7 @@
 //! Frictions of one joint, with and without memory. Shapes are written from the literature, not from the catalogue.
 
 use super::plant::Scene;
+use std::f64::consts::FRAC_2_PI;
 
 /// Step on which frictions with memory are integrated \[s\].
 pub const FINE_STEP: f64 = 2.5e-4;
@@ -12,6 +13,8 @@ pub enum Sign {
     Tanh,
     /// v/√(v² + w²).
     Algebraic,
+    /// 2/π·atan(v/w).
+    Arctan,
 }
 
 impl Sign {
@@ -20,6 +23,7 @@ impl Sign {
         match self {
             Sign::Tanh => (speed / width).tanh(),
             Sign::Algebraic => speed / speed.hypot(width),
+            Sign::Arctan => FRAC_2_PI * (speed / width).atan(),
         }
     }
 }
@@ -110,6 +114,11 @@ fn from_fine(scene: &Scene, joint: usize, integrate: impl Fn(&[f64], &[f64]) -> 
     let torque = integrate(&speeds, &positions);
     let read = |&time: &f64| interpolate(&torque, (time - motion.start) / FINE_STEP);
     scene.times.iter().map(read).collect()
+}
+
+/// Coulomb friction of this size \[N·m, N\] from bristles that bend `distance` far \[rad, m\].
+pub fn lugre_along(scene: &Scene, joint: usize, distance: f64, size: f64) -> Vec<f64> {
+    from_fine(scene, joint, |speeds, _| lugre(speeds, distance, |_| size))
 }
 
 /// Linear between grid points, constant outside.

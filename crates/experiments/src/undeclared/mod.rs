@@ -4,15 +4,18 @@
 //!
 //! Which undeclared effects the tracer finds, with the right joints, and what it invents. A case is one of five robots with one, two, three or no secret effects
 //! (the suites `one`, `two`, `three`, `control`), or with one that the catalogue does not have (`outside`). Noise, jitter, quantisation and the declared
-//! effects are drawn as well. A case follows from its seed alone. Seeds for developing the tracer and seeds for reporting are disjoint.
+//! effects are drawn as well. The wide suites have robots as they come: frictions on all joints, of which mostly nothing is declared, and up to thirteen effects
+//! more (`wide_effects`), right models (`wide_right`), effects that no catalogue has beside others (`wide_outside`), each in fifteen situations, from white
+//! noise to joints that are mostly noise, filters in drives, late velocities, dead bands, and held-out motion that is faster than all that was trained on. A case follows from its seed alone. Seeds for developing the tracer and seeds for reporting are disjoint.
 //!
 //! The tracer is a separate program that sees files only. What is true stays here, or in a `truth.json` beside the folder that it sees. All forms of
 //! effects are written from the literature and not from the tracer's catalogue.
 //!
 //! # How it is run
 //!
-//! `cargo xtask undeclared --all` is the full experiment, 1000 cases of each family of seeds; `--resume` goes on with one that was stopped. `--suite`,
-//! `--kind`, `--robot` and `--count` choose among the cases, `--case SEED` traces one and shows its truth, and `--generate DIR` only writes the files.
+//! `cargo xtask undeclared --all` is the full experiment on the old suites, 1000 cases of each family of seeds, and `--suite wide` that on the wide ones, 1170 cases
+//! of the reporting seeds; `--resume` goes on with one that was stopped. `--suite wide_right --false-name-rates 0.005,0.01,0.05,0.1` calibrates the guard: it passes
+//! `--false-name-rate` to the tracer. `--suite`, `--situation`, `--kind`, `--robot` and `--count` choose among the cases, `--case SEED` traces one and shows its truth, and `--generate DIR` only writes the files.
 //!
 //! # What it prints
 //!
@@ -25,12 +28,15 @@
 //! with one row for each case, and `outcomes/`, what `--resume` goes on from. `--keep DIR` keeps the files of each case.
 
 mod case;
+mod certainty;
 mod dice;
 mod draw;
 mod elasticity;
+mod family;
 mod friction;
 mod kind;
 mod load;
+mod logging;
 mod mechanism;
 mod plant;
 pub(crate) mod report_file;
@@ -40,6 +46,7 @@ mod saturation;
 mod score;
 mod secret;
 mod sensors;
+mod situation;
 mod suite;
 mod table;
 #[cfg(test)]
@@ -48,22 +55,33 @@ pub(crate) mod tracer;
 mod trajectory;
 mod truth;
 mod visibility;
+mod wide;
+mod wide_table;
+#[cfg(test)]
+mod wide_tests;
 mod write;
 
 use anyhow::Context;
 use kind::{Kind, Name};
+use situation::Situation;
 use std::path::PathBuf;
 use suite::{Seeds, Spec, Suite};
 
 /// Arguments of `cargo xtask undeclared`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// All suites, as many cases as the experiment asks for.
+    /// All old suites (or those of --suite), as many cases as the experiment asks for, on both families of seeds.
     #[arg(long)]
     all: bool,
-    /// One suite.
-    #[arg(long, conflicts_with = "all")]
-    suite: Option<Suite>,
+    /// Suites, separated by commas: one, two, three, control, outside (together: old), wide_right, wide_effects, wide_outside (together: wide).
+    #[arg(long, value_name = "SUITE", default_value = "old", value_parser = suites)]
+    suite: std::sync::Arc<Suites>,
+    /// Only cases in this situation (wide suites).
+    #[arg(long)]
+    situation: Option<Situation>,
+    /// Ask the tracer for these rates of false names one after the other, and print asked against observed (suite wide_right).
+    #[arg(long, value_name = "RATE", value_delimiter = ',')]
+    false_name_rates: Vec<f64>,
     /// Only cases with this effect among their secrets.
     #[arg(long)]
     kind: Option<Kind>,
@@ -80,7 +98,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     generate: Option<PathBuf>,
     /// The case of this seed only.
-    #[arg(long, value_name = "SEED", conflicts_with_all = ["all", "suite", "kind", "robot", "count"])]
+    #[arg(long, value_name = "SEED", conflicts_with_all = ["all", "situation", "kind", "robot", "count"])]
     case: Option<u64>,
     /// Keep the files of each case, and its truth, in this folder.
     #[arg(long, value_name = "DIR")]
@@ -97,6 +115,23 @@ pub struct Arguments {
     /// Where `cases.csv` and `score.md` go, and each case's outcome, in a folder for each family of seeds.
     #[arg(long, value_name = "DIR", default_value = "target/undeclared")]
     out: PathBuf,
+}
+
+/// A choice of suites.
+type Suites = Vec<Suite>;
+
+fn suites(text: &str) -> Result<std::sync::Arc<Suites>, String> {
+    let mut suites = Suites::new();
+    for name in text.split(',') {
+        match name {
+            "old" => suites.extend(Suite::OLD),
+            "wide" => suites.extend(Suite::WIDE),
+            name => suites.push(<Suite as clap::ValueEnum>::from_str(name, false).map_err(|_| {
+                format!("no suite {name:?}; there are old and wide, or single ones of them: one, two, three, control, outside, wide_right, wide_effects, wide_outside")
+            })?),
+        }
+    }
+    Ok(std::sync::Arc::new(suites))
 }
 
 /// Runs the task.
@@ -117,8 +152,20 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
         return Ok(());
     }
     let threads = std::thread::available_parallelism().map_or(1, usize::from).div_ceil(arguments.jobs.max(1));
-    let tracer = tracer::Tracer::find(arguments.phiw.as_deref(), threads)?;
-    seeds.into_iter().try_for_each(|seeds| run_and_report(arguments, seeds, &robots, &tracer))
+    let mut tracer = tracer::Tracer::find(arguments.phiw.as_deref(), threads)?;
+    for seeds in seeds {
+        if arguments.false_name_rates.is_empty() {
+            run_and_report(arguments, seeds, &robots, &tracer)?;
+            continue;
+        }
+        let mut runs = Vec::new();
+        for &rate in &arguments.false_name_rates {
+            tracer.false_name_rate = Some(rate);
+            runs.push((rate, run_and_report(arguments, seeds, &robots, &tracer)?));
+        }
+        println!("{}", wide_table::guard(&runs));
+    }
+    Ok(())
 }
 
 /// Runs the cases of one family of seeds, prints the score and writes it.
@@ -127,9 +174,10 @@ fn run_and_report(
     seeds: Seeds,
     robots: &[robot::Robot],
     tracer: &tracer::Tracer,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<Vec<run::Scored>> {
     let specs = specs(arguments, seeds, robots)?;
-    let folder = arguments.out.join(format!("{seeds:?}").to_lowercase());
+    let rate = tracer.false_name_rate.map_or_else(String::new, |rate| format!("-{rate}"));
+    let folder = arguments.out.join(format!("{seeds:?}{rate}").to_lowercase());
     let outcomes = folder.join("outcomes");
     std::fs::create_dir_all(&outcomes).with_context(|| outcomes.display().to_string())?;
     let options = run::Options {
@@ -150,7 +198,7 @@ fn run_and_report(
         let path = folder.join(name);
         std::fs::write(&path, text).with_context(|| path.display().to_string())?;
     }
-    Ok(())
+    Ok(scored)
 }
 
 /// Writes the cases' files and truths, and runs nothing.
@@ -176,14 +224,11 @@ fn specs(arguments: &Arguments, seeds: Seeds, robots: &[robot::Robot]) -> anyhow
         let names: Vec<&str> = robots.iter().map(|robot| robot.name).collect();
         anyhow::ensure!(names.contains(&name.as_str()), "no robot {name:?}; there are {}", names.join(", "));
     }
-    let suites = match arguments.suite {
-        Some(suite) => vec![suite],
-        None => Suite::ALL.to_vec(),
-    };
     let mut specs = Vec::new();
-    for suite in suites {
+    for &suite in arguments.suite.iter() {
         let wanted = |spec: &Spec| {
             arguments.robot.as_ref().is_none_or(|name| robots[spec.robot].name == name)
+                && arguments.situation.is_none_or(|situation| spec.situation == Some(situation))
                 && arguments.kind.is_none_or(|kind| spec.secrets.contains(&Name::Catalogue(kind)))
         };
         let full = suite.full_count();

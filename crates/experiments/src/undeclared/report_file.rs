@@ -14,6 +14,9 @@ pub struct Report {
     pub before: Errors,
     /// What was named, in the order in which it was added.
     pub effects: Vec<Effect>,
+    /// What only polishes the form of another effect.
+    #[serde(default)]
+    pub refinements: Vec<Effect>,
     /// Errors with all that was named.
     pub after: Errors,
 }

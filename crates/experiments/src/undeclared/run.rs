@@ -67,7 +67,7 @@ pub fn run_all(
                         results.push((index, result));
                         let good = |(_, scored): &&(usize, anyhow::Result<Scored>)| {
                             scored.as_ref().is_ok_and(|scored| {
-                                scored.score.as_ref().is_ok_and(|score| score.is_good(scored.truth.suite))
+                                scored.score.as_ref().is_ok_and(|score| score.is_good(&scored.truth))
                             })
                         };
                         let good = results.iter().filter(good).count();
@@ -103,12 +103,12 @@ fn run_one(spec: &Spec, robots: &[Robot], tracer: &Tracer, options: &Options) ->
         Some(folder) => folder.join(spec.seed.to_string()),
         None => temporary.path().join("case"),
     };
-    // The floor is what the noise leaves, and the experiment knows it: the same case without its secrets. A case outside the catalogue, or a control, needs none.
+    // The floor is what the noise leaves, and the experiment knows it: the same case without its secrets.
     let floors = match spec.suite {
-        Suite::One | Suite::Two | Suite::Three => {
+        Suite::One | Suite::Two | Suite::Three | Suite::WideEffects | Suite::WideOutside => {
             tracer.remainder(&case.without_secrets(), &temporary.path().join("twin")).ok()
         }
-        Suite::Control | Suite::Outside => None,
+        Suite::Control | Suite::Outside | Suite::WideRight => None,
     };
     let (score, seconds) = match tracer.run(&case, &folder) {
         Ok(traced) => (Ok(score(&truth, &traced.report, floors.as_ref())), traced.elapsed.as_secs_f64()),

@@ -1,7 +1,7 @@
 //! Holds what the tracer said against what is true.
 
 use super::kind::{Kind, Name};
-use super::report_file::{Error, Report};
+use super::report_file::{Effect, Error, Report};
 use super::suite::Suite;
 use super::truth::{TrueSecret, Truth};
 use serde::{Deserialize, Serialize};
@@ -11,15 +11,19 @@ use std::collections::{BTreeMap, BTreeSet};
 const NEAR_EQUAL: f64 = 0.5;
 /// The error before must exceed the floor by this factor (of squares) for a share of the difference to mean anything.
 const LEAST_EXCESS: f64 = 1.05;
+/// What is left is more than noise where its root mean square exceeds the noise's by this factor, which is the tolerance of the errors of a fit.
+const MORE_THAN_NOISE: f64 = 1.2;
 
 /// What became of one secret.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// Its kind was named with exactly its joints, and nothing else at near-equal merit.
     Right,
     /// It is among the rivals of what was named, or was named with a rival at near-equal merit.
     Rival,
+    /// It was found, but only as a refinement of another effect.
+    Refined,
     /// Its kind was named, on other joints.
     WrongJoints,
     /// Something else was named.
@@ -43,6 +47,15 @@ pub struct Score {
     pub closed: Option<f64>,
     /// The same with the joints' squared errors added as they are \[N·m, N\].
     pub closed_pooled: Option<f64>,
+    /// Of each name as the report has it: its confidence, and whether it is true.
+    #[serde(default)]
+    pub judged: Vec<(f64, bool)>,
+    /// What is left on held-out motion over what the noise leaves there, for the joint where that is most.
+    #[serde(default)]
+    pub left: Option<f64>,
+    /// The report's noise floor over what the noise leaves on held-out motion: lowest and highest joint.
+    #[serde(default)]
+    pub floor: Option<[f64; 2]>,
 }
 
 /// An effect as named: kind and joints.
@@ -56,20 +69,41 @@ struct Named {
 impl Score {
     /// Whether the case's own demand is met: all named right and nothing else, or nothing named where there is nothing, or structure
     /// admitted where nothing of the catalogue explains it.
-    pub fn is_good(&self, suite: Suite) -> bool {
-        match suite {
-            Suite::Control => self.named.is_empty() && self.verdict == "sufficient",
+    pub fn is_good(&self, truth: &Truth) -> bool {
+        match truth.suite {
+            Suite::WideRight => {
+                self.false_names.is_empty() && (!self.named.is_empty() || self.is_sufficient())
+            }
+            Suite::WideOutside => !self.is_explained_away(),
+            Suite::WideEffects => {
+                let found = |(secret, outcome): (&TrueSecret, &Outcome)| {
+                    *outcome == Outcome::Right || !secret.is_material()
+                };
+                truth.secrets.iter().zip(&self.outcomes).all(found) && self.false_names.is_empty()
+            }
+            Suite::Control => self.named.is_empty() && self.is_sufficient(),
             Suite::Outside => matches!(self.verdict.as_str(), "unexplained" | "partly_explained"),
-            _ => {
+            Suite::One | Suite::Two | Suite::Three => {
                 self.outcomes.iter().all(|outcome| *outcome == Outcome::Right) && self.false_names.is_empty()
             }
         }
+    }
+
+    /// Whether the declared model was found right.
+    pub fn is_sufficient(&self) -> bool {
+        self.verdict == "sufficient"
+    }
+
+    /// Whether all was said to be explained although more than noise is left.
+    pub fn is_explained_away(&self) -> bool {
+        matches!(self.verdict.as_str(), "explained" | "sufficient")
+            && self.left.is_none_or(|left| left > MORE_THAN_NOISE)
     }
 }
 
 /// Scores a report. `floors`: RMS that the noise leaves on the validation log, joint by joint; the report's own where `None`.
 pub fn score(truth: &Truth, report: &Report, floors: Option<&BTreeMap<String, f64>>) -> Score {
-    let named = merged(report);
+    let named = merged(&report.effects);
     let mut used = vec![false; named.len()];
     let mut outcomes = vec![Outcome::Missed; truth.secrets.len()];
     // Exact matches first, so that no secret takes a name that is exactly another's.
@@ -86,8 +120,20 @@ pub fn score(truth: &Truth, report: &Report, floors: Option<&BTreeMap<String, f6
             }
         }
     }
-    let false_names: Vec<String> =
-        named.iter().zip(&used).filter(|(_, used)| !**used).map(|(named, _)| named.to_string()).collect();
+    let allowed = |named: &Named| truth.allowed.iter().any(|kind| kind.name() == named.kind);
+    let false_names: Vec<String> = named
+        .iter()
+        .zip(&used)
+        .filter(|(named, used)| !**used && !allowed(named))
+        .map(|(named, _)| named.to_string())
+        .collect();
+    let refined = merged(&report.refinements);
+    for (outcome, secret) in outcomes.iter_mut().zip(&truth.secrets) {
+        let found = |named: &Named| same_kind(secret, named).is_some();
+        if *outcome == Outcome::Missed && refined.iter().any(found) {
+            *outcome = Outcome::Refined;
+        }
+    }
     let mut unclaimed = false_names.len();
     for outcome in &mut outcomes {
         if *outcome == Outcome::Missed && unclaimed > 0 {
@@ -95,6 +141,8 @@ pub fn score(truth: &Truth, report: &Report, floors: Option<&BTreeMap<String, f6
             unclaimed -= 1;
         }
     }
+    // Of a right model the noise leaves what its fit leaves.
+    let known = floors.or((truth.suite == Suite::WideRight).then_some(&report.before.validate.rmse));
     let floors = floors.unwrap_or(&report.noise_floor);
     let closed = |weighted| closed(&report.before.validate, &report.after.validate, floors, weighted);
     Score {
@@ -104,7 +152,40 @@ pub fn score(truth: &Truth, report: &Report, floors: Option<&BTreeMap<String, f6
         verdict: report.verdict.clone(),
         closed: closed(true),
         closed_pooled: closed(false),
+        judged: report.effects.iter().map(|effect| (effect.confidence, is_true(truth, effect))).collect(),
+        left: largest_ratio(left_over(report), known),
+        floor: known.and_then(|known| ratios(&report.noise_floor, known)),
     }
+}
+
+/// Errors of the end on held-out motion.
+fn left_over(report: &Report) -> &BTreeMap<String, f64> {
+    let after = &report.after.validate.rmse;
+    if after.is_empty() { &report.before.validate.rmse } else { after }
+}
+
+/// Lowest and highest of the joints' ratios.
+fn ratios(values: &BTreeMap<String, f64>, floors: &BTreeMap<String, f64>) -> Option<[f64; 2]> {
+    let ratio = |(joint, floor): (&String, &f64)| values.get(joint).map(|value| value / floor);
+    let all: Vec<f64> = floors.iter().filter_map(ratio).collect();
+    (!all.is_empty())
+        .then(|| [all.iter().copied().fold(f64::INFINITY, f64::min), all.iter().copied().fold(0.0, f64::max)])
+}
+
+fn largest_ratio(values: &BTreeMap<String, f64>, floors: Option<&BTreeMap<String, f64>>) -> Option<f64> {
+    Some(ratios(values, floors?)?[1])
+}
+
+/// Whether one name of the report, as it stands there, is true: a part of a family is.
+fn is_true(truth: &Truth, effect: &Effect) -> bool {
+    let joints: BTreeSet<String> = effect.joints.iter().cloned().collect();
+    let part = |secret: &TrueSecret| {
+        secret.kind.name() == effect.kind
+            && effect.kind != Kind::TransmissionCoupling.name()
+            && joints.iter().all(|joint| secret.joints.contains(joint))
+    };
+    let secret = |secret: &TrueSecret| is_secret(secret, &effect.kind, &joints) || part(secret);
+    truth.secrets.iter().any(secret) || truth.allowed.iter().any(|kind| kind.name() == effect.kind)
 }
 
 fn exact(secret: &TrueSecret, named: &Named) -> Option<Outcome> {
@@ -125,7 +206,12 @@ fn same_kind(secret: &TrueSecret, named: &Named) -> Option<Outcome> {
 
 /// Whether kind and joints are the secret's, or another name for literally the same torque.
 fn is_secret(secret: &TrueSecret, kind: &str, joints: &BTreeSet<String>) -> bool {
-    let same = |names: &[String]| names.iter().collect::<BTreeSet<_>>() == joints.iter().collect();
+    // Joints where it is immaterial may be named or not.
+    let same = |names: &[String]| {
+        names.iter().all(|name| joints.contains(name) || secret.optional.contains(name))
+            && joints.iter().all(|joint| names.contains(joint))
+            && (!joints.is_empty() || names.is_empty())
+    };
     // A tilt acts on the base: whatever joints are listed are those that feel it.
     let tilt = secret.kind == Name::Catalogue(Kind::GravityTilt);
     (secret.kind.name() == kind && (tilt || same(&secret.joints)))
@@ -133,9 +219,9 @@ fn is_secret(secret: &TrueSecret, kind: &str, joints: &BTreeSet<String>) -> bool
 }
 
 /// The named effects; one kind named on several joints one after another is one effect, but for couplings, whose joints are pairs.
-fn merged(report: &Report) -> Vec<Named> {
+fn merged(effects: &[Effect]) -> Vec<Named> {
     let mut all: Vec<Named> = Vec::new();
-    for effect in &report.effects {
+    for effect in effects {
         let joints: BTreeSet<String> = effect.joints.iter().cloned().collect();
         let rivals = effect.rivals.iter().map(|rival| {
             let near = rival.confidence >= NEAR_EQUAL * effect.confidence;
@@ -190,6 +276,7 @@ mod tests {
         let secret = |(kind, joints): &(Kind, &[&str])| TrueSecret {
             kind: Name::Catalogue(*kind),
             joints: joints.iter().map(|joint| (*joint).to_owned()).collect(),
+            optional: vec![],
             equivalents: vec![],
             form: String::new(),
             scale: 1.0,
@@ -203,6 +290,8 @@ mod tests {
             held_model: false,
             declared: vec![],
             secrets: secrets.iter().map(secret).collect(),
+            situation: None,
+            allowed: vec![],
             sign_width: 0.01,
             sensors: Sensors {
                 rate: 500.0,
@@ -211,6 +300,7 @@ mod tests {
                 quantum: vec![],
                 angle_noise: 0.0,
                 clock: Clock::Even,
+                logging: None,
             },
             rejected: 0,
         }
@@ -274,6 +364,37 @@ mod tests {
         check(viscous, &with_rival("viscous_friction", "quadratic_friction", 0.4), &[Rival], 0);
         check(viscous, &with_rival("quadratic_friction", "viscous_friction", 0.4), &[Rival], 0);
         check(viscous, &with_rival("quadratic_friction", "joint_spring", 0.4), &[WrongKind], 1);
+    }
+
+    /// A family is right with and without the joints where it is immaterial; a secret that is only a refinement, and a name that the situation makes true,
+    /// are neither right nor false.
+    #[test]
+    fn what_is_immaterial_may_be_named_or_not() {
+        use Outcome::*;
+        let mut truth = truth(&[(Kind::ViscousFriction, &["a", "b", "c"])]);
+        truth.secrets[0].optional = vec!["c".to_owned()];
+        truth.allowed = vec![Kind::TimeDelay];
+        let family = |joints: &str| {
+            format!(r#"{{"kind": "viscous_friction", "joints": [{joints}], "confidence": 0.9}}"#)
+        };
+        let check = |effects: &str, outcome: Outcome, false_names: usize, judged: &[bool]| {
+            let score = score(&truth, &report(effects), None);
+            assert_eq!(score.outcomes, [outcome], "{effects}");
+            assert_eq!(score.false_names.len(), false_names, "{effects}");
+            let found: Vec<bool> = score.judged.iter().map(|(_, is_true)| *is_true).collect();
+            assert_eq!(found, judged, "{effects}");
+        };
+        check(&family(r#""a", "b""#), Right, 0, &[true]);
+        check(&family(r#""a", "b", "c""#), Right, 0, &[true]);
+        check(&format!("{}, {}", family(r#""a""#), family(r#""b", "c""#)), Right, 0, &[true, true]);
+        check(&family(r#""a""#), WrongJoints, 0, &[true]);
+        check(&family(r#""a", "b", "d""#), WrongJoints, 0, &[false]);
+        let delay = family(r#""b""#).replace("viscous_friction", "time_delay");
+        check(&delay, Missed, 0, &[true]);
+        check(&delay.replace("time_delay", "joint_spring"), WrongKind, 1, &[false]);
+        let mut refined = report("");
+        refined.refinements = report(&family(r#""a", "b""#)).effects;
+        assert_eq!(score(&truth, &refined, None).outcomes, [Refined]);
     }
 
     #[test]

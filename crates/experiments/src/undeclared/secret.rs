@@ -1,6 +1,7 @@
 //! A secret: one undeclared effect with its form, its joints and its size.
 
 use super::elasticity::softest;
+use super::family::Family;
 use super::friction::Friction;
 use super::kind::Name;
 use super::load::{HeldBody, WorldForce};
@@ -14,6 +15,8 @@ use phiw_dynamics::Tree;
 pub enum Form {
     /// A friction of one joint.
     Friction(Friction),
+    /// The same on several joints, each in its own size.
+    Family(Family),
     /// A torque of state or time.
     Mechanism(Mechanism),
     /// A force on a link \[N\].
@@ -84,6 +87,13 @@ impl Secret {
                 for &joint in &self.joints {
                     for (sample, added) in friction.torque(scene, joint, self.scale).into_iter().enumerate() {
                         torque[sample * joints + joint] += added;
+                    }
+                }
+            }
+            Form::Family(family) => {
+                for &joint in &self.joints {
+                    for (sample, added) in family.torque(scene, joint).into_iter().enumerate() {
+                        torque[sample * joints + joint] += self.scale * added;
                     }
                 }
             }

@@ -41,6 +41,9 @@ pub struct Sensors {
     pub angle_noise: f64,
     /// The clock.
     pub clock: Clock,
+    /// What else happens to a log of the widened suites.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub logging: Option<super::logging::Logging>,
 }
 
 impl Sensors {
@@ -66,7 +69,7 @@ impl Sensors {
             8 => Clock::JitteredSamples(jitter),
             _ => Clock::JitteredStamps(jitter),
         };
-        Sensors { rate, torque_noise, correlation_time, quantum, angle_noise, clock }
+        Sensors { rate, torque_noise, correlation_time, quantum, angle_noise, clock, logging: None }
     }
 
     /// True times of the samples and the stamps on them, from `start` on.

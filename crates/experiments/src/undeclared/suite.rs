@@ -2,12 +2,14 @@
 
 use super::dice::{Dice, Stream};
 use super::kind::{Kind, Name, Stranger};
+use super::situation::Situation;
 use clap::ValueEnum;
 use serde::Serialize;
 
 /// A family of cases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "snake_case")]
+#[value(rename_all = "snake_case")]
 pub enum Suite {
     /// One undeclared effect.
     One,
@@ -19,6 +21,12 @@ pub enum Suite {
     Control,
     /// One effect that is not in the catalogue.
     Outside,
+    /// Right models in every situation: nothing is to be named.
+    WideRight,
+    /// Frictions on all joints, mostly undeclared, and up to thirteen effects more, in every situation.
+    WideEffects,
+    /// One effect that is not in the catalogue, and up to three that are, in every situation.
+    WideOutside,
 }
 
 /// Development seeds are for looking at; reporting seeds only for reporting.
@@ -33,7 +41,25 @@ pub enum Seeds {
 
 impl Suite {
     /// All suites.
-    pub const ALL: [Suite; 5] = [Suite::One, Suite::Two, Suite::Three, Suite::Control, Suite::Outside];
+    pub const ALL: [Suite; 8] = [
+        Suite::One,
+        Suite::Two,
+        Suite::Three,
+        Suite::Control,
+        Suite::Outside,
+        Suite::WideRight,
+        Suite::WideEffects,
+        Suite::WideOutside,
+    ];
+    /// One to three effects on an otherwise right model, well excited.
+    pub const OLD: [Suite; 5] = [Suite::One, Suite::Two, Suite::Three, Suite::Control, Suite::Outside];
+    /// Robots as they come.
+    pub const WIDE: [Suite; 3] = [Suite::WideRight, Suite::WideEffects, Suite::WideOutside];
+
+    /// Whether its cases have a situation.
+    pub fn is_wide(self) -> bool {
+        Suite::WIDE.contains(&self)
+    }
 
     /// How many cases a full run has.
     pub fn full_count(self) -> usize {
@@ -43,6 +69,9 @@ impl Suite {
             Suite::Three => 50,
             Suite::Control => 300,
             Suite::Outside => 100,
+            Suite::WideRight => 750,
+            Suite::WideEffects => 300,
+            Suite::WideOutside => 120,
         }
     }
 
@@ -71,6 +100,10 @@ pub struct Spec {
     pub held: bool,
     /// Whether several secrets may share a joint.
     pub together: bool,
+    /// What is particular about its noise, drive or motion; in the wide suites only.
+    pub situation: Option<Situation>,
+    /// Whether the frictions of all joints are declared; always, but in the wide suites.
+    pub friction_declared: bool,
 }
 
 impl Spec {
@@ -87,6 +120,8 @@ impl Spec {
             secrets: Vec::new(),
             held: false,
             together: dice.chance(0.3),
+            situation: None,
+            friction_declared: true,
         };
         match suite {
             Suite::One => {
@@ -101,8 +136,49 @@ impl Spec {
                 let strangers = Stranger::value_variants();
                 spec.secrets = vec![Name::Outside(strangers[index % strangers.len()])];
             }
+            Suite::WideRight | Suite::WideEffects | Suite::WideOutside => spec.draw_wide(index, robots, dice),
         }
         Some(spec)
+    }
+
+    /// Situations in turn; the largest robot in one case of ten, since it takes as long as all others.
+    fn draw_wide(&mut self, index: usize, robots: usize, dice: &mut Dice) {
+        let situations = Situation::ALL.len();
+        self.situation = Some(Situation::ALL[index % situations]);
+        self.robot = if dice.chance(0.1) { robots - 1 } else { dice.index((robots - 1).max(1)) };
+        self.friction_declared = match self.suite {
+            Suite::WideEffects => dice.chance(0.3),
+            _ => true,
+        };
+        let strangers = Stranger::value_variants();
+        let count = match self.suite {
+            Suite::WideRight => 0,
+            Suite::WideOutside => {
+                self.secrets = vec![Name::Outside(strangers[(index + index / situations) % strangers.len()])];
+                dice.index(4)
+            }
+            // One with friction alone, then more and more.
+            _ if !self.friction_declared => dice.pick(&[0, 1, 3, 6, 9, 13]),
+            _ => dice.pick(&[1, 3, 6, 9, 13]),
+        };
+        let may_join = |kind: &Kind| {
+            !kind.needs_held_model()
+                && !matches!(
+                    kind,
+                    // Simulated motion and deflected encoders would change what the others are; frictions, rotors and offsets come as families.
+                    Kind::ActuatorSaturation
+                        | Kind::JointElasticity
+                        | Kind::ViscousFriction
+                        | Kind::CoulombFriction
+                        | Kind::RotorInertia
+                        | Kind::TorqueOffset
+                )
+        };
+        let mut choices: Vec<Kind> = Kind::value_variants().iter().copied().filter(may_join).collect();
+        for _ in 0..count {
+            let kind = choices.swap_remove(dice.index(choices.len()));
+            self.secrets.push(Name::Catalogue(kind));
+        }
     }
 
     fn draw_several(&mut self, count: usize, dice: &mut Dice) {

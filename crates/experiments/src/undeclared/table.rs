@@ -20,6 +20,7 @@ pub fn markdown(cases: &[Scored]) -> String {
         match suite {
             Suite::Control => control(&cases, &mut text),
             Suite::Outside => outside(&cases, &mut text),
+            suite if suite.is_wide() => super::wide_table::suite(suite, &cases, &mut text),
             _ => {
                 kinds(&cases, &mut text);
                 if suite != Suite::One {
@@ -30,34 +31,44 @@ pub fn markdown(cases: &[Scored]) -> String {
         by_robot(&cases, &mut text);
         timing(&cases, &mut text);
     }
+    super::wide_table::reliability(cases, &mut text);
     failures(cases, &mut text);
     text
 }
 
-fn scores<'a>(cases: &[&'a Scored]) -> impl Iterator<Item = &'a Score> {
+/// The scores of the cases that the tracer got through.
+pub fn scores<'a>(cases: &[&'a Scored]) -> impl Iterator<Item = &'a Score> {
     let cases: Vec<&'a Scored> = cases.to_vec();
     cases.into_iter().filter_map(|case| case.score.as_ref().ok())
 }
 
 /// For each kind, what became of it.
-fn kinds(cases: &[&Scored], text: &mut String) {
-    const COLUMNS: [Outcome; 5] =
-        [Outcome::Right, Outcome::Rival, Outcome::WrongJoints, Outcome::WrongKind, Outcome::Missed];
-    text.push_str("| kind | n | right | | rival | wrong joints | wrong kind | missed | tracer failed | with a false name |\n");
-    text.push_str("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+pub fn kinds(cases: &[&Scored], text: &mut String) {
+    const COLUMNS: [Outcome; 6] = [
+        Outcome::Right,
+        Outcome::Rival,
+        Outcome::Refined,
+        Outcome::WrongJoints,
+        Outcome::WrongKind,
+        Outcome::Missed,
+    ];
+    text.push_str("| kind | n | right | | rival | refined | wrong joints | wrong kind | missed | tracer failed | with a false name |\n");
+    text.push_str("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
     // Outcomes, failures of the tracer, cases with false names.
-    let mut rows: BTreeMap<Option<Name>, [usize; 7]> = BTreeMap::new();
+    let mut rows: BTreeMap<Option<Name>, [usize; 8]> = BTreeMap::new();
     for case in cases {
-        for (index, secret) in case.truth.secrets.iter().enumerate() {
+        for (index, secret) in
+            case.truth.secrets.iter().enumerate().filter(|(_, secret)| secret.is_material())
+        {
             for key in [Some(secret.kind), None] {
                 let row = rows.entry(key).or_default();
                 match &case.score {
                     Ok(score) => {
                         let column = COLUMNS.iter().position(|outcome| *outcome == score.outcomes[index]);
-                        row[column.unwrap_or(5)] += 1;
-                        row[6] += usize::from(!score.false_names.is_empty());
+                        row[column.unwrap_or(6)] += 1;
+                        row[7] += usize::from(!score.false_names.is_empty());
                     }
-                    Err(_) => row[5] += 1,
+                    Err(_) => row[6] += 1,
                 }
             }
         }
@@ -65,7 +76,7 @@ fn kinds(cases: &[&Scored], text: &mut String) {
     let overall = rows.remove(&None);
     let named = rows.iter().map(|(kind, row)| (kind.map_or_else(String::new, Name::name), *row));
     for (kind, row) in named.chain(overall.map(|row| ("**overall**".to_owned(), row))) {
-        let n: usize = row[..6].iter().sum();
+        let n: usize = row[..7].iter().sum();
         let _ = write!(text, "| {kind} | {n} | {} | {} |", row[0], percent(row[0], n));
         for count in &row[1..] {
             let _ = write!(text, " {count} |");
@@ -73,7 +84,8 @@ fn kinds(cases: &[&Scored], text: &mut String) {
         text.push('\n');
     }
     let closed = |part: fn(&Score) -> Option<f64>| median(scores(cases).filter_map(part).collect());
-    let strict = scores(cases).filter(|score| score.is_good(Suite::One)).count();
+    let strict =
+        cases.iter().filter(|case| case.score.as_ref().is_ok_and(|score| score.is_good(&case.truth))).count();
     let _ = writeln!(
         text,
         "\nAll named right and nothing false: {strict} of {} ({}). Held-out squared error above the noise floor removed, median: {} \
@@ -110,7 +122,8 @@ fn control(cases: &[&Scored], text: &mut String) {
     );
 }
 
-fn outside(cases: &[&Scored], text: &mut String) {
+/// Verdicts on each effect from outside the catalogue.
+pub fn outside(cases: &[&Scored], text: &mut String) {
     let verdicts = ["unexplained", "partly_explained", "sufficient", "explained"];
     text.push_str(
         "| what it was | n | unexplained | partly explained | sufficient | **explained** | tracer failed |\n",
@@ -118,7 +131,7 @@ fn outside(cases: &[&Scored], text: &mut String) {
     text.push_str("|---|--:|--:|--:|--:|--:|--:|\n");
     let mut rows: BTreeMap<Name, [usize; 5]> = BTreeMap::new();
     for case in cases {
-        for secret in &case.truth.secrets {
+        for secret in case.truth.secrets.iter().filter(|secret| matches!(secret.kind, Name::Outside(_))) {
             let row = rows.entry(secret.kind).or_default();
             let verdict =
                 case.score.as_ref().ok().and_then(|score| verdicts.iter().position(|v| *v == score.verdict));
@@ -141,7 +154,7 @@ fn by_robot(cases: &[&Scored], text: &mut String) {
     for case in cases {
         let row = rows.entry(case.truth.robot).or_default();
         row[0] += 1;
-        row[1] += u64::from(case.score.as_ref().is_ok_and(|score| score.is_good(case.truth.suite)));
+        row[1] += u64::from(case.score.as_ref().is_ok_and(|score| score.is_good(&case.truth)));
         row[2] += case.truth.rejected;
     }
     for (robot, [n, good, rejected]) in rows {
@@ -166,7 +179,7 @@ fn failures(cases: &[Scored], text: &mut String) {
     for case in cases {
         let truth = &case.truth;
         let said = match &case.score {
-            Ok(score) if score.is_good(truth.suite) => continue,
+            Ok(score) if score.is_good(truth) => continue,
             Ok(score) => format!("{}; named {}", score.verdict, or_nothing(&score.named)),
             Err(error) => format!("tracer failed: {error}"),
         };
@@ -239,7 +252,8 @@ pub fn csv(cases: &[Scored]) -> String {
     text
 }
 
-fn percent(part: usize, whole: usize) -> String {
+/// A share in per cent.
+pub fn percent(part: usize, whole: usize) -> String {
     format!("{:.1} %", 100.0 * part as f64 / whole.max(1) as f64)
 }
 

@@ -10,6 +10,10 @@ const UNLIMITED_REACH: f64 = 2.8;
 const FADE: f64 = 1.2;
 /// Fastest speed asked of any joint \[rad/s, m/s\].
 const FASTEST: f64 = 3.0;
+/// Shortest and longest rest between moves \[s\].
+const SHORT_RESTS: [f64; 2] = [0.1, 0.7];
+/// The same where joints rest for long.
+const LONG_RESTS: [f64; 2] = [0.8, 3.0];
 
 /// Position, velocity, acceleration of one joint.
 pub type JointState = [f64; 3];
@@ -52,6 +56,13 @@ pub enum JointMotion {
     PointToPoint {
         /// Beginning and end in time, start and goal, ascending in time.
         moves: Vec<[f64; 4]>,
+    },
+    /// Another motion, so many times as slow.
+    Slowed {
+        /// The motion.
+        motion: Box<JointMotion>,
+        /// How many times.
+        factor: f64,
     },
     /// Simulated on an even grid of this step \[s\].
     Simulated {
@@ -98,6 +109,49 @@ impl Motion {
         duration: f64,
         reach: Option<Reach>,
     ) -> Self {
+        Self::moves(tree, dice, start, duration, reach, SHORT_RESTS)
+    }
+
+    /// Moves from pose to pose with long rests: all joints together, or one after the other in their own time.
+    pub fn with_rests(
+        tree: &Tree,
+        dice: &mut Dice,
+        start: f64,
+        duration: f64,
+        reach: Option<Reach>,
+        together: bool,
+    ) -> Self {
+        let mut motion = Self::moves(tree, dice, start, duration, reach, LONG_RESTS);
+        if !together {
+            for joint in 0..tree.joint_count() {
+                let mut own = Self::moves(tree, dice, start, duration, reach, LONG_RESTS);
+                motion.joints[joint] = own.joints.swap_remove(joint);
+            }
+        }
+        motion
+    }
+
+    /// A periodic excitation of two to five harmonics of 0.2 to 0.5 Hz.
+    pub fn periodic(tree: &Tree, dice: &mut Dice, start: f64, duration: f64, reach: Option<Reach>) -> Self {
+        let fundamental = dice.uniform(0.2, 0.5);
+        let highest = fundamental * (2 + dice.index(4)) as f64;
+        let joints = (0..tree.joint_count())
+            .map(|joint| {
+                let reach = reach.filter(|reach| reach.joint == joint);
+                fourier_joint(room(tree, joint), dice, fundamental, highest, duration, reach)
+            })
+            .collect();
+        Motion { start, duration, joints, excess: None }
+    }
+
+    fn moves(
+        tree: &Tree,
+        dice: &mut Dice,
+        start: f64,
+        duration: f64,
+        reach: Option<Reach>,
+        rests: [f64; 2],
+    ) -> Self {
         let rooms: Vec<Room> = (0..tree.joint_count()).map(|joint| room(tree, joint)).collect();
         let pose = |dice: &mut Dice, number: usize| -> Vec<f64> {
             let inside = |(joint, room): (usize, &Room)| match reach {
@@ -128,11 +182,17 @@ impl Motion {
             for (moves, (from, to)) in joints.iter_mut().zip(from.iter().zip(&to)) {
                 moves.push([clock, end, *from, *to]);
             }
-            clock = end + dice.uniform(0.1, 0.7);
+            clock = end + dice.uniform(rests[0], rests[1]);
             from = to;
         }
         let joints = joints.into_iter().map(|moves| JointMotion::PointToPoint { moves }).collect();
         Motion { start, duration, joints, excess: None }
+    }
+
+    /// The same motion `factor` times as slow: as much of it as there is time for.
+    pub fn slow_down(&mut self, factor: f64) {
+        let slowed = |motion: &JointMotion| JointMotion::Slowed { motion: Box::new(motion.clone()), factor };
+        self.joints = self.joints.iter().map(slowed).collect();
     }
 
     /// The same motion around the same place, `factor` times as wide.
@@ -147,7 +207,7 @@ impl Motion {
                         *to = center + factor * (*to - center);
                     }
                 }
-                JointMotion::Simulated { .. } => {}
+                JointMotion::Slowed { .. } | JointMotion::Simulated { .. } => {}
             }
         }
     }
@@ -176,6 +236,10 @@ impl JointMotion {
                     }
                     None => [moves.first().map_or(0.0, |first| first[2]), 0.0, 0.0],
                 }
+            }
+            JointMotion::Slowed { motion, factor } => {
+                let [q, v, a] = motion.state(time / factor, duration);
+                [q, v / factor, a / (factor * factor)]
             }
             JointMotion::Simulated { step, states } => hermite(states, time / step, *step),
         }

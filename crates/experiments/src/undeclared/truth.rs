@@ -4,6 +4,7 @@ use super::case::Case;
 use super::kind::{Kind, Name};
 use super::mechanism::Mechanism;
 use super::secret::{Form, Secret};
+use super::situation::Situation;
 use phiw_dynamics::{JointType, Tree, Vec3};
 use serde::Serialize;
 
@@ -22,6 +23,12 @@ pub struct Truth {
     pub declared: Vec<String>,
     /// What nobody declared.
     pub secrets: Vec<TrueSecret>,
+    /// What is particular about the case, in the wide suites.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub situation: Option<Situation>,
+    /// Names that are not false though they are no secret: the situation makes them true.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub allowed: Vec<Kind>,
     /// Speed over which signs are smoothed \[rad/s\].
     pub sign_width: f64,
     /// Sensors and sampling.
@@ -37,6 +44,9 @@ pub struct TrueSecret {
     pub kind: Name,
     /// Names of its joints; none for a tilt of the base.
     pub joints: Vec<String>,
+    /// Those of them where it is too small or too uncertain to be missed if it is not named.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub optional: Vec<String>,
     /// Other names, with their joints, for literally the same torques.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub equivalents: Vec<(Kind, Vec<String>)>,
@@ -56,6 +66,7 @@ impl Truth {
         let secret = |drawn: &super::case::Drawn| TrueSecret {
             kind: drawn.secret.name,
             joints: case.robot.names(&drawn.secret.joints),
+            optional: case.robot.names(&optional(drawn)),
             equivalents: equivalents(case, &drawn.secret),
             form: shortened(format!("{:?}", drawn.secret.form)),
             scale: drawn.secret.scale,
@@ -69,10 +80,26 @@ impl Truth {
             held_model: case.spec.held,
             declared: case.declared.iter().map(|kind| kind.name()).collect(),
             secrets: case.secrets.iter().map(secret).collect(),
+            situation: case.spec.situation,
+            allowed: match case.spec.situation {
+                Some(Situation::LateFilter) => vec![Kind::TimeDelay],
+                _ => Vec::new(),
+            },
             sign_width: case.ordinary.width,
             sensors: case.sensors.clone(),
             rejected: case.rejected,
         }
+    }
+}
+
+fn optional(drawn: &super::case::Drawn) -> Vec<usize> {
+    drawn.secret.joints.iter().copied().filter(|joint| !drawn.material.contains(joint)).collect()
+}
+
+impl TrueSecret {
+    /// Whether a tracer that does not name it has missed something.
+    pub fn is_material(&self) -> bool {
+        self.joints.is_empty() || self.optional.len() < self.joints.len()
     }
 }
 

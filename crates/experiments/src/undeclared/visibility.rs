@@ -69,7 +69,13 @@ impl Absorber {
         }
     }
 
-    fn add_shape(&mut self, records: &[Record], joint: usize, shape: &dyn Fn(&States, usize, usize) -> f64) {
+    /// Also a shape of a joint's state, on that joint's torque.
+    pub fn add_shape(
+        &mut self,
+        records: &[Record],
+        joint: usize,
+        shape: &dyn Fn(&States, usize, usize) -> f64,
+    ) {
         let joints = self.joints;
         let column = records.iter().flat_map(|record| {
             let value = move |row: usize| {
@@ -81,8 +87,8 @@ impl Absorber {
         self.add(column);
     }
 
-    /// Gram-Schmidt, twice, which is enough (Giraud et al. 2005).
-    fn add(&mut self, column: Vec<f64>) {
+    /// Also this column, samples × joints. Gram-Schmidt, twice, which is enough (Giraud et al. 2005).
+    pub fn add(&mut self, column: Vec<f64>) {
         let mut column = self.weighted(column);
         let before = norm(&column);
         for _ in 0..2 {
@@ -121,6 +127,15 @@ impl Absorber {
                 / samples as f64
         };
         (0..self.joints).map(mean_square).fold(0.0, f64::max).sqrt()
+    }
+
+    /// What is left of a column, weighted by one over the noise.
+    pub fn residual(&self, column: Vec<f64>) -> Vec<f64> {
+        let mut column = self.weighted(column);
+        for _ in 0..2 {
+            self.project_out(&mut column);
+        }
+        column
     }
 
     /// No declared model: what is held absorbs nothing.
