@@ -7,6 +7,7 @@ use phiw_curriculum::*;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{AnalyticBackend, Tree, World};
 use phiw_plant::{Effect, Friction, Gains, MultiSine, Reference, Sensors, Timing};
+use phiw_simulated_robot::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
