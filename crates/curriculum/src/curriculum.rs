@@ -6,11 +6,12 @@ use crate::experiment::check_noise;
 use crate::growth::Found;
 use crate::planner::{Belief, MeasuredSoFar, Policy, plan};
 use crate::random::{Purpose, random};
+use crate::selection::SmallestCondition;
 use crate::triangle::Triangle;
 use crate::{
-    Candidates, Constraint, CurriculumError, EndCriterion, Estimate, Estimator, Evidence, Experiment, Growth,
-    IterationRecord, Measured, MotionDataset, NoneAllowed, Plan, Relaxation, Rivalry, Robot, RobotModel, Run,
-    Selection,
+    Candidates, ConditionRelaxation, Constraint, CurriculumError, EndCriterion, Estimate, Estimator,
+    Evidence, Experiment, FixedCount, Growth, IterationRecord, Measured, MotionDataset, NoneAllowed, Plan,
+    Relaxation, Rivalry, Robot, RobotModel, Run, Selection,
 };
 use phiw_identification::EffectSpec;
 use rand::SeedableRng;
@@ -72,7 +73,34 @@ struct Learning {
     estimate: Estimate,
 }
 
-impl Curriculum<'_> {
+impl<'a> Curriculum<'a> {
+    /// A curriculum with the paper's choices in everything that is not asked for here: the smallest cond (11), relaxed with cond (20), five iterations, no growth. Set what should be
+    /// otherwise.
+    ///
+    /// A plan is refused where no motion keeps the robot standing; the paper's experiments run the least violation instead ([`CurriculumSettings::none_allowed`]).
+    pub fn new(
+        robot: &'a Robot,
+        (dataset, candidates): (&'a MotionDataset, &'a Candidates),
+        experiment: &'a dyn Experiment,
+        constraint: &'a dyn Constraint,
+        estimator: &'a dyn Estimator,
+    ) -> Self {
+        Curriculum {
+            robot,
+            dataset,
+            candidates,
+            experiment,
+            selection: &SmallestCondition,
+            constraint,
+            relaxation: &ConditionRelaxation::OF_THE_PAPER,
+            estimator,
+            growth: None,
+            end: &FixedCount(5),
+            rows_at: RowsAt::default(),
+            settings: CurriculumSettings::default(),
+        }
+    }
+
     /// Goes on with a run until it ends. `saved` is called after each iteration, with the run as it is then.
     ///
     /// # Errors
@@ -302,6 +330,7 @@ impl Curriculum<'_> {
             torque_uncertainties: &torque_uncertainties,
             first_alpha: run.first_alpha,
             excluded: &run.excluded,
+            history: &run.history,
         };
         plan(&belief, &measured, &self.policy(run.seed)).map(Some)
     }

@@ -188,7 +188,7 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
-        source: phiw_plant::SupportError,
+        source: phiw_zmp::FeetError,
     },
     /// Feet that give no support.
     #[error("{}: {source}", path.display())]

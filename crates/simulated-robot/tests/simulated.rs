@@ -11,6 +11,7 @@ use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{AnalyticBackend, BackendError, SimulationBackend, Tree, World};
 use phiw_identification::EffectSpec;
 use phiw_plant::{Derivatives, Effect, Friction, Gains, Sensors, Timing};
+use phiw_simulated_robot::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
