@@ -1,17 +1,12 @@
 //! Experiments and set-up of the workspace: `cargo xtask <task>`.
 
-mod environment;
+mod consumers;
 mod mujoco;
-mod oracle;
-mod paper;
-mod plant_experiment;
-mod retarget;
-mod run;
 mod test;
 mod torture;
-mod undeclared;
 
 use clap::{Parser, Subcommand};
+use phiw_experiments::{oracle, paper, plant, retarget, run, synthetic_log, undeclared};
 use std::process::ExitCode;
 
 #[derive(Parser)]
@@ -23,39 +18,64 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// The best main job so far, on an example log that is made on the spot: identify, with report.
+    /// The main job: a curriculum with the loop closed, then `phiw explain`, on motions and logs that are made on the spot; with reports.
     Run(run::Arguments),
     /// A log as long as wanted, to see that memory does not grow with it.
-    SyntheticLog(run::synthetic_log::Arguments),
-    /// Retargeting: figure 9 of the paper, whole databases, and a page with pictures of them.
+    SyntheticLog(synthetic_log::Arguments),
+    /// Retargeting on one page: whole databases, a film of person and robot, mink on the same markers, figure 9 of the paper.
     Retarget(retarget::Arguments),
     /// All checks of the workspace, and the count of tests.
     Test(test::Arguments),
-    /// Hostile inputs on the release binary: a table of what came of each class.
+    /// Hostile inputs, kills and concurrent runs on the release binary: a table of what came of each class.
     Torture(torture::Arguments),
     /// Fetch MuJoCo's library into the user's cache folder, with Python's pip.
     Mujoco(mujoco::Arguments),
-    /// Compare with Pinocchio, installed from PyPI into a private environment.
+    /// Compare dynamics with Pinocchio and C3D files with ezc3d, installed from PyPI into a private environment.
     Oracle(oracle::Arguments),
     /// Robot logs with effects that nobody declared: generate, trace with `phiw explain`, score.
     Undeclared(undeclared::Arguments),
     /// The experiments of the paper's section 5, resumable, on one machine or many.
     Paper(paper::Arguments),
     /// Robots in physics engines with one secret each, tracked poorly: log, trace with `phiw explain`, score.
-    Plant(plant_experiment::Arguments),
+    Plant(plant::Arguments),
 }
 
 fn main() -> anyhow::Result<ExitCode> {
     match Arguments::parse().task {
-        Task::Run(arguments) => run::command(&arguments),
-        Task::SyntheticLog(arguments) => run::synthetic_log::command(&arguments),
+        Task::Run(arguments) => {
+            mujoco::fetch_or_go_on_without();
+            run::command(&arguments).map(|()| ExitCode::SUCCESS)
+        }
+        Task::SyntheticLog(arguments) => synthetic_log::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Retarget(arguments) => retarget::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Test(arguments) => test::command(&arguments),
         Task::Torture(arguments) => torture::command(&arguments),
         Task::Mujoco(arguments) => mujoco::command(&arguments),
         Task::Oracle(arguments) => oracle::command(&arguments),
-        Task::Paper(arguments) => paper::command(&arguments).map(|()| ExitCode::SUCCESS),
-        Task::Plant(arguments) => plant_experiment::command(&arguments).map(|()| ExitCode::SUCCESS),
+        Task::Paper(arguments) => {
+            if arguments.needs_mujoco() {
+                mujoco::fetch_or_go_on_without();
+            }
+            paper::command(&arguments).map(|()| ExitCode::SUCCESS)
+        }
+        Task::Plant(arguments) => plant::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Undeclared(arguments) => undeclared::command(&arguments).map(|()| ExitCode::SUCCESS),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Arguments;
+    use clap::CommandFactory;
+
+    /// Units in doc comments are escaped for rustdoc. `cargo xtask plant --help` showed the escapes: `\[s\]`.
+    #[test]
+    fn help_has_no_escapes_of_rustdoc() {
+        let mut command = Arguments::command();
+        command.build();
+        for task in command.get_subcommands_mut() {
+            let help = task.render_long_help().to_string();
+            assert!(!help.contains('\\') && !help.contains("[`"), "{help}");
+        }
     }
 }

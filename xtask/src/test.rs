@@ -2,8 +2,9 @@
 
 mod tally;
 
-use crate::{environment, mujoco};
+use crate::{consumers, mujoco};
 use anyhow::Context;
+use phiw_experiments::environment;
 use std::io::{BufRead, BufReader};
 use std::process::{ExitCode, Stdio};
 use tally::Tally;
@@ -59,16 +60,25 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     }
     for check in checks {
         if !passes(check)? {
-            failed.push(check.arguments);
+            failed.push(named(check.arguments));
         }
     }
-    let (mut tally, passed) = run_tests()?;
+    let mut tally = Tally::default();
     tally.add_failures(failed.len() as u64);
-    if !passed {
-        failed.push(TESTS);
+    if !run_tests(TESTS, &mut tally)? {
+        failed.push(named(TESTS));
     }
-    for arguments in &failed {
-        println!("failed: cargo {}", arguments.join(" "));
+    let folder = tempfile::Builder::new().prefix("phiw-consumers-").tempdir()?;
+    let problems = consumers::generate(folder.path())?;
+    tally.add_failures(problems.len() as u64);
+    failed.extend(problems);
+    let consumers = consumers::arguments(folder.path())?;
+    let consumers: Vec<&str> = consumers.iter().map(String::as_str).collect();
+    if !run_tests(&consumers, &mut tally)? {
+        failed.push(named(&consumers));
+    }
+    for problem in &failed {
+        println!("failed: {problem}");
     }
     if unchecked_dependencies {
         println!(
@@ -96,15 +106,15 @@ fn passes(check: &Check) -> anyhow::Result<bool> {
     Ok(status.success())
 }
 
-/// Runs the tests, passing on their output line by line, and counts; whether all is well.
-fn run_tests() -> anyhow::Result<(Tally, bool)> {
-    announce(TESTS);
+/// Runs tests, passing on their output line by line, and counts; whether all is well.
+fn run_tests(arguments: &[&str], tally: &mut Tally) -> anyhow::Result<bool> {
+    announce(arguments);
     let mut child = environment::cargo()?
-        .args(TESTS)
+        .args(arguments)
         .stdout(Stdio::piped())
         .spawn()
         .context("cargo cannot be started")?;
-    let mut tally = Tally::default();
+    let failures = tally.failures();
     if let Some(output) = child.stdout.take() {
         for line in BufReader::new(output).split(b'\n') {
             let line = line.context("the output of the tests cannot be read")?;
@@ -114,12 +124,16 @@ fn run_tests() -> anyhow::Result<(Tally, bool)> {
         }
     }
     let passed = child.wait().context("cargo test did not end")?.success();
-    if !passed && !tally.has_failures() {
+    if !passed && tally.failures() == failures {
         tally.add_failures(1); // tests that do not compile, or a binary that crashed
     }
-    Ok((tally, passed))
+    Ok(passed)
 }
 
 fn announce(arguments: &[&str]) {
-    println!("\n=== cargo {}", arguments.join(" "));
+    println!("\n=== {}", named(arguments));
+}
+
+fn named(arguments: &[&str]) -> String {
+    format!("cargo {}", arguments.join(" "))
 }

@@ -1,7 +1,7 @@
 //! `cargo xtask torture`: hostile inputs, kills and concurrent runs on the release binary, and tables of what came of them.
 
-use crate::environment;
 use anyhow::{Context, ensure};
+use phiw_experiments::environment;
 use phiw_torture::hostile::{self, ClassScore, Ground, Judgement};
 use phiw_torture::interrupted::{kill, pair, subjects};
 use std::path::{Path, PathBuf};

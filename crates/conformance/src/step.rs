@@ -4,6 +4,7 @@ use crate::contract::state_of;
 use crate::measured::{largest_difference, worse};
 use crate::motion::{Controller, Swing, Target};
 use crate::{Builder, Failure, Measured};
+use phiw_dynamics::dense::dot;
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, random_state};
 use phiw_dynamics::{
     AnalyticBackend, DimensionError, DynamicsBackend, Placement, SimulationBackend, Tree, Workspace, World,
@@ -172,8 +173,4 @@ pub(crate) fn center_of_mass(
     tree.center_of_mass_jacobian(&placements, &mut jacobian)?;
     let velocity = jacobian.chunks_exact(v.len()).map(|row| dot(row, v)).collect();
     Ok((tree.center_of_mass(&placements)?.0, velocity))
-}
-
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -1,4 +1,6 @@
 //! Whether the positions of a motion go from row to row as its velocities say.
+//!
+//! A check of [`Motion`], which asks for it when it is read from a log: the two files name each other because they are one type, and stand apart for length.
 
 use crate::{CurriculumError, Motion};
 

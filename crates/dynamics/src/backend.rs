@@ -11,7 +11,7 @@ pub enum BackendError {
     Dimension(#[from] DimensionError),
     /// The world does not fit the robot.
     #[error(transparent)]
-    World(crate::WorldError),
+    World(#[from] crate::WorldError),
     /// A number given to the backend is NaN or infinite.
     #[error("{what} has an element that is not a finite number")]
     NotFinite {

@@ -1,13 +1,12 @@
 //! An identified model as one thing: rigid body, effects, what it was fitted to; written to `model.json` and read back.
 
 use crate::{
-    Design, Effect, EffectCatalogue, EffectError, EffectSpec, Fit, IdentificationError, ReferenceModel,
-    check_size_of_robot,
+    Design, Effect, EffectCatalogue, EffectError, EffectSpec, FactorRows, Fit, IdentificationError,
+    ReferenceModel, check_size_of_robot,
 };
 use phiw_dynamics::{PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree};
 use phiw_limits::Limits;
 use phiw_regressor::BaseParameters;
-use phiw_regressor::factor::Factor;
 use serde::{Deserialize, Serialize};
 
 /// Version of the file's form.
@@ -74,48 +73,6 @@ pub struct EffectParameters {
     pub parameters: Vec<NamedParameter>,
     /// Whether the user declared it; else it was found.
     pub declared: bool,
-}
-
-/// An upper triangular factor, row by row from the diagonal on.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct FactorRows {
-    /// The parameters that its columns stand for; the right-hand side follows them.
-    pub parameters: Vec<usize>,
-    /// Number of rows of Φ.
-    pub rows: u64,
-    /// The entries.
-    pub entries: Vec<f64>,
-}
-
-impl FactorRows {
-    fn of(factor: &Factor, parameters: Vec<usize>) -> Self {
-        let size = factor.columns();
-        let entries =
-            (0..size).flat_map(|row| (row..size).map(move |column| factor.entry(row, column))).collect();
-        FactorRows { parameters, rows: factor.rows(), entries }
-    }
-
-    /// The factor itself.
-    ///
-    /// # Errors
-    /// The number of entries is not that of a triangle.
-    pub fn factor(&self) -> Result<Factor, IdentificationError> {
-        let size = self.parameters.len() + 1;
-        if self.entries.len() != size * (size + 1) / 2 {
-            let message =
-                format!("the model's factor has {} entries, but {} columns", self.entries.len(), size);
-            return Err(IdentificationError::Model(message));
-        }
-        let mut entries = self.entries.iter();
-        let mut rows = vec![0.0; size * size];
-        for row in 0..size {
-            rows[row * size + row..(row + 1) * size]
-                .iter_mut()
-                .zip(&mut entries)
-                .for_each(|(to, from)| *to = *from);
-        }
-        Ok(Factor::of_rows(size, &rows)?.standing_for(self.rows))
-    }
 }
 
 /// Standard deviations that the logs could not tell are `null`.

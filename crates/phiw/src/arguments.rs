@@ -19,6 +19,8 @@ pub enum Command {
     Identify(IdentifyArguments),
     /// The same, then close the loop: find what the model lacks, add it, and report the error before and after.
     Explain(ExplainArguments),
+    /// Say what is in logs before anything is fitted: late velocities, torques that are missing or clipped, units, clocks, and what to do about it.
+    Check(CheckArguments),
     /// Turn marker recordings of people into motions of the robot: for each a log without torques, and what it is worth.
     Retarget(RetargetArguments),
     /// Choose the motion that a real robot should run next, given what has been measured: one iteration of the curriculum.
@@ -31,6 +33,7 @@ impl Command {
         match self {
             Command::Identify(identify) => identify.session.quiet,
             Command::Explain(explain) => explain.session.quiet,
+            Command::Check(check) => check.quiet,
             Command::Retarget(retarget) => retarget.quiet,
             Command::Next(next) => next.quiet,
         }
@@ -57,6 +60,39 @@ pub struct ExplainArguments {
     /// Trace again on this many bootstrap draws of the training motion, and say how often each effect is named.
     #[arg(long, value_name = "COUNT", default_value_t = 0)]
     pub draws: u32,
+}
+
+/// Arguments of `phiw check`.
+#[derive(Clone, Debug, Args)]
+pub struct CheckArguments {
+    /// The robot's URDF.
+    #[arg(long, value_name = "ROBOT.urdf")]
+    pub urdf: PathBuf,
+    /// Logs (CSV).
+    #[arg(value_name = "LOG", required = true)]
+    pub logs: Vec<PathBuf>,
+    /// Joints of the URDF that do not move, at 0 or at a value (rad, m); they need no column in the log.
+    #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
+    pub hold: Vec<(String, f64)>,
+    /// Folder for check.json, the same as numbers; it is made if it is absent.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print nothing but errors.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+impl CheckArguments {
+    /// The same as a session on the logs.
+    pub fn session(&self) -> SessionArguments {
+        SessionArguments {
+            urdf: self.urdf.clone(),
+            train: self.logs.clone(),
+            hold: self.hold.clone(),
+            quiet: self.quiet,
+            ..SessionArguments::default()
+        }
+    }
 }
 
 /// Arguments of `phiw retarget`.

@@ -11,13 +11,13 @@ use crate::output::take_folder;
 use crate::report_json::{by_joint, report_json};
 use crate::session::Session;
 use crate::{Error, summary};
+use phiw_effects::SignalRanges;
 use phiw_identification::{Data, Identified, Model, TorqueError, identify};
 use phiw_report::ReportJson;
 use phiw_report::json::{
     DrawsJson, EffectJson, EvidenceJson, JointMap, NamedInDrawsJson, ParameterJson, ProgramJson,
     RemainingJson, RivalJson, TorqueErrors, Verdict,
 };
-use phiw_residual::SignalRanges;
 use phiw_residual::trace::{self, HeldModel, TraceInput, TraceOptions, Tracing, trace};
 use phiw_result_folder::{Disk, replace_folder};
 use std::fmt::Write;

@@ -2,7 +2,7 @@
 
 pub mod analysis;
 pub mod arguments;
-mod consistency;
+pub mod check;
 pub mod console;
 mod date;
 mod draws;

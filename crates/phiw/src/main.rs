@@ -11,7 +11,14 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     // A fault of ours is one message and status 1, like any other failure that is not the input's.
     std::panic::set_hook(Box::new(|fault| {
-        console::say("error: phiw itself is at fault, please report it: ", &fault.to_string());
+        // A library's way of saying that the system gave no memory.
+        match fault.to_string().contains("AllocError") {
+            true => console::say(
+                "error: ",
+                "there is not enough memory; give phiw more (ulimit -v), or hold joints (--hold)",
+            ),
+            false => console::say("error: phiw itself is at fault, please report it: ", &fault.to_string()),
+        }
     }));
     std::panic::catch_unwind(|| threads::with(|| run(&arguments))).unwrap_or(ExitCode::FAILURE)
 }
@@ -56,6 +63,10 @@ fn told(command: &Command, console: &Console) -> Result<Told, Error> {
         Command::Explain(arguments) => {
             let outcome = phiw::explain::explain(arguments, console)?;
             Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
+        }
+        Command::Check(arguments) => {
+            let outcome = phiw::check::check(arguments, console)?;
+            Told { summary: outcome.summary, warnings: Vec::new(), failures: no_failures }
         }
         Command::Retarget(arguments) => {
             let outcome = phiw::retarget::retarget(arguments, console)?;

@@ -21,6 +21,7 @@ pub fn all(session: &Session, identified: &Identified) -> Vec<String> {
         .collect();
     warnings.extend(twice_in_training(logs.training()));
     warnings.extend(logs.surveys().iter().flat_map(of_log));
+    warnings.extend(crate::check::warnings(&session.tree, logs.surveys()));
     if identified.fit.standard_deviations.iter().all(|std| std.is_nan()) {
         warnings.push(
             "standard deviations could not be estimated: without one twelfth of the training motion some parameter is not determined at all; record more motion"
@@ -66,7 +67,7 @@ fn twice_in_training(training: &[Survey]) -> Vec<String> {
 const COLUMNS_NAMED: usize = 10;
 
 /// Skipped rows, jumps, short stretches, unknown columns.
-fn of_log(survey: &Survey) -> Vec<String> {
+pub fn of_log(survey: &Survey) -> Vec<String> {
     let name = file_name(&survey.path);
     let gap = |gap: &phiw_telemetry::GapCount| {
         let (count, line) = (gap.count, gap.first_line);
@@ -103,7 +104,7 @@ fn of_log(survey: &Survey) -> Vec<String> {
     }
     for joint in &survey.joints {
         let contradicts = |column: &str, derivative: &Option<phiw_telemetry::DerivativeSurvey>| {
-            let derivative = derivative.filter(|derivative| !derivative.plausible())?;
+            let derivative = derivative.filter(|derivative| !derivative.is_derivative())?;
             let how = match derivative.agreement.is_finite() && derivative.min < derivative.max {
                 true => format!("their derivative is {:.3} times as large", derivative.agreement),
                 false => "it is constant".to_owned(),

@@ -4,7 +4,7 @@ use crate::error::check_value;
 use crate::joint_drive::JointDrive;
 use crate::motion::Motion;
 use crate::robot_as_built::robot_as_built;
-use crate::{ComputedTorque, Coupling, Effect, PlantError, Reaction, Reference, Run, Sensors};
+use crate::{ComputedTorque, Coupling, Effect, PlantError, PlantRun, Reaction, Reference, Sensors};
 use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -182,7 +182,7 @@ impl Plant {
         reference: &dyn Reference,
         duration_s: f64,
         random: &mut impl Rng,
-    ) -> Result<Run, PlantError> {
+    ) -> Result<PlantRun, PlantError> {
         check_value(|| "the duration".to_owned(), duration_s, "> 0", |value| value > 0.0)?;
         let seed: u64 = random.random();
         let stream = |number| {
@@ -202,7 +202,7 @@ impl Plant {
             let component = |axis| history.mean(&history.wrench, 6, axis, from, to);
             Reaction::of_wrench([0, 1, 2, 3, 4, 5].map(component))
         };
-        Ok(Run {
+        Ok(PlantRun {
             reactions: windows.iter().map(reaction).collect(),
             recording,
             fell_at_s,

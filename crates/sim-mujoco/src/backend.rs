@@ -1,12 +1,12 @@
 //! The trait over MuJoCo.
 
-use crate::MujocoError;
 use crate::base::{self, Motion};
 use crate::body_kinematics::body_joints;
 use crate::error::NAME;
 use crate::inertial::PrincipalInertia;
 use crate::mjcf::{feet_of_corners, mjcf};
 use crate::simulation::{Simulation, Sizes};
+use crate::{Integrator, MujocoError};
 use phiw_dynamics::{BackendError, BodyJoint, DynamicsBackend, SimulationBackend, Tree, World, check_size};
 use std::cell::RefCell;
 
@@ -14,16 +14,6 @@ use std::cell::RefCell;
 const QUATERNION_TOLERANCE: f64 = 1e-6;
 /// A coordinate, speed or acceleration beyond this has diverged (MuJoCo's `mjMAXVAL`).
 const DIVERGED: f64 = 1e10;
-
-/// How a step goes on in time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Integrator {
-    /// The classical Runge-Kutta method of order four.
-    #[default]
-    RungeKutta4,
-    /// Implicit in the velocity, of order one: no cheaper for a robot, but steady where velocities make it stiff.
-    Implicit,
-}
 
 /// A robot in MuJoCo.
 ///

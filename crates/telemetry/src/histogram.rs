@@ -57,6 +57,13 @@ impl Histogram {
         edge(BINS)
     }
 
+    /// Values from the bin of `x` on.
+    pub fn from(&self, x: f64) -> u64 {
+        let leading = (x.abs().to_bits() >> (52 - BITS)) as i64;
+        let first = (1023 - OCTAVES) << BITS;
+        self.bins[(leading - first).clamp(0, BINS as i64 - 1) as usize..].iter().sum()
+    }
+
     pub fn median(&self) -> f64 {
         self.quantile(0.5)
     }

@@ -1,7 +1,10 @@
 //! What a log shows of one joint.
 
+use crate::alignment::{Alignment, AlignmentCollector};
 use crate::clock::{stamped_misfit, uniform_misfit};
+use crate::findings::CheckSettings;
 use crate::histogram::Histogram;
+use crate::signal_shape::{ShapeCollector, SignalShape};
 
 /// What a log shows of one joint, over all usable rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +29,8 @@ pub struct JointSurvey {
     /// is, motion fast for
     /// the sample rate looks like noise. In rad or m.
     pub position_noise_std: f64,
+    /// What the encoder made of the position.
+    pub position_shape: SignalShape,
     /// The measured velocity (`qd.<joint>`), where the log has it.
     pub velocity: Option<DerivativeSurvey>,
     /// The measured acceleration (`qdd.<joint>`), where the log has it.
@@ -52,6 +57,8 @@ pub struct TorqueSurvey {
     pub rms: f64,
     /// Standard deviation of the white noise, found as [`JointSurvey::position_noise_std`] is, in N·m or N.
     pub noise_std: f64,
+    /// What the sensor made of it.
+    pub shape: SignalShape,
 }
 
 impl TorqueSurvey {
@@ -77,12 +84,19 @@ pub struct DerivativeSurvey {
     /// over this column, by least
     /// squares: 1 where the two agree; NaN where it can't be told.
     pub agreement: f64,
+    /// Of a velocity, how it relates to the positions in detail; `None` where there is too little to tell by.
+    pub alignment: Option<Alignment>,
 }
 
 impl DerivativeSurvey {
-    /// Whether the column is the derivative that it says, within a third: not constant, not in degrees, not
-    /// of the wrong sign.
+    /// Whether the column is the derivative that it says: not constant, not in degrees, not of the wrong sign, not late, not 0 where there is motion.
     pub fn plausible(&self) -> bool {
+        let settings = CheckSettings::default();
+        self.is_derivative() && !self.alignment.is_some_and(|alignment| settings.contradicts(&alignment))
+    }
+
+    /// Whether the column is the derivative that it says within a third.
+    pub fn is_derivative(&self) -> bool {
         self.min < self.max && !(self.agreement < 0.67 || self.agreement > 1.5)
     }
 }
@@ -105,11 +119,15 @@ pub(crate) struct JointCollector {
     uneven: [Histogram; 2],
     qd: Option<Derivative>,
     qdd: Option<Derivative>,
+    alignment: Option<AlignmentCollector>,
+    q_shape: ShapeCollector,
+    tau_shape: ShapeCollector,
     temperature: bool,
 }
 
 impl JointCollector {
-    pub fn new(torque: bool, qd: bool, qdd: bool, temperature: bool) -> Self {
+    /// For samples about `period` apart \[s\].
+    pub fn new(period: f64, torque: bool, [qd, qdd, temperature]: [bool; 3]) -> Self {
         JointCollector {
             rows: 0.0,
             q: Moments::default(),
@@ -117,6 +135,9 @@ impl JointCollector {
             misfit: Histogram::new(),
             slopes: [0.0; 3],
             uneven: [Histogram::new(), Histogram::new()],
+            alignment: qd.then(|| AlignmentCollector::new(period)),
+            q_shape: ShapeCollector::new(),
+            tau_shape: ShapeCollector::new(),
             qd: qd.then(Derivative::default),
             qdd: qdd.then(Derivative::default),
             temperature,
@@ -124,8 +145,15 @@ impl JointCollector {
     }
 
     /// One sample; the signals that the joint lacks are NaN.
-    pub fn push(&mut self, q: f64, tau: f64, qd: f64, qdd: f64) {
+    pub fn push(&mut self, t: f64, q: f64, tau: f64, qd: f64, qdd: f64) {
         self.rows += 1.0;
+        self.q_shape.push(t, q, q);
+        if self.tau.is_some() {
+            self.tau_shape.push(t, q, tau);
+        }
+        if let Some(alignment) = &mut self.alignment {
+            alignment.push(t, q, qd);
+        }
         self.q.push(q, self.rows);
         if let Some((moments, _)) = &mut self.tau {
             moments.push(tau, self.rows);
@@ -134,6 +162,15 @@ impl JointCollector {
             if let Some(derivative) = derivative {
                 derivative.range.push(x, self.rows);
             }
+        }
+    }
+
+    /// The segment is over.
+    pub fn end_segment(&mut self) {
+        self.q_shape.end_segment();
+        self.tau_shape.end_segment();
+        if let Some(alignment) = &mut self.alignment {
+            alignment.end_segment();
         }
     }
 
@@ -194,10 +231,14 @@ impl JointCollector {
                 max: moments.max,
                 rms: (moments.square / self.rows + moments.mean * moments.mean).sqrt(),
                 noise_std: histogram.median() * NOISE_PER_MISFIT,
+                shape: self.tau_shape.finish(),
             }),
             position_noise_std,
-            velocity: self.qd.as_ref().map(Derivative::finish),
-            acceleration: self.qdd.as_ref().map(Derivative::finish),
+            position_shape: self.q_shape.finish(),
+            velocity: self.qd.as_ref().map(|derivative| {
+                derivative.finish(self.alignment.as_ref().and_then(AlignmentCollector::finish))
+            }),
+            acceleration: self.qdd.as_ref().map(|derivative| derivative.finish(None)),
             temperature: self.temperature,
         }
     }
@@ -235,7 +276,12 @@ struct Derivative {
 }
 
 impl Derivative {
-    fn finish(&self) -> DerivativeSurvey {
-        DerivativeSurvey { min: self.range.min, max: self.range.max, agreement: self.product / self.square }
+    fn finish(&self, alignment: Option<Alignment>) -> DerivativeSurvey {
+        DerivativeSurvey {
+            min: self.range.min,
+            max: self.range.max,
+            agreement: self.product / self.square,
+            alignment,
+        }
     }
 }

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod alignment;
 mod block;
 mod blocks;
 mod clock;
@@ -8,6 +9,8 @@ mod conditioning;
 mod cutoff;
 mod differentiator;
 mod error;
+mod findings;
+mod gap;
 mod histogram;
 mod joint_survey;
 mod kernel;
@@ -17,25 +20,30 @@ mod plan;
 mod reader;
 mod recording;
 mod segments;
+mod signal_shape;
 mod spectrum;
 mod spike;
 mod stream;
 mod survey;
 mod writer;
 
+pub use alignment::Alignment;
 pub use block::{Block, Signals};
 pub use clock::{Clock, ClockChoice};
 pub use columns::TorqueColumns;
 pub use conditioning::{Conditioning, ConditioningOptions};
 pub use cutoff::{Bound, CutoffSuggestion};
 pub use error::LogError;
+pub use findings::{CheckSettings, Finding, FindingKind, findings};
+pub use gap::GapReason;
 pub use joint_survey::{DerivativeSurvey, JointSurvey, TorqueSurvey};
 pub use kernel::{LowPass, SmoothingKernel};
 pub use parallel_filter::{FilterScratch, ParallelFilter};
 pub use plan::LogPlan;
 pub use reader::looks_like;
 pub use recording::Recording;
-pub use segments::{GapCount, GapReason, Segment, SpikeCount};
+pub use segments::{GapCount, Segment, SpikeCount};
+pub use signal_shape::{SignalShape, Still};
 pub use spectrum::Spectrum;
 pub use stream::{StreamSummary, stream};
 pub use survey::{Session, Survey, arrange_session, survey};

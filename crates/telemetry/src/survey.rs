@@ -252,7 +252,8 @@ impl<'a> Collector<'a> {
     fn new(layout: &Layout, steps: Steps, progress: &'a mut dyn FnMut(u64, u64)) -> Self {
         let joint = |i: usize| {
             let has = |places: &[Option<usize>]| places[i].is_some();
-            JointCollector::new(layout.torque, has(&layout.qd), has(&layout.qdd), has(&layout.temp))
+            let optional = [&layout.qd, &layout.qdd, &layout.temp].map(|places| has(places));
+            JointCollector::new(steps.median, layout.torque, optional)
         };
         Collector {
             joints: (0..layout.joints).map(joint).collect(),
@@ -355,7 +356,8 @@ impl SegmentSink for Collector<'_> {
         let optional = |place: Option<usize>| place.map_or(f64::NAN, |place| values[place]);
         for (i, joint) in self.joints.iter_mut().enumerate() {
             let torque = torques.get(i).copied().unwrap_or(f64::NAN);
-            joint.push(values[q + i], torque, optional(self.layout.qd[i]), optional(self.layout.qdd[i]));
+            let [qd, qdd] = [&self.layout.qd, &self.layout.qdd].map(|places| optional(places[i]));
+            joint.push(values[0], values[q + i], torque, qd, qdd);
         }
         if self.in_segment >= WINDOW {
             for place in 1..width {
@@ -388,6 +390,7 @@ impl SegmentSink for Collector<'_> {
             }
         }
         self.in_segment = 0;
+        self.joints.iter_mut().for_each(JointCollector::end_segment);
         self.spectrum.end_segment();
         true
     }

@@ -5,7 +5,7 @@
 
 use super::UrdfError;
 use super::robot::{Inertial, Joint, JointKind, Limit, Link, Mimic, Pose, Robot, TENSOR};
-use super::source::{child, children, line, name};
+use super::source::{child, children, children_with_lines, line, name};
 use roxmltree::{Document, Node};
 
 /// The axis of a joint that gives none.
@@ -21,8 +21,9 @@ const VERTICAL_PITCH: f64 = 0.99999;
 pub(super) fn read(document: &Document) -> Result<Robot, UrdfError> {
     let root = document.root_element();
     let version = Version::of(root);
-    let links = children(root, "link").map(|node| link(Part::owner(node, version)));
-    let joints = children(root, "joint").map(|node| joint(Part::owner(node, version)));
+    let links = children_with_lines(root, "link").map(|(node, line)| link(Part::owner(node, version), line));
+    let joints =
+        children_with_lines(root, "joint").map(|(node, line)| joint(Part::owner(node, version), line));
     Ok(Robot {
         name: name(root),
         links: links.collect::<Result<_, _>>()?,
@@ -118,10 +119,10 @@ fn title(element: Node) -> String {
     format!("{} `{}`", element.tag_name().name(), name(element))
 }
 
-fn link(link: Part) -> Result<Link, UrdfError> {
+fn link(link: Part, line: u32) -> Result<Link, UrdfError> {
     let name = link.text("name", "a name")?;
     let inertial = link.child("inertial")?.map(inertial).transpose()?;
-    Ok(Link { name, line: line(link.node), inertial })
+    Ok(Link { name, line, inertial })
 }
 
 fn inertial(inertial: Part) -> Result<Inertial, UrdfError> {
@@ -149,12 +150,11 @@ fn inertial(inertial: Part) -> Result<Inertial, UrdfError> {
     Ok(Inertial { origin, mass: mass.unwrap_or(0.0), inertia, missing })
 }
 
-fn joint(joint: Part) -> Result<Joint, UrdfError> {
+fn joint(joint: Part, line: u32) -> Result<Joint, UrdfError> {
     let name = joint.text("name", "a name")?;
     let kind = joint.text("type", "a type")?;
     let parent = end(joint, "parent", "a <parent link=…>")?;
     let child = end(joint, "child", "a <child link=…>")?;
-    let line = line(joint.node);
     let Some(kind) = JointKind::from_name(&kind) else {
         return Err(UrdfError::UnknownType { line, joint: name, kind });
     };

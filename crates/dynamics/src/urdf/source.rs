@@ -40,3 +40,22 @@ pub(super) fn name(element: Node) -> String {
 pub(super) fn line(element: Node) -> u32 {
     element.document().text_pos_at(element.range().start).row
 }
+
+/// The element's children of that tag, each with the line at which it starts: [`line`] of one after the other would go through the text each time.
+pub(super) fn children_with_lines<'a, 'input>(
+    element: Node<'a, 'input>,
+    tag: &str,
+) -> impl Iterator<Item = (Node<'a, 'input>, u32)> {
+    let text = element.document().input_text().as_bytes();
+    let (mut position, mut line) = (0, 1);
+    children(element, tag).map(move |node| {
+        let start = node.range().start;
+        if start < position {
+            // What an entity holds stands where the entity is declared.
+            (position, line) = (0, 1);
+        }
+        line += text[position..start].iter().filter(|&&byte| byte == b'\n').count() as u32;
+        position = start;
+        (node, line)
+    })
+}

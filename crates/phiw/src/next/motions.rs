@@ -3,8 +3,8 @@
 use crate::Error;
 use phiw_curriculum::{CurriculumError, Motion, MotionDataset, StepTolerance};
 use phiw_dynamics::{JointType, Tree};
+use phiw_effects::SignalRanges;
 use phiw_identification::{IdentificationError, Progress};
-use phiw_residual::SignalRanges;
 use phiw_telemetry::{Recording, Survey, TorqueColumns};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};

@@ -3,7 +3,9 @@
 
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{AnalyticBackend, BackendError, SimulationBackend, Tree, Workspace, World};
-use phiw_plant::{ComputedTorque, Effect, Gains, History, MultiSine, Plant, PlantSetup, RigidBodyModel, Run};
+use phiw_plant::{
+    ComputedTorque, Effect, Gains, History, MultiSine, Plant, PlantRun, PlantSetup, RigidBodyModel,
+};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -55,7 +57,7 @@ pub fn random(seed: u64) -> ChaCha8Rng {
 }
 
 /// Six seconds of motion of a plant.
-pub fn run(tree: &Tree, world: &World, setup: PlantSetup, seed: u64) -> Run {
+pub fn run(tree: &Tree, world: &World, setup: PlantSetup, seed: u64) -> PlantRun {
     let mut plant = Plant::new(tree, world, setup, analytic).unwrap();
     plant.run(&motion(tree, 6.0, seed), 6.0, &mut random(seed)).unwrap()
 }

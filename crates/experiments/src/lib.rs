@@ -1,0 +1,25 @@
+//! The experiments of this project: what phiw's crates can do, measured, on robots and logs that are made on the spot.
+//!
+//! Each experiment is a module with a page of documentation: what it asks, how it is run, what it prints, and where its results go. Each has its command line,
+//! `Arguments`, and `command(&Arguments)`, which does it. `cargo xtask` is the way in.
+//!
+//! | module | asks |
+//! |---|---|
+//! | [`mod@run`] | does the whole chain work, from motions and logs to a model with its missing effect found? |
+//! | [`paper`] | do the results of the paper's section 5 come out, with balance and undeclared effects as well? |
+//! | [`undeclared`] | which undeclared effects does `phiw explain` find in logs, and what does it invent? |
+//! | [`plant`] | does it find them in the closed loop of a physics engine, tracked poorly? |
+//! | [`retarget`] | how fast and how close is retargeting, over whole databases and against others? |
+//! | [`oracle`] | do dynamics and C3D reader agree with Pinocchio and ezc3d? |
+//! | [`synthetic_log`] | does memory grow with the length of a log? It makes the log. |
+//!
+//! Unlike the library crates, experiments print, and write where they are told.
+
+pub mod environment;
+pub mod oracle;
+pub mod paper;
+pub mod plant;
+pub mod retarget;
+pub mod run;
+pub mod synthetic_log;
+pub mod undeclared;

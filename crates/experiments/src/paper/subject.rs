@@ -1,0 +1,189 @@
+//! The robot under test: what is true of it, and what is declared.
+
+use super::whole_body::{self, Standing};
+use crate::environment;
+use anyhow::Context;
+use phiw_curriculum::{Robot, RobotModel};
+use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
+use phiw_dynamics::{Foot, InertialParameters, Tree, World};
+use phiw_plant::{Effect, Friction, GainSettings, Gains, apparent_inertia, feet_from_toml};
+use phiw_zmp::{Stance, SupportPolygon};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Robots of 18 joints and 132 base parameters, and one with legs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum SubjectName {
+    /// models/upper_body18.urdf, on a pedestal that stands free.
+    UpperBody18,
+    /// The Torobo of the shared data, as in the paper. Its file knows neither the weight of its base nor what it stands on: 25 kg on a square of
+    /// 0.4 m are taken.
+    Torobo,
+    /// models/humanoid30.urdf on its own feet, with a base that floats.
+    WholeBody,
+}
+
+/// Joints of the 20-joint Torobo that the paper's robot has not.
+const HELD: [&str; 2] = ["torso/joint_3", "head/joint_1"];
+/// Viscous friction: share of the torque limit that it takes at the speed limit. A real drive has some percent.
+pub const VISCOUS_SHARE: f64 = 0.02;
+/// The fastest that a joint is taken to be [rad/s]; the Torobo's file has placeholders.
+pub const FASTEST: f64 = 4.0;
+/// Base of the Torobo: mass \[kg\], half a side of its square sole and height of its centre \[m\].
+const BASE: [f64; 3] = [25.0, 0.2, 0.2];
+
+/// A robot, its truth, and how it is set up.
+pub struct Subject {
+    /// Where its URDF is.
+    pub urdf: PathBuf,
+    /// Joints that are held.
+    pub hold: Vec<(String, f64)>,
+    /// On a fixed base.
+    pub tree: Tree,
+    /// On a floating base, where it can stand.
+    pub floating: Tree,
+    /// What is under it.
+    pub feet: Vec<Foot>,
+    /// What its ZMP must not leave.
+    pub stance: Stance,
+    /// The link on the floor.
+    pub base_link: InertialParameters,
+    /// Coefficients of viscous friction \[N·m·s/rad\].
+    pub viscous: Vec<f64>,
+    /// K_p and K_d.
+    pub gains: Gains,
+    /// Its legs on the floor, for a robot with legs. `tree` then has virtual joints for the base; `viscous` and `gains` are of the motors.
+    pub standing: Option<Standing>,
+}
+
+impl Subject {
+    /// Reads the robot. Commands are held for `control_period_s`.
+    ///
+    /// # Errors
+    /// A file is not there, or is not a robot.
+    pub fn read(name: SubjectName, control_period_s: f64) -> anyhow::Result<Self> {
+        let root = environment::workspace_root()?;
+        let (urdf, hold) = match name {
+            SubjectName::WholeBody => return whole_body::subject(),
+            SubjectName::UpperBody18 => (root.join("models/upper_body18.urdf"), Vec::new()),
+            SubjectName::Torobo => (
+                root.join("../shared/data/robots/torobo20/torobo20.urdf"),
+                HELD.map(|joint| (joint.to_owned(), 0.0)).to_vec(),
+            ),
+        };
+        let read = |floating_base: bool| {
+            let options = UrdfOptions { floating_base, held: hold.clone() };
+            read_urdf_file(&urdf, &options).map(|reading| reading.tree)
+        };
+        let (tree, mut floating) = (read(false)?, read(true)?);
+        let feet = match name {
+            SubjectName::UpperBody18 => {
+                let path = root.join("models/upper_body18.support.toml");
+                let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+                feet_from_toml(&text, &floating)?
+            }
+            _ => {
+                let [mass, half, height] = BASE;
+                let moment = mass * (half * half / 3.0 + height * height);
+                let base =
+                    [mass, 0.0, 0.0, mass * height, moment, 0.0, moment, 0.0, 0.0, mass * half * half / 1.5];
+                let mut parameters = floating.inertial_parameters();
+                parameters[..base.len()].copy_from_slice(&base);
+                floating.set_inertial_parameters(&parameters)?;
+                let sole =
+                    vec![[half, half, 0.0], [-half, half, 0.0], [-half, -half, 0.0], [half, -half, 0.0]];
+                vec![Foot { body: 0, sole }]
+            }
+        };
+        let corners: Vec<[f64; 2]> =
+            feet.iter().flat_map(|foot| &foot.sole).map(|&[x, y, _]| [x, y]).collect();
+        let support = SupportPolygon::from_points(&corners)?;
+        let stance = Stance::new(support.bounds().polygon()?, [0.0, 0.0], 0.0)?;
+        let joints = tree.joint_count();
+        let limits = |joint: usize| tree.joint(joint).limits;
+        let viscous: Vec<f64> = (0..joints)
+            .map(|joint| VISCOUS_SHARE * limits(joint).effort / limits(joint).velocity.min(FASTEST))
+            .collect();
+        let gains = arm_gains(&tree, &viscous, control_period_s)?;
+        let base_link = floating.bodies()[0].inertial;
+        Ok(Subject { urdf, hold, tree, floating, feet, stance, base_link, viscous, gains, standing: None })
+    }
+
+    /// What is declared.
+    ///
+    /// # Errors
+    /// None that a robot that was read can cause.
+    pub fn robot(&self) -> anyhow::Result<Robot> {
+        match &self.standing {
+            Some(standing) => standing.robot(),
+            None => Ok(Robot::with_viscous_friction(self.tree.clone(), self.base_link)?),
+        }
+    }
+
+    /// What is true.
+    ///
+    /// # Errors
+    /// As above.
+    pub fn truth(&self, robot: &Robot) -> anyhow::Result<RobotModel> {
+        Ok(robot.truth(&self.viscous)?)
+    }
+
+    /// The frictions, in the plant.
+    pub fn frictions(&self) -> Vec<Effect> {
+        let friction = |(joint, &coefficient): (usize, &f64)| Effect::Friction {
+            joint,
+            law: Friction::Viscous { coefficient },
+        };
+        self.viscous.iter().enumerate().map(friction).collect()
+    }
+
+    /// The floor, for a robot that stands on it.
+    pub fn floor(&self) -> World {
+        World { feet: self.feet.clone(), ..World::default() }
+    }
+
+    /// Standard deviation of the torques' noise \[N·m\], as a share of the limits; of virtual joints that of the sensors under the feet.
+    pub fn torque_noise(&self, share: f64) -> Vec<f64> {
+        let base = self.standing.as_ref().map(Standing::base_noise);
+        let noise = |joint: usize| match base.as_ref().and_then(|base| base.get(joint)) {
+            Some(&noise) => noise,
+            None => share * self.tree.joint(joint).limits.effort,
+        };
+        (0..self.tree.joint_count()).map(noise).collect()
+    }
+
+    /// What the rows of each torque are multiplied with before motions are compared: 1 as in the paper. On feet the rows of the base are of other
+    /// units and a hundred times sharper, so there each is counted in its own noise.
+    pub fn row_weights(&self, share: f64) -> Vec<f64> {
+        match self.standing {
+            Some(_) => self.torque_noise(share).iter().map(|noise| 1.0 / noise).collect(),
+            None => vec![1.0; self.tree.joint_count()],
+        }
+    }
+
+    /// The rows whose error is the torque error (19): motors, not virtual joints.
+    pub fn judged_rows(&self) -> Vec<f64> {
+        let motors = self.viscous.len();
+        (0..self.tree.joint_count())
+            .map(|joint| f64::from(u8::from(joint + motors >= self.tree.joint_count())))
+            .collect()
+    }
+
+    /// The joints that motions of people move.
+    pub fn moved_joints(&self) -> Vec<String> {
+        match &self.standing {
+            Some(standing) => standing.upper_joints(),
+            None => self.tree.joint_names().map(str::to_owned).collect(),
+        }
+    }
+}
+
+/// Small gains, critically damped, that stay stable when commands are held for `control_period_s`.
+///
+/// # Errors
+/// A list does not fit the robot.
+pub fn arm_gains(tree: &Tree, viscous: &[f64], control_period_s: f64) -> anyhow::Result<Gains> {
+    let inertia = apparent_inertia(tree, &[], &tree.neutral_configuration())?;
+    Ok(Gains::held(tree, &inertia, viscous, control_period_s, &GainSettings::default())?)
+}

@@ -1,0 +1,275 @@
+//! What a logger or a drive does to a log beyond noise and quanta: colour, tails, filters, dead bands, steps, a velocity that is late.
+
+use super::dice::Dice;
+use super::plant::Record;
+use super::sensors::Sensors;
+use super::situation::Situation;
+use super::trajectory::Motion;
+use phiw_dynamics::{JointType, Tree};
+use serde::Serialize;
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+/// Share of outliers and their size, for [`Tails::Contaminated`].
+const OUTLIERS: [f64; 2] = [0.02, 8.0];
+/// What velocity columns are multiplied by when somebody took the wrong unit: revolutions a minute, the other direction. Degrees are refused as such.
+const WRONG_UNITS: [f64; 2] = [9.549_296_6, -1.0];
+
+/// The shape of the noise's innovations, all of unit variance.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Tails {
+    /// Normal.
+    Normal,
+    /// Student's t with three degrees of freedom.
+    Student,
+    /// Normal, with outliers.
+    Contaminated,
+}
+
+/// A low-pass of the drive.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DriveFilter {
+    /// Corner frequency \[Hz\].
+    pub corner: f64,
+    /// Whether the filter's delay stays in the log; else it runs forwards and backwards.
+    pub causal: bool,
+}
+
+/// A `qd` column.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct VelocityColumn {
+    /// How much later than the position it is \[s\].
+    pub lag: f64,
+    /// What it is multiplied by.
+    pub scale: f64,
+    /// Speeds below this are written as 0 \[rad/s, m/s\], joint by joint.
+    pub dead_band: Vec<f64>,
+    /// Standard deviation of its noise \[rad/s, m/s\], joint by joint.
+    pub noise: Vec<f64>,
+}
+
+/// Everything that the situations ask of a logger.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Logging {
+    /// Shape of the torque's noise.
+    pub tails: Tails,
+    /// Low-pass over torque and noise.
+    pub filter: Option<DriveFilter>,
+    /// A velocity column; none is written without.
+    pub velocity: Option<VelocityColumn>,
+    /// Torques below this are written as 0 \[N·m, N\], joint by joint.
+    pub dead_band: Vec<f64>,
+    /// Steps of the torque \[N·m, N\], joint by joint; 0 for none.
+    pub torque_step: Vec<f64>,
+}
+
+impl Logging {
+    /// Draws what a situation asks for, and changes the sensors to it. `torque`, `speed`: root mean squares of each joint.
+    pub fn draw(
+        situation: Situation,
+        tree: &Tree,
+        [torque, speed]: [&[f64]; 2],
+        sensors: &mut Sensors,
+        dice: &mut Dice,
+    ) -> Self {
+        use Situation::{
+            Colour, DeadBand, DriveFilter as Filter, HeavyTails, LateFilter, LateVelocity, LongColour, Mixed,
+            NoiseJoints, Quantised, ShortColour, White,
+        };
+        let joints = torque.len();
+        sensors.correlation_time = match situation {
+            White | HeavyTails | Filter | LateFilter | Quantised => 0.0,
+            ShortColour => dice.log_uniform(0.005, 0.05),
+            Colour => dice.log_uniform(0.05, 0.3),
+            LongColour => dice.log_uniform(0.3, 1.0),
+            Mixed => dice.log_uniform(0.005, 0.3),
+            NoiseJoints if dice.chance(0.5) => dice.log_uniform(0.005, 0.3),
+            _ if dice.chance(0.5) => dice.log_uniform(0.005, 0.05),
+            _ => 0.0,
+        };
+        let share = dice.log_uniform(0.005, if situation == Quantised { 0.02 } else { 0.05 });
+        sensors.torque_noise =
+            torque.iter().map(|torque| torque * share * dice.log_uniform(0.7, 1.4)).collect();
+        if situation == NoiseJoints {
+            for _ in 0..1 + dice.index((joints / 3).max(1)) {
+                let joint = dice.index(joints);
+                sensors.torque_noise[joint] = torque[joint] * dice.log_uniform(0.5, 3.0);
+            }
+        }
+        let heavy = situation == HeavyTails || (situation == Mixed && dice.chance(0.5));
+        let tails = match dice.chance(0.5) {
+            _ if !heavy => Tails::Normal,
+            true => Tails::Student,
+            false => Tails::Contaminated,
+        };
+        let corner = dice.log_uniform(4.0, 20.0);
+        let filter = matches!(situation, Filter | LateFilter)
+            .then_some(DriveFilter { corner, causal: situation == LateFilter });
+        let mut torque_step = vec![0.0; joints];
+        if matches!(situation, Quantised | Mixed) {
+            let steps = dice.log_uniform(0.5, 4.0);
+            torque_step = sensors.torque_noise.iter().map(|noise| noise * steps).collect();
+        }
+        if situation == Quantised {
+            let bits = 11 + dice.index(3) as i32;
+            for (joint, quantum) in sensors.quantum.iter_mut().enumerate() {
+                if tree.joint(joint).joint_type != JointType::Prismatic {
+                    *quantum = TAU / f64::from(bits).exp2();
+                }
+            }
+        }
+        let mut velocity = matches!(situation, LateVelocity | Mixed).then(|| VelocityColumn {
+            lag: dice.log_uniform(0.02, 0.2),
+            scale: if dice.chance(0.25) { dice.pick(&WRONG_UNITS) } else { 1.0 },
+            dead_band: vec![0.0; joints],
+            noise: speed.iter().map(|speed| 0.001 * speed).collect(),
+        });
+        let mut dead_band = vec![0.0; joints];
+        if situation == DeadBand && dice.chance(0.5) {
+            let share = dice.log_uniform(0.02, 0.1);
+            dead_band = torque.iter().map(|torque| share * torque).collect();
+        } else if situation == DeadBand {
+            let share = dice.log_uniform(0.05, 0.2);
+            velocity = Some(VelocityColumn {
+                lag: 0.0,
+                scale: 1.0,
+                dead_band: speed.iter().map(|speed| share * speed).collect(),
+                noise: speed.iter().map(|speed| 0.001 * speed).collect(),
+            });
+        }
+        Logging { tails, filter, velocity, dead_band, torque_step }
+    }
+
+    /// The log's text: `t`, `q.*`, `qd.*` if there is such a column, `tau.*`.
+    pub fn log(
+        &self,
+        sensors: &Sensors,
+        tree: &Tree,
+        motion: &Motion,
+        record: &Record,
+        stamps: &[f64],
+        dice: &mut Dice,
+    ) -> String {
+        let joints = tree.joint_count();
+        let torque = self.torque(sensors, record, dice);
+        let mut text = String::with_capacity(record.times.len() * (12 + 32 * joints));
+        text.push('t');
+        let prefixes: &[&str] = if self.velocity.is_some() { &["q", "qd", "tau"] } else { &["q", "tau"] };
+        for prefix in prefixes {
+            tree.joint_names().for_each(|joint| {
+                let _ = write!(text, ",{prefix}.{joint}");
+            });
+        }
+        text.push('\n');
+        for (sample, stamp) in stamps.iter().enumerate() {
+            let _ = write!(text, "{stamp:.7}");
+            for joint in 0..joints {
+                let quantum = sensors.quantum[joint];
+                let seen = record.states.q(sample, joint) / quantum + sensors.angle_noise * dice.normal();
+                let _ = write!(text, ",{:.9}", seen.round() * quantum);
+            }
+            if let Some(velocity) = &self.velocity {
+                for joint in 0..joints {
+                    let [_, speed, _] = motion.state(joint, record.times[sample] - velocity.lag);
+                    let speed = if speed.abs() < velocity.dead_band[joint] {
+                        0.0
+                    } else {
+                        velocity.scale * (speed + velocity.noise[joint] * dice.normal())
+                    };
+                    let _ = write!(text, ",{speed:.7}");
+                }
+            }
+            for joint in 0..joints {
+                let _ = write!(text, ",{:.6}", torque[sample * joints + joint]);
+            }
+            text.push('\n');
+        }
+        text
+    }
+
+    /// The torque as logged, samples × joints: noise, filter, dead band and steps, in this order.
+    fn torque(&self, sensors: &Sensors, record: &Record, dice: &mut Dice) -> Vec<f64> {
+        let joints = sensors.torque_noise.len();
+        let mut torque = record.torque.clone();
+        for joint in 0..joints {
+            let noise = self.noise(&record.times, sensors.correlation_time, dice);
+            for (row, noise) in torque.chunks_exact_mut(joints).zip(noise) {
+                row[joint] += sensors.torque_noise[joint] * noise;
+            }
+            if let Some(filter) = &self.filter {
+                let mut column: Vec<f64> = torque.iter().skip(joint).step_by(joints).copied().collect();
+                filter.apply(&record.times, &mut column);
+                for (row, value) in torque.chunks_exact_mut(joints).zip(column) {
+                    row[joint] = value;
+                }
+            }
+            for row in torque.chunks_exact_mut(joints) {
+                if row[joint].abs() < self.dead_band[joint] {
+                    row[joint] = 0.0;
+                }
+                if self.torque_step[joint] > 0.0 {
+                    row[joint] = (row[joint] / self.torque_step[joint]).round() * self.torque_step[joint];
+                }
+            }
+        }
+        torque
+    }
+
+    /// Noise of unit variance: a first-order autoregression of this correlation time \[s\], white where that is nought.
+    pub fn noise(&self, times: &[f64], correlation_time: f64, dice: &mut Dice) -> Vec<f64> {
+        let mut level = dice.normal();
+        let mut previous = times.first().copied().unwrap_or(0.0);
+        let next = |&time: &f64| {
+            let innovation = self.tails.draw(dice);
+            let kept =
+                if correlation_time > 0.0 { (-(time - previous) / correlation_time).exp() } else { 0.0 };
+            previous = time;
+            level = kept * level + (1.0 - kept * kept).sqrt() * innovation;
+            level
+        };
+        times.iter().map(next).collect()
+    }
+}
+
+impl Tails {
+    /// A draw of unit variance.
+    fn draw(self, dice: &mut Dice) -> f64 {
+        match self {
+            Tails::Normal => dice.normal(),
+            Tails::Student => {
+                let square: f64 = (0..3).map(|_| dice.normal().powi(2)).sum();
+                // Its variance is 3.
+                dice.normal() / (square / 3.0).sqrt() / 3.0_f64.sqrt()
+            }
+            Tails::Contaminated => {
+                let [share, size] = OUTLIERS;
+                let scale = if dice.chance(share) { size } else { 1.0 };
+                scale * dice.normal() / (1.0 - share + share * size * size).sqrt()
+            }
+        }
+    }
+}
+
+impl DriveFilter {
+    /// Two poles at the corner: one after the other in time, or one in each direction.
+    pub fn apply(&self, times: &[f64], values: &mut [f64]) {
+        let pass = |values: &mut [f64], elapsed: &dyn Fn(usize) -> f64| {
+            let mut level = values.first().copied().unwrap_or(0.0);
+            for (index, value) in values.iter_mut().enumerate().skip(1) {
+                level += (1.0 - (-elapsed(index) * TAU * self.corner).exp()) * (*value - level);
+                *value = level;
+            }
+        };
+        let forwards = |index: usize| times[index] - times[index - 1];
+        pass(values, &forwards);
+        if self.causal {
+            pass(values, &forwards);
+        } else {
+            let last = times.len();
+            values.reverse();
+            pass(values, &|index| times[last - index] - times[last - index - 1]);
+            values.reverse();
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! Which cases there are: a case follows from its seed alone.
+
+use super::dice::{Dice, Stream};
+use super::kind::{Kind, Name, Stranger};
+use super::situation::Situation;
+use clap::ValueEnum;
+use serde::Serialize;
+
+/// A family of cases.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[value(rename_all = "snake_case")]
+pub enum Suite {
+    /// One undeclared effect.
+    One,
+    /// Two.
+    Two,
+    /// Three.
+    Three,
+    /// None: the declared model is right.
+    Control,
+    /// One effect that is not in the catalogue.
+    Outside,
+    /// Right models in every situation: nothing is to be named.
+    WideRight,
+    /// Frictions on all joints, mostly undeclared, and up to thirteen effects more, in every situation.
+    WideEffects,
+    /// One effect that is not in the catalogue, and up to three that are, in every situation.
+    WideOutside,
+}
+
+/// Development seeds are for looking at; reporting seeds only for reporting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Seeds {
+    /// For developing the tracer.
+    Dev,
+    /// For the score that is reported.
+    Report,
+}
+
+impl Suite {
+    /// All suites.
+    pub const ALL: [Suite; 8] = [
+        Suite::One,
+        Suite::Two,
+        Suite::Three,
+        Suite::Control,
+        Suite::Outside,
+        Suite::WideRight,
+        Suite::WideEffects,
+        Suite::WideOutside,
+    ];
+    /// One to three effects on an otherwise right model, well excited.
+    pub const OLD: [Suite; 5] = [Suite::One, Suite::Two, Suite::Three, Suite::Control, Suite::Outside];
+    /// Robots as they come.
+    pub const WIDE: [Suite; 3] = [Suite::WideRight, Suite::WideEffects, Suite::WideOutside];
+
+    /// Whether its cases have a situation.
+    pub fn is_wide(self) -> bool {
+        Suite::WIDE.contains(&self)
+    }
+
+    /// How many cases a full run has.
+    pub fn full_count(self) -> usize {
+        match self {
+            Suite::One => 400,
+            Suite::Two => 150,
+            Suite::Three => 50,
+            Suite::Control => 300,
+            Suite::Outside => 100,
+            Suite::WideRight => 750,
+            Suite::WideEffects => 300,
+            Suite::WideOutside => 120,
+        }
+    }
+
+    /// The seed of a case.
+    pub fn seed(self, seeds: Seeds, index: usize) -> u64 {
+        let phase = match seeds {
+            Seeds::Dev => 1,
+            Seeds::Report => 2,
+        };
+        phase * 1_000_000 + self as u64 * 100_000 + index as u64
+    }
+}
+
+/// What a case is about, before its numbers are drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spec {
+    /// The seed that it follows from.
+    pub seed: u64,
+    /// Its family.
+    pub suite: Suite,
+    /// Index of the robot that is tried first.
+    pub robot: usize,
+    /// Names of the secrets.
+    pub secrets: Vec<Name>,
+    /// Whether the secrets set in after an identification of the clean robot, whose model is held.
+    pub held: bool,
+    /// Whether several secrets may share a joint.
+    pub together: bool,
+    /// What is particular about its noise, drive or motion; in the wide suites only.
+    pub situation: Option<Situation>,
+    /// Whether the frictions of all joints are declared; always, but in the wide suites.
+    pub friction_declared: bool,
+}
+
+impl Spec {
+    /// The case of a seed; `None` if no suite has it.
+    pub fn of_seed(seed: u64, robots: usize) -> Option<Spec> {
+        let suite = *Suite::ALL.get((seed % 1_000_000 / 100_000) as usize)?;
+        let index = (seed % 100_000) as usize;
+        let dice = &mut Dice::new(seed, u64::MAX >> 8, Stream::Secret);
+        let kinds = Kind::value_variants();
+        let mut spec = Spec {
+            seed,
+            suite,
+            robot: index % robots,
+            secrets: Vec::new(),
+            held: false,
+            together: dice.chance(0.3),
+            situation: None,
+            friction_declared: true,
+        };
+        match suite {
+            Suite::One => {
+                let kind = kinds[index % kinds.len()];
+                spec.held = kind.needs_held_model() || (kind.may_grow() && index / kinds.len() % 3 == 2);
+                spec.secrets = vec![Name::Catalogue(kind)];
+            }
+            Suite::Two => spec.draw_several(2, dice),
+            Suite::Three => spec.draw_several(3, dice),
+            Suite::Control => spec.held = dice.chance(0.2),
+            Suite::Outside => {
+                let strangers = Stranger::value_variants();
+                spec.secrets = vec![Name::Outside(strangers[index % strangers.len()])];
+            }
+            Suite::WideRight | Suite::WideEffects | Suite::WideOutside => spec.draw_wide(index, robots, dice),
+        }
+        Some(spec)
+    }
+
+    /// Situations in turn; the largest robot in one case of ten, since it takes as long as all others.
+    fn draw_wide(&mut self, index: usize, robots: usize, dice: &mut Dice) {
+        let situations = Situation::ALL.len();
+        self.situation = Some(Situation::ALL[index % situations]);
+        self.robot = if dice.chance(0.1) { robots - 1 } else { dice.index((robots - 1).max(1)) };
+        self.friction_declared = match self.suite {
+            Suite::WideEffects => dice.chance(0.3),
+            _ => true,
+        };
+        let strangers = Stranger::value_variants();
+        let count = match self.suite {
+            Suite::WideRight => 0,
+            Suite::WideOutside => {
+                self.secrets = vec![Name::Outside(strangers[(index + index / situations) % strangers.len()])];
+                dice.index(4)
+            }
+            // One with friction alone, then more and more.
+            _ if !self.friction_declared => dice.pick(&[0, 1, 3, 6, 9, 13]),
+            _ => dice.pick(&[1, 3, 6, 9, 13]),
+        };
+        let may_join = |kind: &Kind| {
+            !kind.needs_held_model()
+                && !matches!(
+                    kind,
+                    // Simulated motion and deflected encoders would change what the others are; frictions, rotors and offsets come as families.
+                    Kind::ActuatorSaturation
+                        | Kind::JointElasticity
+                        | Kind::ViscousFriction
+                        | Kind::CoulombFriction
+                        | Kind::RotorInertia
+                        | Kind::TorqueOffset
+                )
+        };
+        let mut choices: Vec<Kind> = Kind::value_variants().iter().copied().filter(may_join).collect();
+        for _ in 0..count {
+            let kind = choices.swap_remove(dice.index(choices.len()));
+            self.secrets.push(Name::Catalogue(kind));
+        }
+    }
+
+    fn draw_several(&mut self, count: usize, dice: &mut Dice) {
+        self.held = dice.chance(0.2);
+        let may_join = |kind: &Kind| match kind {
+            // Simulated motion and deflected encoders would change what a second effect is: they are judged alone.
+            Kind::ActuatorSaturation | Kind::JointElasticity => false,
+            kind => self.held || !kind.needs_held_model(),
+        };
+        let choices: Vec<Kind> = Kind::value_variants().iter().copied().filter(may_join).collect();
+        let mut kinds: Vec<Kind> = Vec::new();
+        while kinds.len() < count {
+            let kind = dice.pick(&choices);
+            if !kinds.iter().any(|other| kind.is_nested_with(*other)) {
+                kinds.push(kind);
+            }
+        }
+        self.secrets = kinds.into_iter().map(Name::Catalogue).collect();
+    }
+
+    /// Whether one of the secrets is this effect.
+    pub fn has(&self, kind: Kind) -> bool {
+        self.secrets.contains(&Name::Catalogue(kind))
+    }
+}

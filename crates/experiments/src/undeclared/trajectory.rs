@@ -1,0 +1,429 @@
+//! Motions whose position, velocity and acceleration are known in closed form.
+
+use super::dice::Dice;
+use phiw_dynamics::Tree;
+use std::f64::consts::TAU;
+
+/// Reach taken for joints without limits \[rad\].
+const UNLIMITED_REACH: f64 = 2.8;
+/// Time in which a motion fades in and out \[s\].
+const FADE: f64 = 1.2;
+/// Fastest speed asked of any joint \[rad/s, m/s\].
+const FASTEST: f64 = 3.0;
+/// Shortest and longest rest between moves \[s\].
+const SHORT_RESTS: [f64; 2] = [0.1, 0.7];
+/// The same where joints rest for long.
+const LONG_RESTS: [f64; 2] = [0.8, 3.0];
+
+/// Position, velocity, acceleration of one joint.
+pub type JointState = [f64; 3];
+
+/// One log's motion of all joints, at rest before its start and after its end.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// Session time of its start \[s\].
+    pub start: f64,
+    /// How long it takes \[s\].
+    pub duration: f64,
+    /// One for each joint.
+    pub joints: Vec<JointMotion>,
+    /// What was commanded beyond what an actuator delivered.
+    pub excess: Option<Excess>,
+}
+
+/// Torque that was commanded but not delivered.
+#[derive(Clone, Debug)]
+pub struct Excess {
+    /// The joint.
+    pub joint: usize,
+    /// Step of the grid from the motion's start \[s\].
+    pub step: f64,
+    /// Torque on the grid \[N·m\].
+    pub torque: Vec<f64>,
+}
+
+/// The motion of one joint, over the time since the start.
+#[derive(Clone, Debug)]
+pub enum JointMotion {
+    /// A finite Fourier series that fades in and out.
+    Fourier {
+        /// Where it rests.
+        center: f64,
+        /// Amplitude, angular frequency, phase.
+        terms: Vec<[f64; 3]>,
+    },
+    /// Minimum-jerk moves with rests between.
+    PointToPoint {
+        /// Beginning and end in time, start and goal, ascending in time.
+        moves: Vec<[f64; 4]>,
+    },
+    /// Another motion, so many times as slow.
+    Slowed {
+        /// The motion.
+        motion: Box<JointMotion>,
+        /// How many times.
+        factor: f64,
+    },
+    /// Simulated on an even grid of this step \[s\].
+    Simulated {
+        /// Step of the grid \[s\].
+        step: f64,
+        /// States on the grid.
+        states: Vec<JointState>,
+    },
+}
+
+/// A joint that must come close to one of its limits.
+#[derive(Clone, Copy, Debug)]
+pub struct Reach {
+    /// The joint.
+    pub joint: usize,
+    /// The upper limit or the lower.
+    pub upper: bool,
+}
+
+impl Motion {
+    /// State of a joint at a session time.
+    pub fn state(&self, joint: usize, time: f64) -> JointState {
+        self.joints[joint].state((time - self.start).clamp(0.0, self.duration), self.duration)
+    }
+
+    /// A periodic excitation of all joints: six to ten sinusoids each, of a fundamental of 0.05 to 0.1 Hz.
+    pub fn fourier(tree: &Tree, dice: &mut Dice, start: f64, duration: f64, reach: Option<Reach>) -> Self {
+        let fundamental = dice.uniform(0.05, 0.1);
+        let highest = dice.uniform(1.0, 1.5);
+        let joints = (0..tree.joint_count())
+            .map(|joint| {
+                let reach = reach.filter(|reach| reach.joint == joint);
+                fourier_joint(room(tree, joint), dice, fundamental, highest, duration, reach)
+            })
+            .collect();
+        Motion { start, duration, joints, excess: None }
+    }
+
+    /// Moves from pose to pose, as when picking and placing, all joints together, with rests.
+    pub fn point_to_point(
+        tree: &Tree,
+        dice: &mut Dice,
+        start: f64,
+        duration: f64,
+        reach: Option<Reach>,
+    ) -> Self {
+        Self::moves(tree, dice, start, duration, reach, SHORT_RESTS)
+    }
+
+    /// Moves from pose to pose with long rests: all joints together, or one after the other in their own time.
+    pub fn with_rests(
+        tree: &Tree,
+        dice: &mut Dice,
+        start: f64,
+        duration: f64,
+        reach: Option<Reach>,
+        together: bool,
+    ) -> Self {
+        let mut motion = Self::moves(tree, dice, start, duration, reach, LONG_RESTS);
+        if !together {
+            for joint in 0..tree.joint_count() {
+                let mut own = Self::moves(tree, dice, start, duration, reach, LONG_RESTS);
+                motion.joints[joint] = own.joints.swap_remove(joint);
+            }
+        }
+        motion
+    }
+
+    /// A periodic excitation of two to five harmonics of 0.2 to 0.5 Hz.
+    pub fn periodic(tree: &Tree, dice: &mut Dice, start: f64, duration: f64, reach: Option<Reach>) -> Self {
+        let fundamental = dice.uniform(0.2, 0.5);
+        let highest = fundamental * (2 + dice.index(4)) as f64;
+        let joints = (0..tree.joint_count())
+            .map(|joint| {
+                let reach = reach.filter(|reach| reach.joint == joint);
+                fourier_joint(room(tree, joint), dice, fundamental, highest, duration, reach)
+            })
+            .collect();
+        Motion { start, duration, joints, excess: None }
+    }
+
+    fn moves(
+        tree: &Tree,
+        dice: &mut Dice,
+        start: f64,
+        duration: f64,
+        reach: Option<Reach>,
+        rests: [f64; 2],
+    ) -> Self {
+        let rooms: Vec<Room> = (0..tree.joint_count()).map(|joint| room(tree, joint)).collect();
+        let pose = |dice: &mut Dice, number: usize| -> Vec<f64> {
+            let inside = |(joint, room): (usize, &Room)| match reach {
+                Some(reach) if reach.joint == joint && number % 3 == 1 => room.near_limit(reach.upper),
+                _ => {
+                    let margin = 0.12 * (room.upper - room.lower);
+                    dice.uniform(room.lower + margin, room.upper - margin)
+                }
+            };
+            rooms.iter().enumerate().map(inside).collect()
+        };
+        let mut joints = vec![Vec::new(); rooms.len()];
+        let mut from = pose(dice, 0);
+        let mut clock = 0.3;
+        let haste = dice.uniform(0.6, 0.95);
+        for number in 1.. {
+            let to = pose(dice, number);
+            // A minimum-jerk move of distance d in time T peaks at 1.875 d/T and 5.77 d/T².
+            let needed = rooms.iter().zip(from.iter().zip(&to)).map(|(room, (from, to))| {
+                let distance = (to - from).abs();
+                (1.875 * distance / (haste * room.velocity))
+                    .max((5.77 * distance / (8.0 * room.velocity)).sqrt())
+            });
+            let end = clock + needed.fold(0.4, f64::max);
+            if end > duration - 0.3 {
+                break;
+            }
+            for (moves, (from, to)) in joints.iter_mut().zip(from.iter().zip(&to)) {
+                moves.push([clock, end, *from, *to]);
+            }
+            clock = end + dice.uniform(rests[0], rests[1]);
+            from = to;
+        }
+        let joints = joints.into_iter().map(|moves| JointMotion::PointToPoint { moves }).collect();
+        Motion { start, duration, joints, excess: None }
+    }
+
+    /// The same motion `factor` times as slow: as much of it as there is time for.
+    pub fn slow_down(&mut self, factor: f64) {
+        let slowed = |motion: &JointMotion| JointMotion::Slowed { motion: Box::new(motion.clone()), factor };
+        self.joints = self.joints.iter().map(slowed).collect();
+    }
+
+    /// The same motion around the same place, `factor` times as wide.
+    pub fn shrink(&mut self, factor: f64) {
+        for joint in &mut self.joints {
+            match joint {
+                JointMotion::Fourier { terms, .. } => terms.iter_mut().for_each(|term| term[0] *= factor),
+                JointMotion::PointToPoint { moves } => {
+                    let center = moves.first().map_or(0.0, |first| first[2]);
+                    for [_, _, from, to] in moves {
+                        *from = center + factor * (*from - center);
+                        *to = center + factor * (*to - center);
+                    }
+                }
+                JointMotion::Slowed { .. } | JointMotion::Simulated { .. } => {}
+            }
+        }
+    }
+}
+
+impl JointMotion {
+    fn state(&self, time: f64, duration: f64) -> JointState {
+        match self {
+            JointMotion::Fourier { center, terms } => {
+                let mut sum = [0.0; 3];
+                for &[amplitude, frequency, phase] in terms {
+                    let (sine, cosine) = (frequency * time + phase).sin_cos();
+                    sum[0] += amplitude * sine;
+                    sum[1] += amplitude * frequency * cosine;
+                    sum[2] -= amplitude * frequency * frequency * sine;
+                }
+                let [w, dw, ddw] = window(time, duration);
+                let [s, ds, dds] = sum;
+                [center + w * s, dw * s + w * ds, ddw * s + 2.0 * dw * ds + w * dds]
+            }
+            JointMotion::PointToPoint { moves } => {
+                let after = moves.partition_point(|move_| move_[0] <= time);
+                match after.checked_sub(1).map(|index| moves[index]) {
+                    Some([begin, end, from, to]) => {
+                        minimum_jerk((time - begin) / (end - begin), end - begin, from, to)
+                    }
+                    None => [moves.first().map_or(0.0, |first| first[2]), 0.0, 0.0],
+                }
+            }
+            JointMotion::Slowed { motion, factor } => {
+                let [q, v, a] = motion.state(time / factor, duration);
+                [q, v / factor, a / (factor * factor)]
+            }
+            JointMotion::Simulated { step, states } => hermite(states, time / step, *step),
+        }
+    }
+}
+
+/// Where a joint may go, and how fast.
+struct Room {
+    lower: f64,
+    upper: f64,
+    velocity: f64,
+}
+
+impl Room {
+    fn near_limit(&self, upper: bool) -> f64 {
+        let margin = 0.015 * (self.upper - self.lower);
+        if upper { self.upper - margin } else { self.lower + margin }
+    }
+}
+
+fn room(tree: &Tree, joint: usize) -> Room {
+    let limits = tree.joint(joint).limits;
+    Room {
+        lower: limits.lower.max(-UNLIMITED_REACH),
+        upper: limits.upper.min(UNLIMITED_REACH),
+        velocity: limits.velocity.min(FASTEST),
+    }
+}
+
+fn fourier_joint(
+    room: Room,
+    dice: &mut Dice,
+    fundamental: f64,
+    highest: f64,
+    duration: f64,
+    reach: Option<Reach>,
+) -> JointMotion {
+    let harmonics = (highest / fundamental) as usize;
+    let decay = dice.uniform(0.7, 1.3);
+    let count = 6 + dice.index(5);
+    let mut terms: Vec<[f64; 3]> = (0..count)
+        .map(|number| {
+            // Spread evenly in the logarithm, lowest and highest always among them.
+            let position = (number as f64 + dice.uniform(-0.4, 0.4)) / (count - 1) as f64;
+            let harmonic = (harmonics as f64).powf(position.clamp(0.0, 1.0)).round().max(1.0);
+            [
+                dice.uniform(0.3, 1.0) * harmonic.powf(-decay),
+                TAU * fundamental * harmonic,
+                dice.uniform(0.0, TAU),
+            ]
+        })
+        .collect();
+    let unscaled = JointMotion::Fourier { center: 0.0, terms: terms.clone() };
+    let mut extent = [0.0_f64, 0.0];
+    let mut fastest = 0.0_f64;
+    for step in 0..(50.0 * duration) as usize {
+        let [q, v, _] = unscaled.state(step as f64 / 50.0, duration);
+        extent = [extent[0].min(q), extent[1].max(q)];
+        fastest = fastest.max(v.abs());
+    }
+    let width = extent[1] - extent[0];
+    let scale = (dice.uniform(0.5, 0.9) * (room.upper - room.lower) / width)
+        .min(dice.uniform(0.5, 0.95) * room.velocity / fastest);
+    terms.iter_mut().for_each(|term| term[0] *= scale);
+    let center = match reach {
+        Some(reach) => room.near_limit(reach.upper) - scale * extent[usize::from(reach.upper)],
+        None => {
+            let margin = 0.03 * (room.upper - room.lower);
+            dice.uniform(room.lower + margin - scale * extent[0], room.upper - margin - scale * extent[1])
+        }
+    };
+    JointMotion::Fourier { center, terms }
+}
+
+/// Rises from 0 to 1 in [`FADE`] and falls at the end, with three smooth derivatives.
+fn window(time: f64, duration: f64) -> JointState {
+    if time < FADE {
+        smooth_step(time / FADE, FADE)
+    } else if time > duration - FADE {
+        let [w, dw, ddw] = smooth_step((duration - time) / FADE, FADE);
+        [w, -dw, ddw]
+    } else {
+        [1.0, 0.0, 0.0]
+    }
+}
+
+/// 35 x⁴ − 84 x⁵ + 70 x⁶ − 20 x⁷.
+fn smooth_step(x: f64, length: f64) -> JointState {
+    let value = x.powi(4) * (35.0 + x * (-84.0 + x * (70.0 - 20.0 * x)));
+    let slope = 140.0 * (x * (1.0 - x)).powi(3);
+    let curvature = 420.0 * (x * (1.0 - x)).powi(2) * (1.0 - 2.0 * x);
+    [value, slope / length, curvature / (length * length)]
+}
+
+/// 10 x³ − 15 x⁴ + 6 x⁵ of the way; at the goal after x = 1.
+fn minimum_jerk(x: f64, length: f64, from: f64, to: f64) -> JointState {
+    if x >= 1.0 {
+        return [to, 0.0, 0.0];
+    }
+    let way = to - from;
+    let value = x.powi(3) * (10.0 + x * (-15.0 + 6.0 * x));
+    let slope = 30.0 * (x * (1.0 - x)).powi(2);
+    let curvature = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x);
+    [from + way * value, way * slope / length, way * curvature / (length * length)]
+}
+
+/// Cubic in position, from positions and velocities on the grid; linear in acceleration.
+fn hermite(states: &[JointState], place: f64, step: f64) -> JointState {
+    let last = states.len() - 1;
+    let index = (place as usize).min(last.saturating_sub(1));
+    let ([q0, v0, a0], [q1, v1, a1]) = (states[index], states[(index + 1).min(last)]);
+    let x = (place - index as f64).clamp(0.0, 1.0);
+    let (h00, h10) = ((1.0 + 2.0 * x) * (1.0 - x).powi(2), x * (1.0 - x).powi(2));
+    let (h01, h11) = (x * x * (3.0 - 2.0 * x), x * x * (x - 1.0));
+    let position = h00 * q0 + h10 * step * v0 + h01 * q1 + h11 * step * v1;
+    let velocity = (6.0 * x * x - 6.0 * x) * (q0 - q1) / step
+        + (1.0 - x) * (1.0 - 3.0 * x) * v0
+        + x * (3.0 * x - 2.0) * v1;
+    [position, velocity, a0 + x * (a1 - a0)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::dice::{Dice, Stream};
+    use super::super::robot::robots;
+    use super::{JointMotion, Motion, Reach};
+
+    /// Derivatives by central differences, limits and rest at both ends.
+    fn check(point_to_point: bool, reach: Option<Reach>) {
+        let robots = robots().expect("the models read");
+        for (number, robot) in robots.iter().enumerate() {
+            let mut dice = Dice::new(number as u64, 0, Stream::Motion);
+            let draw = if point_to_point { Motion::point_to_point } else { Motion::fourier };
+            let motion = draw(&robot.tree, &mut dice, 25.0, 20.0, reach);
+            let step = 1e-4;
+            for joint in 0..robot.joints() {
+                let limits = robot.tree.joint(joint).limits;
+                let mut furthest = [f64::INFINITY, f64::NEG_INFINITY];
+                for sample in 0..400 {
+                    let time = 25.0 + 0.05 * f64::from(sample) + 0.0123;
+                    let [before, [q, v, a], after] =
+                        [time - step, time, time + step].map(|time| motion.state(joint, time));
+                    assert!(
+                        (v - (after[0] - before[0]) / (2.0 * step)).abs() < 1e-3,
+                        "{}: {time}",
+                        robot.name
+                    );
+                    assert!(
+                        (a - (after[1] - before[1]) / (2.0 * step)).abs() < 0.1,
+                        "{}: {time}",
+                        robot.name
+                    );
+                    assert!(q > limits.lower && q < limits.upper && v.abs() <= limits.velocity);
+                    furthest = [furthest[0].min(q), furthest[1].max(q)];
+                }
+                assert_eq!(motion.state(joint, 25.0)[1], 0.0);
+                assert_eq!(motion.state(joint, 45.0)[1], 0.0);
+                if reach.is_some_and(|reach| reach.joint == joint && reach.upper) {
+                    assert!(limits.upper - furthest[1] < 0.03 * (limits.upper - limits.lower));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn derivatives_are_exact_and_limits_are_kept() {
+        check(false, None);
+        check(true, None);
+        check(false, Some(Reach { joint: 1, upper: true }));
+        check(true, Some(Reach { joint: 1, upper: true }));
+    }
+
+    #[test]
+    fn a_simulated_motion_passes_through_its_grid() {
+        let states: Vec<_> =
+            (0..50).map(|k| 0.1 * f64::from(k)).map(|t| [t.sin(), t.cos(), -t.sin()]).collect();
+        let joint = JointMotion::Simulated { step: 0.1, states };
+        for time in [0.0, 0.31, 1.77, 4.9] {
+            let [q, v, a] = joint.state(time, 5.0);
+            assert!(
+                (q - time.sin()).abs() < 1e-5
+                    && (v - time.cos()).abs() < 1e-3
+                    && (a + time.sin()).abs() < 2e-3
+            );
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! `phiw check`: what is in logs, before anything is fitted to them.
+
+use crate::arguments::CheckArguments;
+use crate::console::Console;
+use crate::output::check_folder;
+use crate::warnings::{file_name, of_log};
+use crate::{Error, session};
+use phiw_dynamics::Tree;
+use phiw_identification::{InputError, check_excitation, check_logs, robot_findings};
+use phiw_result_folder::{Disk, Lock, ResultFile, check_inputs, replace_files};
+use phiw_telemetry::{CheckSettings, Finding, FindingKind, Survey, TorqueColumns};
+use serde_json::{Value, json};
+use std::fmt::Write;
+
+/// Name of the file with the findings.
+const RESULT_FILE: &str = "check.json";
+
+/// What was found.
+#[derive(Debug)]
+pub struct CheckOutcome {
+    /// As text for a terminal.
+    pub summary: String,
+    /// The same as numbers, as in `check.json`.
+    pub report: Value,
+}
+
+/// Surveys logs and says what sensors, drives and loggers did to them. Findings are answers, not errors.
+///
+/// # Errors
+/// A robot or a log that cannot be read, or results that cannot be written.
+pub fn check(arguments: &CheckArguments, console: &Console) -> Result<CheckOutcome, Error> {
+    let place = match &arguments.out {
+        Some(folder) => {
+            check_folder(folder)?;
+            let inputs: Vec<_> = std::iter::once(&arguments.urdf).chain(&arguments.logs).cloned().collect();
+            check_inputs(&inputs, &[folder.join(RESULT_FILE)])?;
+            Some((folder, Lock::acquire(&folder.join(RESULT_FILE), "phiw check")?))
+        }
+        None => None,
+    };
+    let (tree, _, _) = session::read_robot(&arguments.session())?;
+    let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
+    let mut surveys = Vec::new();
+    for path in &arguments.logs {
+        let mut progress = |done, total| console.progress("surveying", done, total);
+        surveys.push(phiw_telemetry::survey(path, &joints, TorqueColumns::Optional, &mut progress)?);
+    }
+    console.finish();
+    let findings = robot_findings(&tree, &surveys, &CheckSettings::default());
+    let refused = [check_logs(&tree, &surveys, &[]).err(), check_excitation(&tree, &surveys).err()];
+    let refused: Vec<String> = refused.iter().flatten().map(InputError::to_string).collect();
+    let report = report(&tree, &surveys, &findings, &refused);
+    if let Some((folder, _lock)) = &place {
+        let text = serde_json::to_string_pretty(&report)
+            .map_err(|source| Error::Json { file: RESULT_FILE, source })?;
+        std::fs::create_dir_all(folder)
+            .map_err(|source| Error::Unreadable { path: folder.into(), source })?;
+        replace_files(&Disk, folder, RESULT_FILE, &[ResultFile::new(RESULT_FILE, text + "\n")])?;
+    }
+    Ok(CheckOutcome { summary: summary(&surveys, &findings, &refused), report })
+}
+
+/// One warning for each thing that was found, with the number of logs that show it; without what the identification says or refuses by itself.
+pub fn warnings(tree: &Tree, surveys: &[Survey]) -> Vec<String> {
+    let findings = robot_findings(tree, surveys, &CheckSettings::default());
+    let said_elsewhere = |finding: &Finding| finding.kind == FindingKind::StandsStill;
+    let contradicted = |log: usize, finding: &Finding| {
+        let joint = finding.column.strip_prefix("qd.");
+        surveys[log].joints.iter().any(|survey| {
+            Some(survey.name.as_str()) == joint
+                && survey.velocity.is_some_and(|velocity| !velocity.is_derivative())
+        })
+    };
+    grouped(&findings)
+        .into_iter()
+        .filter(|(logs, finding)| !said_elsewhere(finding) && !contradicted(logs[0], finding))
+        .map(|(logs, finding)| format!("{}: {finding}", logs_in_words(&logs, surveys)))
+        .collect()
+}
+
+/// What several logs show alike, once, with those logs.
+fn grouped(findings: &[(usize, Finding)]) -> Vec<(Vec<usize>, &Finding)> {
+    let mut groups: Vec<(Vec<usize>, &Finding)> = Vec::new();
+    for (log, finding) in findings {
+        let same = |(_, other): &&mut (Vec<usize>, &Finding)| {
+            (other.kind, &other.column) == (finding.kind, &finding.column)
+        };
+        match groups.iter_mut().find(same) {
+            Some((logs, _)) => logs.push(*log),
+            None => groups.push((vec![*log], finding)),
+        }
+    }
+    groups
+}
+
+fn logs_in_words(logs: &[usize], surveys: &[Survey]) -> String {
+    let first = file_name(&surveys[logs[0]].path);
+    match logs.len() - 1 {
+        0 => first,
+        1 => format!("{first} and one log more"),
+        more => format!("{first} and {more} logs more"),
+    }
+}
+
+fn summary(surveys: &[Survey], findings: &[(usize, Finding)], refused: &[String]) -> String {
+    let mut text = String::new();
+    // Writing to a string does not fail.
+    for survey in surveys {
+        let _ = writeln!(
+            text,
+            "{}: {} rows, {:.1} s at {:.1} Hz, {} segments",
+            file_name(&survey.path),
+            survey.used_rows,
+            survey.duration(),
+            survey.rate_hz(),
+            survey.segments.len(),
+        );
+        for warning in of_log(survey) {
+            let _ = writeln!(text, "  {warning}");
+        }
+    }
+    let groups = grouped(findings);
+    for (logs, finding) in &groups {
+        let _ = writeln!(text, "\n{}: {} {}", logs_in_words(logs, surveys), finding.column, finding.measured);
+        let _ = writeln!(text, "  what follows: {}", finding.kind.consequence());
+        let _ = writeln!(text, "  what to do:   {}", finding.kind.mend());
+    }
+    for refused in refused {
+        let _ = writeln!(text, "\nno identification would begin: {refused}");
+    }
+    if groups.is_empty() && refused.is_empty() {
+        text.push_str("\nnothing found\n");
+    }
+    text
+}
+
+fn report(tree: &Tree, surveys: &[Survey], findings: &[(usize, Finding)], refused: &[String]) -> Value {
+    let finding = |(log, finding): &(usize, Finding)| {
+        json!({
+            "log": surveys[*log].path.display().to_string(),
+            "kind": finding.kind.name(),
+            "column": finding.column,
+            "measured": finding.measured,
+            "consequence": finding.kind.consequence(),
+            "mend": finding.kind.mend(),
+        })
+    };
+    let log = |survey: &Survey| {
+        json!({
+            "log": survey.path.display().to_string(),
+            "rows": survey.rows,
+            "used_rows": survey.used_rows,
+            "seconds": survey.duration(),
+            "rate_hz": survey.rate_hz(),
+            "jitter": survey.jitter,
+            "clock": survey.clock.to_string(),
+            "warnings": of_log(survey),
+        })
+    };
+    json!({
+        "schema": 1,
+        "robot": tree.name(),
+        "logs": surveys.iter().map(log).collect::<Vec<_>>(),
+        "findings": findings.iter().map(finding).collect::<Vec<_>>(),
+        "refused": refused,
+    })
+}

@@ -1,0 +1,93 @@
+//! Each class of what sensors, drives and loggers do to a log is found, and nothing is found where there is nothing.
+
+use phiw_telemetry::{CheckSettings, FindingKind, TorqueColumns, findings, survey};
+use std::fmt::Write;
+
+const RATE: f64 = 200.0;
+
+/// A row of a joint that swings: `[t, q, qd, tau]`, with noise of a hundredth on the torque.
+fn clean(k: usize) -> [f64; 4] {
+    let t = k as f64 / RATE;
+    let swing = |t: f64| {
+        [(2.0 * t).sin() + 0.4 * (7.0 * t + 0.5).sin(), 2.0 * (2.0 * t).cos() + 2.8 * (7.0 * t + 0.5).cos()]
+    };
+    let [q, qd] = swing(t);
+    let noise = ((k as f64 * 12.9898).sin() * 43_758.545_3).fract();
+    [t, q, qd, 3.0 * q.sin() + 0.5 * qd + 0.05 * noise]
+}
+
+/// What is found in 20 s of a log whose rows are `change`d.
+fn found(change: impl Fn(usize, [f64; 4]) -> [f64; 4]) -> Vec<FindingKind> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("log.csv");
+    let mut text = String::from("t,q.a,qd.a,tau.a\n");
+    for k in 0..(20.0 * RATE) as usize {
+        let [t, q, qd, tau] = change(k, clean(k));
+        let _ = writeln!(text, "{t:.6},{q:.9},{qd:.7},{tau:.6}");
+    }
+    std::fs::write(&path, text).expect("written");
+    let survey =
+        survey(&path, &["a".to_owned()], TorqueColumns::Required, &mut |_, _| {}).expect("a log that reads");
+    findings(&survey, &CheckSettings::default()).into_iter().map(|finding| finding.kind).collect()
+}
+
+fn check(change: impl Fn(usize, [f64; 4]) -> [f64; 4], expected: &[FindingKind]) {
+    assert_eq!(found(change), expected);
+}
+
+#[test]
+fn nothing_is_found_in_a_clean_log() {
+    check(|_, row| row, &[]);
+    // Rests are no findings: velocity and torque are 0 where nothing moves.
+    check(|k, row| if k < 800 { [row[0], clean(800)[1], 0.0, 0.0] } else { row }, &[]);
+    // Gravity may keep a torque's sign.
+    check(|_, [t, q, qd, tau]| [t, q, qd, tau + 12.0], &[]);
+    // Fine steps of torque and encoder.
+    check(|_, [t, q, qd, tau]| [t, (q * 1e4).round() / 1e4, qd, (tau * 50.0).round() / 50.0], &[]);
+}
+
+#[test]
+fn every_class_is_found() {
+    use FindingKind::*;
+    // 0.15 s late.
+    check(|k, [t, q, _, tau]| [t, q, if k < 30 { 0.0 } else { clean(k - 30)[2] }, tau], &[LateVelocity]);
+    check(|_, [t, q, qd, tau]| [t, q, 1.1 * qd, tau], &[VelocityScale]);
+    check(|_, [t, q, qd, tau]| [t, q, -9.55 * qd, tau], &[VelocityScale]);
+    check(|_, [t, q, qd, tau]| [t, q, if qd.abs() < 0.6 { 0.0 } else { qd }, tau], &[VelocityDeadBand]);
+    check(|k, [t, q, qd, tau]| [t, q, qd, if (900..1200).contains(&k) { 0.0 } else { tau }], &[ZeroTorque]);
+    check(|k, [t, q, qd, tau]| [t, q, qd, if (900..1200).contains(&k) { 1.25 } else { tau }], &[StillTorque]);
+    check(|_, [t, q, qd, tau]| [t, q, qd, tau.abs()], &[UnsignedTorque]);
+    check(|_, [t, q, qd, tau]| [t, q, qd, (2.0 * tau).round() / 2.0], &[TorqueSteps]);
+    check(|_, [t, q, qd, tau]| [t, q, qd, tau.min(2.5)], &[FlatTop]);
+    check(|_, [t, q, qd, tau]| [t, q, qd, tau.max(-2.5)], &[FlatTop]);
+    check(|_, [t, q, qd, tau]| [t, q, qd, if tau.abs() < 0.3 { 0.0 } else { tau }], &[TorqueDeadBand]);
+    check(
+        |_, [t, q, _, tau]| [t, (q * 100.0).round() / 100.0, clean((t * RATE).round() as usize)[2], tau],
+        &[EncoderSteps],
+    );
+    check(|_, [t, _, _, tau]| [t, 0.3, 0.0, tau], &[StandsStill]);
+    check(|_, [t, q, qd, tau]| [20.0 * t, q, qd / 20.0, tau], &[Sampling]);
+    let late_stamp = |k: usize| if k % 2 == 0 { 0.4 / RATE } else { 0.0 };
+    check(move |k, [t, q, qd, tau]| [t + late_stamp(k), q, qd, tau], &[Clock]);
+}
+
+/// A velocity that lags was trusted where its slope against dq/dt was near 1, and four false delays came of it.
+#[test]
+fn a_velocity_that_lags_is_not_used() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("log.csv");
+    for (late, plausible) in [(0, true), (4, false), (30, false)] {
+        let mut text = String::from("t,q.a,qd.a,tau.a\n");
+        for k in 0..4000 {
+            let [t, q, _, tau] = clean(k + late);
+            let _ = writeln!(text, "{t:.6},{q:.9},{:.7},{tau:.6}", clean(k)[2]);
+        }
+        std::fs::write(&path, text).expect("written");
+        let survey =
+            survey(&path, &["a".to_owned()], TorqueColumns::Required, &mut |_, _| {}).expect("it reads");
+        let velocity = survey.joints[0].velocity.expect("a velocity column");
+        assert_eq!(velocity.plausible(), plausible, "{late}: {velocity:?}");
+        let lag = velocity.alignment.expect("enough to tell by").lag;
+        assert!((lag - late as f64 / RATE).abs() < 0.003, "{late}: {lag}");
+    }
+}
