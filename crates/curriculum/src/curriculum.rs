@@ -5,6 +5,7 @@ use crate::estimation::RowsAt;
 use crate::experiment::check_noise;
 use crate::growth::Found;
 use crate::planner::{Belief, MeasuredSoFar, Policy, plan};
+use crate::random::{Purpose, random};
 use crate::triangle::Triangle;
 use crate::{
     Candidates, Constraint, CurriculumError, EndCriterion, Estimate, Estimator, Evidence, Experiment, Growth,
@@ -61,19 +62,6 @@ impl Default for CurriculumSettings {
     fn default() -> Self {
         CurriculumSettings { none_allowed: NoneAllowed::default(), rivalry_period_s: 0.02, most_answers: 3 }
     }
-}
-
-/// What a stream of random numbers is for. Each iteration has its own, so that nothing has to be remembered.
-#[derive(Clone, Copy)]
-pub(crate) enum Purpose {
-    Selection = 1,
-    Experiment = 2,
-}
-
-pub(crate) fn random(seed: u64, iteration: usize, purpose: Purpose) -> ChaCha8Rng {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(16 * (iteration as u64 + 1) + purpose as u64);
-    random
 }
 
 /// A belief with what was measured, and how sure it is.

@@ -16,6 +16,7 @@ mod measured;
 mod motion;
 mod motion_limits;
 mod planner;
+mod random;
 mod record;
 mod relaxation;
 mod rivalry;

@@ -67,7 +67,7 @@ fn every_class_is_found() {
     );
     check(|_, [t, _, _, tau]| [t, 0.3, 0.0, tau], &[StandsStill]);
     check(|_, [t, q, qd, tau]| [20.0 * t, q, qd / 20.0, tau], &[Sampling]);
-    let late_stamp = |k: usize| if k % 2 == 0 { 0.4 / RATE } else { 0.0 };
+    let late_stamp = |k: usize| if k.is_multiple_of(2) { 0.4 / RATE } else { 0.0 };
     check(move |k, [t, q, qd, tau]| [t + late_stamp(k), q, qd, tau], &[Clock]);
 }
 

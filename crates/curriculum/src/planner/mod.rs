@@ -4,7 +4,7 @@ mod permission;
 
 pub use permission::{NoneAllowed, Permission, permission};
 
-use crate::curriculum::{Purpose, random};
+use crate::random::{Purpose, random};
 use crate::selection::{Best, Choice, Question, Scored, decide};
 use crate::triangle::Triangle;
 use crate::{

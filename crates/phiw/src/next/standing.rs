@@ -41,6 +41,6 @@ fn stance(path: &Path, whole: &Tree, held: &[(String, f64)]) -> Result<Stance, E
         feet_from_toml(&text, whole).map_err(|source| Error::Support { path: path.to_owned(), source })?;
     StanceSettings::default().stance(whole, &feet, held).map_err(|source| match source {
         StanceError::Curriculum(source) => source.into(),
-        source => Error::Stance { path: path.to_owned(), source },
+        source => Error::Stance { path: path.to_owned(), source: Box::new(source) },
     })
 }
