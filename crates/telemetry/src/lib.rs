@@ -22,6 +22,7 @@ mod segments;
 mod signal_shape;
 mod spectrum;
 mod spike;
+mod still;
 mod stream;
 mod survey;
 mod writer;
