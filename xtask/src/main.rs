@@ -1,5 +1,6 @@
 //! Experiments and set-up of the workspace: `cargo xtask <task>`.
 
+mod consumers;
 mod mujoco;
 mod test;
 mod torture;
@@ -17,19 +18,19 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// The best main job so far, on an example log that is made on the spot: identify, with report.
+    /// The main job: a curriculum with the loop closed, then `phiw explain`, on motions and logs that are made on the spot; with reports.
     Run(run::Arguments),
     /// A log as long as wanted, to see that memory does not grow with it.
     SyntheticLog(synthetic_log::Arguments),
-    /// Retargeting: figure 9 of the paper, whole databases, and a page with pictures of them.
+    /// Retargeting on one page: whole databases, a film of person and robot, mink on the same markers, figure 9 of the paper.
     Retarget(retarget::Arguments),
     /// All checks of the workspace, and the count of tests.
     Test(test::Arguments),
-    /// Hostile inputs on the release binary: a table of what came of each class.
+    /// Hostile inputs, kills and concurrent runs on the release binary: a table of what came of each class.
     Torture(torture::Arguments),
     /// Fetch MuJoCo's library into the user's cache folder, with Python's pip.
     Mujoco(mujoco::Arguments),
-    /// Compare with Pinocchio, installed from PyPI into a private environment.
+    /// Compare dynamics with Pinocchio and C3D files with ezc3d, installed from PyPI into a private environment.
     Oracle(oracle::Arguments),
     /// Robot logs with effects that nobody declared: generate, trace with `phiw explain`, score.
     Undeclared(undeclared::Arguments),
@@ -59,5 +60,22 @@ fn main() -> anyhow::Result<ExitCode> {
         }
         Task::Plant(arguments) => plant::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Undeclared(arguments) => undeclared::command(&arguments).map(|()| ExitCode::SUCCESS),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Arguments;
+    use clap::CommandFactory;
+
+    /// Units in doc comments are escaped for rustdoc. `cargo xtask plant --help` showed the escapes: `\[s\]`.
+    #[test]
+    fn help_has_no_escapes_of_rustdoc() {
+        let mut command = Arguments::command();
+        command.build();
+        for task in command.get_subcommands_mut() {
+            let help = task.render_long_help().to_string();
+            assert!(!help.contains('\\') && !help.contains("[`"), "{help}");
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 mod tally;
 
-use crate::mujoco;
+use crate::{consumers, mujoco};
 use anyhow::Context;
 use phiw_experiments::environment;
 use std::io::{BufRead, BufReader};
@@ -35,6 +35,10 @@ const CHECKS: [Check; 3] = [
     },
 ];
 
+/// Licences, duplicates and sources of what is linked, by `deny.toml`. Advisories are left out: they need a network.
+const DEPENDENCIES: Check =
+    Check { arguments: &["deny", "check", "licenses", "bans", "sources"], environment: &[] };
+
 /// `--show-output` prints what passing tests said, so that a test that skipped itself is seen and counted.
 const TESTS: &[&str] = &["test", "--workspace", "--no-fail-fast", "--", "--show-output"];
 
@@ -45,22 +49,51 @@ const TESTS: &[&str] = &["test", "--workspace", "--no-fail-fast", "--", "--show-
 pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     mujoco::fetch_or_go_on_without();
     let mut failed = Vec::new();
-    let checks = if arguments.quick { &[] } else { &CHECKS[..] };
+    let mut checks = Vec::new();
+    let mut unchecked_dependencies = false;
+    if !arguments.quick {
+        match has_deny()? {
+            true => checks.push(&DEPENDENCIES),
+            false => unchecked_dependencies = true,
+        }
+        checks.extend(&CHECKS);
+    }
     for check in checks {
         if !passes(check)? {
-            failed.push(check.arguments);
+            failed.push(named(check.arguments));
         }
     }
-    let (mut tally, passed) = run_tests()?;
+    let mut tally = Tally::default();
     tally.add_failures(failed.len() as u64);
-    if !passed {
-        failed.push(TESTS);
+    if !run_tests(TESTS, &mut tally)? {
+        failed.push(named(TESTS));
     }
-    for arguments in &failed {
-        println!("failed: cargo {}", arguments.join(" "));
+    let folder = tempfile::Builder::new().prefix("phiw-consumers-").tempdir()?;
+    let problems = consumers::generate(folder.path())?;
+    tally.add_failures(problems.len() as u64);
+    failed.extend(problems);
+    let consumers = consumers::arguments(folder.path())?;
+    let consumers: Vec<&str> = consumers.iter().map(String::as_str).collect();
+    if !run_tests(&consumers, &mut tally)? {
+        failed.push(named(&consumers));
+    }
+    for problem in &failed {
+        println!("failed: {problem}");
+    }
+    if unchecked_dependencies {
+        println!(
+            "skipped: cargo-deny is not installed: licences, duplicates and sources of dependencies are unchecked"
+        );
     }
     println!("{tally}");
     Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Whether `cargo deny` can be run.
+fn has_deny() -> anyhow::Result<bool> {
+    let version =
+        environment::cargo()?.args(["deny", "--version"]).output().context("cargo cannot be started")?;
+    Ok(version.status.success())
 }
 
 fn passes(check: &Check) -> anyhow::Result<bool> {
@@ -73,15 +106,15 @@ fn passes(check: &Check) -> anyhow::Result<bool> {
     Ok(status.success())
 }
 
-/// Runs the tests, passing on their output line by line, and counts; whether all is well.
-fn run_tests() -> anyhow::Result<(Tally, bool)> {
-    announce(TESTS);
+/// Runs tests, passing on their output line by line, and counts; whether all is well.
+fn run_tests(arguments: &[&str], tally: &mut Tally) -> anyhow::Result<bool> {
+    announce(arguments);
     let mut child = environment::cargo()?
-        .args(TESTS)
+        .args(arguments)
         .stdout(Stdio::piped())
         .spawn()
         .context("cargo cannot be started")?;
-    let mut tally = Tally::default();
+    let failures = tally.failures();
     if let Some(output) = child.stdout.take() {
         for line in BufReader::new(output).split(b'\n') {
             let line = line.context("the output of the tests cannot be read")?;
@@ -91,12 +124,16 @@ fn run_tests() -> anyhow::Result<(Tally, bool)> {
         }
     }
     let passed = child.wait().context("cargo test did not end")?.success();
-    if !passed && !tally.has_failures() {
+    if !passed && tally.failures() == failures {
         tally.add_failures(1); // tests that do not compile, or a binary that crashed
     }
-    Ok((tally, passed))
+    Ok(passed)
 }
 
 fn announce(arguments: &[&str]) {
-    println!("\n=== cargo {}", arguments.join(" "));
+    println!("\n=== {}", named(arguments));
+}
+
+fn named(arguments: &[&str]) -> String {
+    format!("cargo {}", arguments.join(" "))
 }

@@ -1,19 +1,20 @@
 //! From a recording to a motion of the robot: calibration, start, solution, and what it is worth.
 
-use crate::Problem;
 use crate::artefacts::Artefact;
 use crate::bspline::{Basis, Curve};
 use crate::human::{HumanBody, MarkerMap, Placed};
 use crate::human_start::human_start;
 use crate::marker_settings::MarkerSettings;
 use crate::quality::{Quality, quality};
-use crate::recording::{MarkerRecording, RecordingError, read_recording};
+use crate::reading::read_recording;
+use crate::recording::{MarkerRecording, RecordingError};
 use crate::retarget_error::{RetargetError, check_near};
 use crate::robot::{RobotError, RobotModel};
 use crate::robot_start::robot_start;
 use crate::solver::{Iterations, Solution, Stop, solve};
 use crate::start::{align, start};
 use crate::weights::{Cost, Weights};
+use crate::{Calibration, Problem};
 use phiw_dynamics::{Tree, Vec3};
 use phiw_limits::Limits;
 use std::collections::BTreeMap;
@@ -63,19 +64,6 @@ pub struct Retargeter {
     map: MarkerMap,
     robot: RobotModel,
     options: RetargetOptions,
-}
-
-/// What a static trial tells of a person.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Calibration {
-    /// Where markers sit on their segments.
-    pub markers: BTreeMap<String, Placed>,
-    /// The lengths ξ^h \[m\], in the order of [`crate::human::SEGMENT_PARAMETERS`].
-    pub lengths_m: Vec<f64>,
-    /// Coordinates of the pose by name \[rad, m\].
-    pub pose: BTreeMap<String, f64>,
-    /// RMS distance of the markers that the map places from where they are \[m\].
-    pub marker_rms_m: f64,
 }
 
 /// A person in one recording, as the markers alone tell.
@@ -131,6 +119,27 @@ pub struct Retargeted {
     pub frames: usize,
     /// Frames per second \[Hz\].
     pub rate_hz: f64,
+}
+
+impl Retargeted {
+    /// Time between two samples \[s\]: the recording's.
+    pub fn period_s(&self) -> f64 {
+        1.0 / self.rate_hz
+    }
+
+    /// Positions \[rad, m\], velocities and accelerations of the robot at the recording's frames, row-major `[frame × joint]`: what a log of the motion, or a
+    /// motion to choose from, is made of.
+    pub fn signals(&self) -> [Vec<f64>; 3] {
+        let joints = self.robot.dimension();
+        let mut scratch = vec![0.0; self.robot.basis().degree() + 1];
+        let mut signals = [0; 3].map(|_| vec![0.0; self.frames * joints]);
+        for (order, signal) in signals.iter_mut().enumerate() {
+            for (frame, values) in signal.chunks_exact_mut(joints.max(1)).enumerate() {
+                self.robot.evaluate(order, frame as f64 / self.rate_hz, &mut scratch, values);
+            }
+        }
+        signals
+    }
 }
 
 impl Retargeter {

@@ -1,7 +1,7 @@
 //! Where the solver starts.
 
+use crate::Calibration;
 use crate::problem::Problem;
-use crate::retarget::Calibration;
 use crate::solver::{Arrow, Pattern};
 use phiw_dynamics::{Lanes, Vec3};
 

@@ -1,15 +1,18 @@
-//! What the trait promises apart from numbers: names, sizes, errors, what changes and what does not.
+//! What the traits promise apart from numbers: names, sizes, errors, what changes and what does not.
 
 use crate::measured::{largest_difference, worse};
 use crate::{Builder, Failure, Measured};
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, random_state};
-use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World};
+use phiw_dynamics::{BackendError, DynamicsBackend, SimulationBackend, Tree, World};
 
 /// Joint names, their order, and the sizes of states are the tree's.
 ///
 /// # Errors
 /// What differs.
-pub fn joints_are_the_trees(build: &Builder, tree: &Tree) -> Result<Measured, Failure> {
+pub fn joints_are_the_trees<B: DynamicsBackend + ?Sized>(
+    build: &Builder<B>,
+    tree: &Tree,
+) -> Result<Measured, Failure> {
     let backend = build(tree, &World::default())?;
     let (found, expected) = (backend.joint_names(), tree.joint_names());
     if found.len() != expected.len() {
@@ -62,18 +65,42 @@ pub fn inverse_dynamics_keeps_state(build: &Builder, tree: &Tree) -> Result<Meas
     Measured::check("change of the state by inverse and forward dynamics", change, 0.0, "")
 }
 
-/// Slices of the wrong length, NaN, a quaternion that is not unit and a time step that is not positive are the errors that the
-/// trait names, and change nothing.
+/// Motions and forces of the wrong length are the errors that [`DynamicsBackend`] names, and do not disturb what comes after.
 ///
 /// # Errors
 /// What was accepted, or refused with another error.
-pub fn wrong_input_is_refused(build: &Builder, tree: &Tree) -> Result<Measured, Failure> {
+pub fn wrong_motion_is_refused<B: DynamicsBackend + ?Sized>(
+    build: &Builder<B>,
+    tree: &Tree,
+) -> Result<Measured, Failure> {
     let mut backend = build(tree, &World::default())?;
     let RandomState { q, v, a } = random_state(tree, &mut RandomNumbers::new(3));
+    let (longer, shorter) = (vec![0.0; v.len() + 1], &v[1..]);
+    let (mut before, mut after) = (a.clone(), a.clone());
+    backend.inverse_dynamics(&q, &v, &a, &mut before)?;
+    let size = |error: &BackendError| matches!(error, BackendError::Dimension(_));
+    let mut force = a.clone();
+    expect("a configuration too short", backend.inverse_dynamics(&q[1..], &v, &a, &mut force), size)?;
+    expect("an acceleration too short", backend.inverse_dynamics(&q, &v, shorter, &mut force), size)?;
+    expect("room for too few forces", backend.inverse_dynamics(&q, &v, &a, &mut shorter.to_vec()), size)?;
+    expect("a force too long", backend.forward_dynamics(&q, &v, &longer, &mut force), size)?;
+    backend.inverse_dynamics(&q, &v, &a, &mut after)?;
+    let change = largest_difference(&after, &before);
+    Measured::check("change of inverse dynamics by what is refused", change, 0.0, "")
+}
+
+/// States of the wrong length, NaN, a quaternion that is not unit and a time step that is not positive are the errors that
+/// [`SimulationBackend`] names, and change nothing.
+///
+/// # Errors
+/// What was accepted, or refused with another error.
+pub fn wrong_step_is_refused(build: &Builder, tree: &Tree) -> Result<Measured, Failure> {
+    let mut backend = build(tree, &World::default())?;
+    let RandomState { q, v, .. } = random_state(tree, &mut RandomNumbers::new(3));
     backend.set_state(&q, &v)?;
     let before = state_of(backend.as_ref())?;
     let torque = vec![0.0; tree.joint_count()];
-    let (longer, shorter) = (vec![0.0; v.len() + 1], &v[1..]);
+    let longer = vec![0.0; v.len() + 1];
     let with_nan = |slice: &[f64]| {
         let mut broken = slice.to_vec();
         if let Some(last) = broken.last_mut() {
@@ -81,14 +108,7 @@ pub fn wrong_input_is_refused(build: &Builder, tree: &Tree) -> Result<Measured, 
         }
         broken
     };
-    let mut force = a.clone();
 
-    let expect = |what: &str, result: Result<(), BackendError>, right: fn(&BackendError) -> bool| match result
-    {
-        Err(error) if right(&error) => Ok(()),
-        Err(error) => Err(Failure::Wrong(format!("{what} is refused with the wrong error: {error}"))),
-        Ok(()) => Err(Failure::Wrong(format!("{what} is accepted"))),
-    };
     let size = |error: &BackendError| matches!(error, BackendError::Dimension(_));
     let finite = |error: &BackendError| matches!(error, BackendError::NotFinite { .. });
     let time = |error: &BackendError| matches!(error, BackendError::TimeStep { .. });
@@ -99,9 +119,6 @@ pub fn wrong_input_is_refused(build: &Builder, tree: &Tree) -> Result<Measured, 
     expect("a NaN position", backend.set_state(&with_nan(&q), &v), finite)?;
     expect("a NaN velocity", backend.set_state(&q, &with_nan(&v)), finite)?;
     expect("room for too few positions", backend.state(&mut q[1..].to_vec(), &mut v.clone()), size)?;
-    expect("an acceleration too short", backend.inverse_dynamics(&q, &v, shorter, &mut force), size)?;
-    expect("room for too few forces", backend.inverse_dynamics(&q, &v, &a, &mut shorter.to_vec()), size)?;
-    expect("a force too long", backend.forward_dynamics(&q, &v, &longer, &mut force), size)?;
     expect("a torque too long", backend.step(&vec![0.0; torque.len() + 1], 1e-3), size)?;
     expect("a NaN torque", backend.step(&with_nan(&torque), 1e-3), finite)?;
     for dt in [0.0, -1e-3, f64::NAN] {
@@ -117,8 +134,21 @@ pub fn wrong_input_is_refused(build: &Builder, tree: &Tree) -> Result<Measured, 
     Measured::check("change of the state by what is refused", change, 0.0, "")
 }
 
+/// An error unless `what` was refused, and with the right error.
+fn expect(
+    what: &str,
+    result: Result<(), BackendError>,
+    right: fn(&BackendError) -> bool,
+) -> Result<(), Failure> {
+    match result {
+        Err(error) if right(&error) => Ok(()),
+        Err(error) => Err(Failure::Wrong(format!("{what} is refused with the wrong error: {error}"))),
+        Ok(()) => Err(Failure::Wrong(format!("{what} is accepted"))),
+    }
+}
+
 /// The backend's state.
-pub(crate) fn state_of(backend: &dyn DynamicsBackend) -> Result<(Vec<f64>, Vec<f64>), BackendError> {
+pub(crate) fn state_of(backend: &dyn SimulationBackend) -> Result<(Vec<f64>, Vec<f64>), BackendError> {
     let (mut q, mut v) = (vec![0.0; backend.configuration_size()], vec![0.0; backend.velocity_size()]);
     backend.state(&mut q, &mut v)?;
     Ok((q, v))

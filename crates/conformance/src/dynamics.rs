@@ -3,7 +3,7 @@
 use crate::measured::{relative_difference, worse};
 use crate::{Builder, Failure, Measured};
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, random_state};
-use phiw_dynamics::{AnalyticBackend, DynamicsBackend, Tree, World};
+use phiw_dynamics::{AnalyticBackend, DimensionError, DynamicsBackend, Tree, World};
 use phiw_regressor::JointTorqueRegressor;
 
 /// Largest difference between two ways to compute the same force or acceleration, relative to its largest element.
@@ -13,8 +13,8 @@ const AGREEMENT: f64 = 1e-8;
 ///
 /// # Errors
 /// The largest difference, over the largest force of its state, is above 1e-8.
-pub fn inverse_dynamics_is_the_analytic(
-    build: &Builder,
+pub fn inverse_dynamics_is_the_analytic<B: DynamicsBackend + ?Sized>(
+    build: &Builder<B>,
     tree: &Tree,
     states: usize,
 ) -> Result<Measured, Failure> {
@@ -33,8 +33,8 @@ pub fn inverse_dynamics_is_the_analytic(
 ///
 /// # Errors
 /// The largest difference, over the largest component, is above 1e-8.
-pub fn base_wrench_of_inverse_dynamics(
-    build: &Builder,
+pub fn base_wrench_of_inverse_dynamics<B: DynamicsBackend + ?Sized>(
+    build: &Builder<B>,
     tree: &Tree,
     states: usize,
 ) -> Result<Measured, Failure> {
@@ -53,8 +53,8 @@ pub fn base_wrench_of_inverse_dynamics(
 ///
 /// # Errors
 /// The largest difference, over the largest acceleration of its state, is above 1e-8.
-pub fn forward_dynamics_undoes_inverse_dynamics(
-    build: &Builder,
+pub fn forward_dynamics_undoes_inverse_dynamics<B: DynamicsBackend + ?Sized>(
+    build: &Builder<B>,
     tree: &Tree,
     states: usize,
 ) -> Result<Measured, Failure> {
@@ -72,8 +72,8 @@ pub fn forward_dynamics_undoes_inverse_dynamics(
 ///
 /// # Errors
 /// The largest difference, over the largest force of its state, is above 1e-8.
-pub fn regressor_predicts_inverse_dynamics(
-    build: &Builder,
+pub fn regressor_predicts_inverse_dynamics<B: DynamicsBackend + ?Sized>(
+    build: &Builder<B>,
     tree: &Tree,
     seed: u64,
     states: usize,
@@ -81,20 +81,26 @@ pub fn regressor_predicts_inverse_dynamics(
     let mut backend = build(tree, &World::default())?;
     let regressor = JointTorqueRegressor::new(tree);
     let (mut scratch, mut pairs) = (regressor.scratch::<f64>(), vec![0.0; regressor.buffer_size()]);
-    let mut dense = vec![0.0; regressor.rows() * regressor.columns()];
     let parameters = tree.inertial_parameters();
     let largest = over_states(tree, states, seed, |RandomState { q, v, a }| {
         let mut force = vec![0.0; v.len()];
         backend.inverse_dynamics(q, v, a, &mut force)?;
         regressor.compute(tree, q, v, a, &mut scratch, &mut pairs)?;
-        regressor.scatter(&pairs, &mut dense)?;
-        let predicted: Vec<f64> = dense
-            .chunks_exact(parameters.len())
-            .map(|row| row.iter().zip(&parameters).map(|(x, w)| x * w).sum())
-            .collect();
-        Ok(relative_difference(&predicted, &force))
+        Ok(relative_difference(&predicted_force(&regressor, &pairs, &parameters)?, &force))
     })?;
     Measured::check("Φw against inverse dynamics", largest, AGREEMENT, "")
+}
+
+/// Φw of a regressor's pairs.
+pub(crate) fn predicted_force(
+    regressor: &JointTorqueRegressor,
+    pairs: &[f64],
+    parameters: &[f64],
+) -> Result<Vec<f64>, DimensionError> {
+    let mut dense = vec![0.0; regressor.rows() * regressor.columns()];
+    regressor.scatter(pairs, &mut dense)?;
+    let rows = dense.chunks_exact(parameters.len());
+    Ok(rows.map(|row| row.iter().zip(parameters).map(|(x, w)| x * w).sum()).collect())
 }
 
 /// A rotor's inertia stands on the diagonal of the mass matrix, in inverse and in forward dynamics, and gives the base no
@@ -102,8 +108,8 @@ pub fn regressor_predicts_inverse_dynamics(
 ///
 /// # Errors
 /// The largest difference, over the largest force or acceleration of its state, is above 1e-8.
-pub fn rotor_inertia_is_part_of_the_mass(
-    build: &Builder,
+pub fn rotor_inertia_is_part_of_the_mass<B: DynamicsBackend + ?Sized>(
+    build: &Builder<B>,
     tree: &Tree,
     states: usize,
 ) -> Result<Measured, Failure> {
@@ -131,7 +137,7 @@ pub fn rotor_inertia_is_part_of_the_mass(
 }
 
 /// The worst of what `measure` says of `states` random states.
-fn over_states(
+pub(crate) fn over_states(
     tree: &Tree,
     states: usize,
     seed: u64,

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod body_kinematics;
 mod contract;
 mod dynamics;
 mod measured;
@@ -9,8 +10,13 @@ mod robots;
 mod standing;
 mod step;
 
+pub use body_kinematics::{
+    body_joints_are_the_trees, body_motions_are_the_trees, floor_wrench_over_kinematics_is_the_base_wrench,
+    regressor_over_kinematics_predicts_inverse_dynamics,
+};
 pub use contract::{
-    inverse_dynamics_keeps_state, joints_are_the_trees, state_round_trip, wrong_input_is_refused,
+    inverse_dynamics_keeps_state, joints_are_the_trees, state_round_trip, wrong_motion_is_refused,
+    wrong_step_is_refused,
 };
 pub use dynamics::{
     base_wrench_of_inverse_dynamics, forward_dynamics_undoes_inverse_dynamics,
@@ -26,33 +32,72 @@ pub use step::{
     base_wrench_of_a_step, energy_drift, falls_freely, position_limits_hold, tracking_difference,
 };
 
-use phiw_dynamics::{AnalyticBackend, BackendError, DynamicsBackend, Tree, World};
+use phiw_dynamics::{
+    AnalyticBackend, BackendError, BodyKinematics, DynamicsBackend, SimulationBackend, Tree, World,
+};
 
-/// What makes the backend under test: a robot in a world.
-pub type Builder<'a> = dyn Fn(&Tree, &World) -> Result<Box<dyn DynamicsBackend>, BackendError> + 'a;
+/// What makes the backend under test: a robot in a world. `B` is the backend, or the trait of it that is tested.
+pub type Builder<'a, B = dyn SimulationBackend> = dyn Fn(&Tree, &World) -> Result<Box<B>, BackendError> + 'a;
 
 /// The builder of [`AnalyticBackend`], which knows no world with contacts.
 ///
 /// # Errors
 /// The world does not fit the robot, or has feet or position limits.
-pub fn analytic(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+pub fn analytic(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     Ok(Box::new(AnalyticBackend::in_world(tree.clone(), world)?))
 }
 
-/// Everything about the robot's own equation that holds for any backend: the contract, then inverse and forward dynamics at
-/// `states` random states. Steps and floors, whose accuracy is the backend's own, have checks of their own.
+/// Everything about the robot's own equation that holds for any [`DynamicsBackend`]: the contract, then inverse and forward dynamics at
+/// `states` random states.
 ///
 /// # Errors
 /// The first check that fails.
-pub fn equation_of_motion(build: &Builder, tree: &Tree, states: usize) -> Result<Vec<Measured>, Failure> {
+pub fn equation_of_motion<B: DynamicsBackend + ?Sized>(
+    build: &Builder<B>,
+    tree: &Tree,
+    states: usize,
+) -> Result<Vec<Measured>, Failure> {
     Ok(vec![
         joints_are_the_trees(build, tree)?,
-        state_round_trip(build, tree, states.min(100))?,
-        wrong_input_is_refused(build, tree)?,
-        inverse_dynamics_keeps_state(build, tree)?,
+        wrong_motion_is_refused(build, tree)?,
         inverse_dynamics_is_the_analytic(build, tree, states)?,
         base_wrench_of_inverse_dynamics(build, tree, states.min(100))?,
         forward_dynamics_undoes_inverse_dynamics(build, tree, states)?,
         regressor_predicts_inverse_dynamics(build, tree, 0, states.min(100))?,
+    ])
+}
+
+/// What any [`SimulationBackend`] promises about its state. Steps and floors, whose accuracy is the backend's own, have checks of their
+/// own.
+///
+/// # Errors
+/// The first check that fails.
+pub fn state_of_a_simulation(build: &Builder, tree: &Tree, states: usize) -> Result<Vec<Measured>, Failure> {
+    Ok(vec![
+        state_round_trip(build, tree, states)?,
+        wrong_step_is_refused(build, tree)?,
+        inverse_dynamics_keeps_state(build, tree)?,
+    ])
+}
+
+/// The regressor and the ZMP over a backend's own [`BodyKinematics`]: bodies and their motions are the tree's, Φw = τ, and the floor's
+/// wrench is the base wrench, at `states` random states.
+///
+/// # Errors
+/// The first check that fails.
+pub fn kinematics_of_bodies<B>(
+    build: &Builder<B>,
+    tree: &Tree,
+    states: usize,
+) -> Result<Vec<Measured>, Failure>
+where
+    B: DynamicsBackend + BodyKinematics + ?Sized,
+    Failure: From<B::Error>,
+{
+    Ok(vec![
+        body_joints_are_the_trees(build, tree)?,
+        body_motions_are_the_trees(build, tree, states)?,
+        regressor_over_kinematics_predicts_inverse_dynamics(build, tree, 0, states)?,
+        floor_wrench_over_kinematics_is_the_base_wrench(build, tree, states)?,
     ])
 }

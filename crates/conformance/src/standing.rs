@@ -3,8 +3,9 @@
 use crate::contract::state_of;
 use crate::measured::worse;
 use crate::motion::{Controller, Target, smooth_step};
-use crate::step::{center_of_mass, dot};
+use crate::step::center_of_mass;
 use crate::{Builder, Failure, Measured};
+use phiw_dynamics::dense::dot;
 use phiw_dynamics::{AnalyticBackend, DynamicsBackend, Inertia, Placement, Spatial, Tree, Vec3, World};
 use std::f64::consts::TAU;
 

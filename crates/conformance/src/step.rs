@@ -4,8 +4,11 @@ use crate::contract::state_of;
 use crate::measured::{largest_difference, worse};
 use crate::motion::{Controller, Swing, Target};
 use crate::{Builder, Failure, Measured};
+use phiw_dynamics::dense::dot;
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, random_state};
-use phiw_dynamics::{AnalyticBackend, DimensionError, DynamicsBackend, Placement, Tree, Workspace, World};
+use phiw_dynamics::{
+    AnalyticBackend, DimensionError, DynamicsBackend, Placement, SimulationBackend, Tree, Workspace, World,
+};
 
 /// Joints under PD control and gravity compensation, on a smooth motion of 5 s, against the same with a `reference` backend.
 ///
@@ -148,7 +151,7 @@ pub fn position_limits_hold(build: &Builder, tree: &Tree) -> Result<Measured, Fa
 }
 
 /// Kinetic and potential energy \[J\].
-fn energies(tree: &Tree, backend: &dyn DynamicsBackend) -> Result<[f64; 2], Failure> {
+fn energies(tree: &Tree, backend: &dyn SimulationBackend) -> Result<[f64; 2], Failure> {
     let (q, v) = state_of(backend)?;
     let mut mass = vec![0.0; v.len() * v.len()];
     tree.mass_matrix(&q, &mut Workspace::new(tree), &mut mass)?;
@@ -170,8 +173,4 @@ pub(crate) fn center_of_mass(
     tree.center_of_mass_jacobian(&placements, &mut jacobian)?;
     let velocity = jacobian.chunks_exact(v.len()).map(|row| dot(row, v)).collect();
     Ok((tree.center_of_mass(&placements)?.0, velocity))
-}
-
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -2,16 +2,27 @@
 
 use phiw_conformance::{
     Failure, analytic, base_wrench_of_a_step, energy_drift, equation_of_motion, falls_freely,
-    inverse_dynamics_is_the_analytic, regressor_predicts_random_robots, robots, tracking_difference,
+    inverse_dynamics_is_the_analytic, kinematics_of_bodies, regressor_predicts_random_robots, robots,
+    state_of_a_simulation, tracking_difference,
 };
 use phiw_dynamics::random_tree::{RandomTreeOptions, random_tree};
 use phiw_dynamics::{AnalyticBackend, BackendError, DynamicsBackend, Tree, World};
+
+/// The builder of the backend as the type that it is, which has the motion of bodies too.
+fn own_type(tree: &Tree, world: &World) -> Result<Box<AnalyticBackend>, BackendError> {
+    Ok(Box::new(AnalyticBackend::in_world(tree.clone(), world)?))
+}
 
 #[test]
 fn equation_of_motion_of_all_robots() {
     for robot in robots().unwrap() {
         println!("{}", robot.name);
-        for measured in equation_of_motion(&analytic, &robot.tree, 200).unwrap() {
+        let groups = [
+            equation_of_motion(&analytic, &robot.tree, 200),
+            state_of_a_simulation(&analytic, &robot.tree, 100),
+            kinematics_of_bodies(&own_type, &robot.tree, 100),
+        ];
+        for measured in groups.into_iter().flat_map(Result::unwrap) {
             println!("  {measured}");
         }
     }
@@ -19,7 +30,7 @@ fn equation_of_motion_of_all_robots() {
 
 #[test]
 fn random_robots() {
-    println!("{}", regressor_predicts_random_robots(&analytic, true).unwrap());
+    println!("{}", regressor_predicts_random_robots(&own_type, true).unwrap());
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! What each motion of the dataset would tell: its factor, computed once for all iterations and all runs.
 
 use crate::triangle::Triangle;
-use crate::{CurriculumError, MotionDataset, Robot, RobotModel};
+use crate::{CurriculumError, Evidence, MotionDataset, Robot, RobotModel};
 use phiw_identification::{Design, EffectSpec, Fold, accumulate};
 use phiw_regressor::RegressorError;
 use phiw_regressor::least_squares::GroupedFactor;
@@ -23,6 +23,10 @@ pub struct Candidate {
 #[derive(Clone, Debug)]
 pub struct Candidates {
     weights: Vec<f64>,
+    /// The parameters of a belief that the columns belong to.
+    parameters: Vec<usize>,
+    /// Rows a second of the motion in the middle \[Hz\].
+    rate_hz: f64,
     candidates: Vec<Candidate>,
     everything: Triangle,
 }
@@ -54,6 +58,41 @@ impl Candidates {
         Self::of_designs(&|| robot.design_of(model), dataset, weights)
     }
 
+    /// The columns that are known before a motion has been run, for beliefs with the columns of `design`: those of the rigid body, and of the effects that follow from the
+    /// motion alone. An effect that needs torques or measured signals says nothing yet, and one that no motion excites would make cond(Φ) infinite.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn foreseeable(
+        robot: &Robot,
+        design: &Design,
+        dataset: &MotionDataset,
+        weights: &[f64],
+    ) -> Result<Self, CurriculumError> {
+        let all = 0..design.effects().len();
+        let mut effects: Vec<usize> =
+            all.filter(|&effect| design.effects()[effect].needs().is_empty()).collect();
+        loop {
+            let specs: Vec<EffectSpec> =
+                effects.iter().map(|&effect| design.effects()[effect].spec()).collect();
+            let candidates = Self::new(robot, &specs, dataset, weights)?;
+            let mut parameters: Vec<usize> = (0..robot.base().count()).collect();
+            let mut excited = Vec::new();
+            for &effect in &effects {
+                let columns = parameters.len()..parameters.len() + design.effect_parameters(effect).len();
+                let size = |column| candidates.everything.column(column).iter().map(|x| x * x).sum::<f64>();
+                if columns.clone().all(|column| (f64::MIN_POSITIVE..f64::INFINITY).contains(&size(column))) {
+                    excited.push(effect);
+                }
+                parameters.extend(design.effect_parameters(effect));
+            }
+            if excited.len() == effects.len() {
+                return Ok(Candidates { parameters, ..candidates });
+            }
+            effects = excited;
+        }
+    }
+
     fn of_designs(
         design: &(dyn Fn() -> Result<Design, CurriculumError> + Sync),
         dataset: &MotionDataset,
@@ -68,9 +107,14 @@ impl Candidates {
         let candidates: Result<Vec<Candidate>, CurriculumError> =
             dataset.motions().par_iter().map(reduce).collect();
         let candidates = candidates?;
-        let mut everything = Triangle::empty(design()?.parameter_count());
+        let count = design()?.parameter_count();
+        let mut everything = Triangle::empty(count);
         candidates.iter().for_each(|candidate| everything.absorb(&mut candidate.triangle.clone()));
-        Ok(Candidates { weights: weights.to_vec(), candidates, everything })
+        let mut rates: Vec<f64> = dataset.motions().iter().map(|motion| 1.0 / motion.period_s()).collect();
+        rates.sort_by(f64::total_cmp);
+        let rate_hz = rates.get(rates.len() / 2).copied().unwrap_or(1.0);
+        let parameters = (0..count).collect();
+        Ok(Candidates { weights: weights.to_vec(), parameters, rate_hz, candidates, everything })
     }
 
     /// R of all motions together.
@@ -88,12 +132,14 @@ impl Candidates {
         &self.candidates
     }
 
-    /// R of what has been measured, weighted like the candidates.
+    /// R of what has been measured in the candidates' columns, weighted like them, its rows counted as if they were as dense in time as those of the motions.
     ///
     /// # Errors
-    /// The factor is of another robot.
-    pub fn measured(&self, factor: &GroupedFactor) -> Result<Triangle, RegressorError> {
-        Ok(Triangle::of_factor(&factor.combine(&self.weights)?))
+    /// The evidence is of another robot.
+    pub fn measured(&self, evidence: &Evidence) -> Result<Triangle, RegressorError> {
+        let density = evidence.rate_hz().map_or(1.0, |rate_hz| (self.rate_hz / rate_hz).sqrt());
+        let weights: Vec<f64> = self.weights.iter().map(|weight| density * weight).collect();
+        Ok(Triangle::of_factor(&evidence.factor().select(&self.parameters)?.combine(&weights)?))
     }
 }
 

@@ -45,15 +45,20 @@ pub trait Constraint: Send + Sync {
 pub struct ZmpConstraint {
     /// What the robot stands on.
     pub stance: Stance,
-    /// Which ZMP; the paper's is [`ZmpModel::PointMass`], equation (8).
+    /// Which ZMP. Default: [`ZmpModel::MultiBody`], what a force plate sees. The paper's is [`ZmpModel::PointMass`], equation (8), which leaves out that bodies turn.
     pub model: ZmpModel,
-    /// Time between the samples that are looked at \[s\]: people move slowly against 20 ms.
+    /// Time between the samples that are looked at \[s\]; every sample is looked at where that is shorter than the motion's period. Default: 0.
     pub period_s: f64,
 }
 
 impl ZmpConstraint {
-    /// The paper's: equation (8), looked at every 20 ms.
+    /// For a robot that could fall: the ZMP of all bodies at every sample.
     pub fn new(stance: Stance) -> Self {
+        ZmpConstraint { stance, model: ZmpModel::MultiBody, period_s: 0.0 }
+    }
+
+    /// As in the paper: equation (8), looked at every 20 ms.
+    pub fn of_the_paper(stance: Stance) -> Self {
         ZmpConstraint { stance, model: ZmpModel::PointMass, period_s: 0.02 }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::{CurriculumError, Robot, RobotModel};
 use phiw_dynamics::DimensionError;
+use phiw_effects::JointProperty;
 use phiw_identification::Design;
 use phiw_plant::{ComputedTorque, Gains, RigidBodyModel, TorqueModel};
 use phiw_telemetry::Block;
@@ -41,8 +42,9 @@ impl Controller for FeedForward {
 fn viscous_alone(robot: &Robot, model: &RobotModel) -> Option<Vec<f64>> {
     let mut viscous = vec![0.0; robot.tree().joint_count()];
     for effect in &model.effects {
-        let ("viscous_friction", [joint], [value]) =
-            (effect.spec.kind.as_str(), effect.spec.joints.as_slice(), effect.parameters.as_slice())
+        let property = robot.catalogue().joint_property(&effect.spec);
+        let (Some(JointProperty::Damping), [joint], [value]) =
+            (property, effect.spec.joints.as_slice(), effect.parameters.as_slice())
         else {
             return None;
         };
@@ -68,9 +70,7 @@ impl TorqueModel for ModelTorque {
         scratch.begin(&block)?;
         scratch.evaluate(&block, 0, &mut self.evaluation)?;
         for (torque, layout) in torque.iter_mut().zip(self.design.rows()) {
-            let columns = &self.evaluation[layout.range.clone()];
-            *torque =
-                columns.iter().zip(&layout.parameters).map(|(column, &k)| column * self.parameters[k]).sum();
+            *torque = layout.torque(&self.evaluation, &self.parameters);
         }
         Ok(())
     }

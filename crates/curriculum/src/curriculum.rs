@@ -1,12 +1,14 @@
 //! Algorithm 1, lines 10 to 17: select, measure, estimate, relax; and, where the model may grow, look for what it lacks.
 
+use crate::contest::{rivals_to_separate, unconfirmed};
 use crate::estimation::RowsAt;
+use crate::experiment::check_noise;
 use crate::growth::Found;
-use crate::selection::{Choice, Question};
+use crate::planner::{Belief, MeasuredSoFar, Policy, plan};
 use crate::triangle::Triangle;
 use crate::{
     Candidates, Constraint, CurriculumError, EndCriterion, Estimate, Estimator, Evidence, Experiment, Growth,
-    IterationRecord, Learnt, Measured, MotionDataset, Relaxation, Rivalry, Robot, RobotModel, Run, Safety,
+    IterationRecord, Measured, MotionDataset, NoneAllowed, Plan, Relaxation, Rivalry, Robot, RobotModel, Run,
     Selection,
 };
 use phiw_identification::EffectSpec;
@@ -38,19 +40,37 @@ pub struct Curriculum<'a> {
     pub end: &'a dyn EndCriterion,
     /// Which instants of a log become rows.
     pub rows_at: RowsAt,
+    /// What the loop itself decides.
+    pub settings: CurriculumSettings,
 }
 
-/// Answers of who looks for effects that are put to the estimator's likelihood after one log.
-const MOST_ANSWERS: usize = 3;
+/// What the loop itself decides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CurriculumSettings {
+    /// What happens where the constraint allows no motion. Default: [`NoneAllowed::Refuse`].
+    pub none_allowed: NoneAllowed,
+    /// Time between the samples by which rival beliefs are compared \[s\]. Shorter costs time; longer misses what is quick. Default: 0.02, since people move slowly against
+    /// it.
+    pub rivalry_period_s: f64,
+    /// How often after one log [`Growth`] is asked again once the likelihood has refuted one of its answers, which is then excluded. Each time costs a
+    /// search and some fits. Default: 3, a limit on the time and no finding.
+    pub most_answers: usize,
+}
+
+impl Default for CurriculumSettings {
+    fn default() -> Self {
+        CurriculumSettings { none_allowed: NoneAllowed::default(), rivalry_period_s: 0.02, most_answers: 3 }
+    }
+}
 
 /// What a stream of random numbers is for. Each iteration has its own, so that nothing has to be remembered.
 #[derive(Clone, Copy)]
-enum Purpose {
+pub(crate) enum Purpose {
     Selection = 1,
     Experiment = 2,
 }
 
-fn random(seed: u64, iteration: usize, purpose: Purpose) -> ChaCha8Rng {
+pub(crate) fn random(seed: u64, iteration: usize, purpose: Purpose) -> ChaCha8Rng {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(16 * (iteration as u64 + 1) + purpose as u64);
     random
@@ -88,6 +108,7 @@ impl Curriculum<'_> {
     /// # Errors
     /// The run is not of this robot, the robot can not be run, or nothing can be estimated.
     pub fn step(&self, run: &mut Run) -> Result<(), CurriculumError> {
+        check_noise(self.robot, self.experiment, self.estimator)?;
         let Some(plan) = self.plan(run)? else { return Ok(()) };
         let motion = &self.dataset.motions()[plan.choice.motion];
         let mut noise = random(run.seed, run.history.len(), Purpose::Experiment);
@@ -151,10 +172,10 @@ impl Curriculum<'_> {
         let mut learning = self.believe(evidence, &run.model, std::slice::from_ref(measured))?;
         let Some(growth) = self.growth else { return Ok(learning) };
         run.logs.push(measured.clone());
-        let mut doubted = open_rivalry(run).is_some();
+        let mut doubted = open_rivalry(&run.rivals, &run.history).is_some();
         let (mut found, mut believed, mut refuted) = (Found::default(), Vec::new(), Vec::new());
         // What stood in the place of the answer, and is not true, makes way for it.
-        for _ in 0..MOST_ANSWERS {
+        for _ in 0..self.settings.most_answers {
             found = growth.look(self.robot, &learning.model, &run.logs, doubted, &refuted)?;
             (learning, believed) =
                 self.confirmed(learning, found.effects.clone(), &run.logs, growth.least_gain())?;
@@ -188,22 +209,16 @@ impl Curriculum<'_> {
     ) -> Result<(Learning, Vec<EffectSpec>), CurriculumError> {
         let mut with = self.fitted(&learning, &effects, logs)?;
         while let Some(misfit) = self.misfit(&with)? {
-            let mut least: Option<(f64, usize, Learning)> = None;
+            let (mut gains, mut without) = (Vec::new(), Vec::new());
             for place in 0..effects.len() {
                 let others = [&effects[..place], &effects[place + 1..]].concat();
-                let without = self.fitted(&learning, &others, logs)?;
-                let gain = self.misfit(&without)?.unwrap_or(f64::INFINITY) - misfit;
-                if least.as_ref().is_none_or(|least| gain < least.0) {
-                    least = Some((gain, place, without));
-                }
+                let learning = self.fitted(&learning, &others, logs)?;
+                gains.push(self.misfit(&learning)?.unwrap_or(f64::INFINITY) - misfit);
+                without.push(learning);
             }
-            match least {
-                Some((gain, place, without)) if gain < least_gain => {
-                    effects.remove(place);
-                    with = without;
-                }
-                _ => break,
-            }
+            let Some(place) = unconfirmed(&gains, least_gain) else { break };
+            effects.remove(place);
+            with = without.swap_remove(place);
         }
         Ok((with, effects))
     }
@@ -270,118 +285,57 @@ impl Curriculum<'_> {
         let Some(evidence) = run.evidence.as_ref().filter(|evidence| !evidence.is_empty()) else {
             return Ok(None);
         };
-        let declared: Vec<usize> = (0..self.candidates.everything().size()).collect();
-        Ok(Some(self.candidates.measured(&evidence.factor().select(&declared)?)?))
+        Ok(Some(self.candidates.measured(evidence)?))
     }
 
     /// What the next iteration would do; none once the run has ended. For a real robot this is all there is to do before it moves.
     ///
     /// # Errors
-    /// The run is not of this robot or these motions.
+    /// As [`plan()`], or the run is not of this robot or these motions.
     pub fn plan(&self, run: &Run) -> Result<Option<Plan>, CurriculumError> {
         if run.ended.is_some() {
             return Ok(None);
         }
-        let safety = self.constraint.all(self.robot, &run.model, self.dataset)?;
-        let first_alpha = run.first_alpha.unwrap_or_else(|| self.relaxation.first(&safety));
-        let first = run.history.iter().find_map(|record| record.condition_number);
-        let alpha = match (first, run.history.last().and_then(|record| record.condition_number)) {
-            (Some(first_condition_number), Some(condition_number)) => {
-                let uncertainty = |record: &IterationRecord| record.torque_uncertainty;
-                let torque_uncertainty = run
-                    .history
-                    .iter()
-                    .find_map(uncertainty)
-                    .zip(run.history.last().and_then(uncertainty))
-                    .map(|(first, last)| [first, last]);
-                self.relaxation.next(&Learnt {
-                    first_alpha,
-                    first_condition_number,
-                    condition_number,
-                    torque_uncertainty,
-                })
-            }
-            _ => first_alpha,
+        let triangle = self.measured(run)?;
+        let condition_numbers: Vec<_> = run.history.iter().map(|record| record.condition_number).collect();
+        let torque_uncertainties: Vec<_> =
+            run.history.iter().map(|record| record.torque_uncertainty).collect();
+        let belief = Belief {
+            robot: self.robot,
+            dataset: self.dataset,
+            candidates: self.candidates,
+            model: &run.model,
+            initial: &run.initial,
+            rivalry: open_rivalry(&run.rivals, &run.history),
         };
-        // Where the robot has fallen on all of them, all are open again.
-        let all_fell = run.excluded.len() >= self.dataset.len();
-        let open = (0..self.dataset.len()).filter(|motion| all_fell || !run.excluded.contains(motion));
-        let mut allowed: Vec<usize> =
-            open.clone().filter(|&motion| safety[motion].largest_reduction >= alpha).collect();
-        let forced = allowed.is_empty();
-        if forced {
-            let by_safety = |a: &usize, b: &usize| {
-                safety[*a].largest_reduction.total_cmp(&safety[*b].largest_reduction).then(b.cmp(a))
-            };
-            allowed.extend(open.max_by(by_safety));
-        }
-        let (choice, separates) = match open_rivalry(run) {
-            Some(rivalry) => (self.telling(rivalry, &allowed)?, Some(rivalry.names())),
-            None => (self.select(run, &allowed)?, None),
+        let measured = MeasuredSoFar {
+            triangle: triangle.as_ref(),
+            condition_numbers: &condition_numbers,
+            torque_uncertainties: &torque_uncertainties,
+            first_alpha: run.first_alpha,
+            excluded: &run.excluded,
         };
-        let safety = safety[choice.motion];
-        Ok(Some(Plan { choice, separates, allowed, forced, alpha, first_alpha, safety }))
+        plan(&belief, &measured, &self.policy(run.seed)).map(Some)
     }
 
-    /// Line 12.
-    fn select(&self, run: &Run, allowed: &[usize]) -> Result<Choice, CurriculumError> {
-        let measured = self.measured(run)?;
-        let question = Question { candidates: self.candidates, allowed, measured: measured.as_ref() };
-        let mut dice = random(run.seed, run.history.len(), Purpose::Selection);
-        Ok(self.selection.choose(&question, &mut dice))
-    }
-
-    /// The motion on which two rivals differ most, torques counted by their limits.
-    fn telling(&self, rivalry: &Rivalry, allowed: &[usize]) -> Result<Choice, CurriculumError> {
-        let tree = self.robot.tree();
-        let scale: Vec<f64> = (0..tree.joint_count())
-            .map(|joint| tree.joint(joint).limits.effort)
-            .map(|effort| if effort.is_finite() && effort > 0.0 { effort } else { 1.0 })
-            .collect();
-        let mut differences = Vec::with_capacity(allowed.len());
-        for &motion in allowed {
-            let difference = rivalry.difference(self.robot, &self.dataset.motions()[motion], &scale)?;
-            differences.push((difference, motion));
+    /// Who decides what in a plan of this curriculum.
+    fn policy(&self, seed: u64) -> Policy<'_> {
+        Policy {
+            selection: self.selection,
+            constraint: self.constraint,
+            relaxation: self.relaxation,
+            none_allowed: self.settings.none_allowed,
+            rivalry_period_s: self.settings.rivalry_period_s,
+            seed,
         }
-        differences.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        Ok(Choice {
-            motion: differences.first().map_or(0, |best| best.1),
-            merit: differences.first().map(|best| best.0),
-            runner_up: differences.get(1).map(|next| (next.1, next.0)),
-        })
     }
 }
 
-/// The rivals that the next motion is to tell apart. A pair has one motion, and then the parameters have one: what tells rivals apart need not tell
-/// anything else, and rivals that one motion has not told may be rivals for ever.
-fn open_rivalry(run: &Run) -> Option<&Rivalry> {
-    if run.history.last().is_some_and(|record| record.separates.is_some()) {
-        return None;
-    }
-    let tried = |names: &[String; 2]| {
-        let separated = run.history.iter().filter_map(|record| record.separates.as_ref());
-        separated.into_iter().any(|pair| names.iter().all(|name| pair.contains(name)))
-    };
-    run.rivals.iter().find(|rivalry| !tried(&rivalry.names()))
-}
-
-/// What an iteration is going to do.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Plan {
-    /// The motion, and why.
-    pub choice: Choice,
-    /// The two beliefs that it is to tell apart, in words; none if it is chosen for what it tells of the parameters.
-    pub separates: Option<[String; 2]>,
-    /// The motions that could be chosen, ascending.
-    pub allowed: Vec<usize>,
-    /// The constraint allows none, and the safest is the only one.
-    pub forced: bool,
-    /// The reduction coefficient α.
-    pub alpha: f64,
-    /// α of the first iteration.
-    pub first_alpha: f64,
-    /// How safe the motion is under the present belief.
-    pub safety: Safety,
+/// The rivals that the next motion is to tell apart.
+fn open_rivalry<'a>(rivals: &'a [Rivalry], history: &[IterationRecord]) -> Option<&'a Rivalry> {
+    let names: Vec<[String; 2]> = rivals.iter().map(Rivalry::names).collect();
+    let separated: Vec<Option<[String; 2]>> = history.iter().map(|record| record.separates.clone()).collect();
+    rivals_to_separate(&names, &separated).map(|index| &rivals[index])
 }
 
 /// The first belief of a run: [`RobotModel::unreliable`] about `truth`, the same for the same seed.

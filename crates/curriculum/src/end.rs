@@ -1,17 +1,6 @@
 //! When the curriculum ends.
 
-use crate::IterationRecord;
-use serde::{Deserialize, Serialize};
-
-/// Why a curriculum ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum EndReason {
-    /// The number of iterations that was asked for.
-    Count,
-    /// Another motion would change little.
-    Converged,
-}
+use crate::{EndReason, IterationRecord};
 
 /// Decides after each iteration whether it was the last.
 pub trait EndCriterion: Send + Sync {

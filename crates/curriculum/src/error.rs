@@ -31,6 +31,47 @@ pub enum CurriculumError {
         /// What it must be.
         must_be: &'static str,
     },
+    /// Every motion is expected to topple the robot.
+    #[error(
+        "none of the {motions} motions keeps the ZMP over the support under the present estimate: the safest, {safest}, leaves it by {:.1} mm; \
+         add calmer motions, or start from a better model", 1e3 * outside_m
+    )]
+    NothingSafe {
+        /// How many there are.
+        motions: usize,
+        /// The one that comes nearest.
+        safest: String,
+        /// How far its ZMP is outside \[m\].
+        outside_m: f64,
+    },
+    /// The robot has fallen on every motion.
+    #[error(
+        "the robot has fallen on all of the {motions} motions: add calmer motions, or start from a better model"
+    )]
+    FellOnAll {
+        /// How many there are.
+        motions: usize,
+    },
+    /// Noise is stated twice.
+    #[error(
+        "the estimator counts on a noise of {told} N·m (N) in the torque of {joint}, where the experiment makes {made}: give it the experiment's own torque_noise()"
+    )]
+    Noise {
+        /// The joint.
+        joint: String,
+        /// Standard deviation that the experiment makes \[N·m, N\].
+        made: f64,
+        /// Standard deviation that the estimator was told \[N·m, N\].
+        told: f64,
+    },
+    /// A model's effect has no counterpart in a plant.
+    #[error(
+        "no plant is built with {kind} from a model: leave it out there, and add it to the effects of the simulated robot"
+    )]
+    NotSimulated {
+        /// The kind of the effect.
+        kind: String,
+    },
     /// A saved run is not of this robot or these motions.
     #[error(
         "the saved run does not fit: {0}; use the robot and the motions that it was begun with, or begin anew"

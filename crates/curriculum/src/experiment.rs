@@ -1,8 +1,9 @@
 //! Where measurements come from: a trait, and a simulated robot over any backend.
 
-use crate::{Controller, CurriculumError, Measured, Motion, Robot, RobotModel};
-use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World};
-use phiw_plant::{Effect, History, Plant, PlantSetup, Reaction, Run as PlantRun, Sensors, Timing};
+use crate::{Controller, CurriculumError, Estimator, KnownEffect, Measured, Motion, Robot, RobotModel};
+use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
+use phiw_effects::JointProperty;
+use phiw_plant::{Effect, Friction, History, Plant, PlantRun, PlantSetup, Reaction, Sensors, Timing};
 use rand_chacha::ChaCha8Rng;
 
 /// What happened when a motion was tried.
@@ -31,10 +32,16 @@ pub trait Experiment: Send + Sync {
         motion: &Motion,
         random: &mut ChaCha8Rng,
     ) -> Result<Trial, CurriculumError>;
+
+    /// Standard deviation of each torque's noise \[N·m, N\], if it is known. An estimator that is told another one is refused.
+    fn known_torque_noise(&self) -> Option<Vec<f64>> {
+        None
+    }
 }
 
 /// Makes a backend of the robot as it is built.
-pub type BuildBackend = dyn Fn(&Tree, &World) -> Result<Box<dyn DynamicsBackend>, BackendError> + Send + Sync;
+pub type BuildBackend =
+    dyn Fn(&Tree, &World) -> Result<Box<dyn SimulationBackend>, BackendError> + Send + Sync;
 
 /// A simulated robot: the plant of the paper's Figure 2, over any backend.
 ///
@@ -51,20 +58,79 @@ pub struct SimulatedRobot {
     pub controller: Box<dyn Controller>,
     /// Standard deviation of δf over the torque limit: 0.05 in the paper.
     pub actuator_noise: f64,
+    /// What the log says of the motion and of the torques, a row every control period. The controller sees the encoders, too.
+    pub sensors: Sensors,
     /// How time is cut.
     pub timing: Timing,
     /// Tilt of its base at which it counts as fallen \[rad\].
     pub fall_tilt_rad: f64,
+    /// When what it stands with counts as still.
+    pub stillness: Stillness,
     /// Makes the backend.
     pub build: Box<BuildBackend>,
 }
 
-/// Turning rate up to which a base counts as still \[rad/s\]: what a gyroscope tells from its own noise.
-const STILL_RAD_PER_S: f64 = 0.01;
-/// Time around a movement of the base that does not count either \[s\]: it lands before it rests.
-const SETTLES_S: f64 = 0.1;
+/// When a base or a foot counts as still: rows in which it moves are no rows of a robot that stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stillness {
+    /// Turning rate of a base \[rad/s\]. Default: 0.01, what a gyroscope tells from its own noise.
+    pub base_turning: f64,
+    /// Time around a movement of the base that does not count either, since it lands before it rests \[s\]. Default: 0.1.
+    pub settles_s: f64,
+    /// Speed of a foot's sole \[m/s\]. Default: 0.005. A foot of a kilogram that goes through that within a millisecond takes 5 N.
+    pub foot_speed: f64,
+    /// Turning rate of a foot \[rad/s\]. Default: 0.05, the same over a lever of 0.1 m.
+    pub foot_turning: f64,
+}
+
+impl Default for Stillness {
+    fn default() -> Self {
+        Stillness { base_turning: 0.01, settles_s: 0.1, foot_speed: 5e-3, foot_turning: 5e-2 }
+    }
+}
+
+/// Share by which two statements of one noise may differ: numbers that were written down and read again.
+const ROUNDED: f64 = 1e-6;
 
 impl SimulatedRobot {
+    /// The robot that `truth` describes, on its fixed base: what its bodies and its effects are is stated there alone. Its actuators add no noise, its sensors are
+    /// exact, and its time is cut as [`Timing::default`] says: set what should be otherwise.
+    ///
+    /// # Errors
+    /// `truth` is not of this robot, or has an effect that no plant is built with from a model: add such a one to [`Self::effects`].
+    pub fn new(
+        robot: &Robot,
+        truth: &RobotModel,
+        controller: impl Controller + 'static,
+        build: impl Fn(&Tree, &World) -> Result<Box<dyn SimulationBackend>, BackendError> + Send + Sync + 'static,
+    ) -> Result<Self, CurriculumError> {
+        let timing = Timing::default();
+        Ok(SimulatedRobot {
+            tree: truth.tree(robot)?,
+            world: World::default(),
+            effects: plant_effects(robot, truth)?,
+            controller: Box::new(controller),
+            actuator_noise: 0.0,
+            sensors: Sensors::exact(timing.control_period_s),
+            timing,
+            fall_tilt_rad: 0.3,
+            stillness: Stillness::default(),
+            build: Box::new(build),
+        })
+    }
+
+    /// Standard deviation of each torque's noise \[N·m, N\]: what the actuator adds and what its sensor adds.
+    pub fn torque_noise(&self) -> Vec<f64> {
+        let noise = |joint: usize| {
+            let sensor = self.sensors.torque_noise.get(joint).copied().unwrap_or(0.0);
+            match self.actuator_noise {
+                0.0 => sensor,
+                share => sensor.hypot(share * self.tree.joint(joint).limits.effort),
+            }
+        };
+        (0..self.tree.joint_count()).map(noise).collect()
+    }
+
     /// Lets a plant of its own follow a motion of its motors.
     pub(crate) fn run(
         &self,
@@ -73,16 +139,16 @@ impl SimulatedRobot {
         motion: &Motion,
         random: &mut ChaCha8Rng,
     ) -> Result<PlantRun, CurriculumError> {
+        let period_s = self.sensors.period_s;
+        if (period_s / self.timing.control_period_s - 1.0).abs() > 1e-9 {
+            let must_be =
+                "the control period, since a row's torque is the one that is held until the next row";
+            return Err(CurriculumError::Value { what: "the sensors' period", value: period_s, must_be });
+        }
         let setup = PlantSetup {
             effects: self.effects.clone(),
             actuator_noise: self.actuator_noise,
-            // The command itself: a mean around the stamp would mix two of them.
-            sensors: Sensors {
-                period_s: self.timing.control_period_s,
-                torque_window_s: 0.0,
-                derivatives: true,
-                ..Sensors::default()
-            },
+            sensors: self.sensors.clone(),
             timing: self.timing,
             fall_tilt_rad: self.fall_tilt_rad,
             ..PlantSetup::new(self.controller.controller(robot, model)?)
@@ -105,9 +171,9 @@ impl SimulatedRobot {
         };
         let moves: Vec<bool> = (0_u32..)
             .map_while(|row| rate(f64::from(row) * period_s))
-            .map(|rate| rate > STILL_RAD_PER_S)
+            .map(|rate| rate > self.stillness.base_turning)
             .collect();
-        let reach = (SETTLES_S / period_s).round() as usize;
+        let reach = (self.stillness.settles_s / period_s).round() as usize;
         let around = |row: usize| &moves[row.saturating_sub(reach)..(row + reach + 1).min(moves.len())];
         (0..moves.len()).map(|row| !around(row).contains(&true)).collect()
     }
@@ -138,4 +204,51 @@ impl Experiment for SimulatedRobot {
             reactions: run.reactions,
         })
     }
+
+    fn known_torque_noise(&self) -> Option<Vec<f64>> {
+        Some(self.torque_noise())
+    }
+}
+
+/// The effects of a model as a plant has them: those that simulators express as a property of a joint.
+fn plant_effects(robot: &Robot, model: &RobotModel) -> Result<Vec<Effect>, CurriculumError> {
+    robot.design(&model.specs())?;
+    let effect = |known: &KnownEffect| {
+        let property = robot.catalogue().joint_property(&known.spec);
+        let joint = known.spec.joints.first().and_then(|joint| robot.tree().joint_index(joint));
+        let (Some(property), Some(joint), &[value]) = (property, joint, known.parameters.as_slice()) else {
+            return Err(CurriculumError::NotSimulated { kind: known.spec.kind.clone() });
+        };
+        let width = known.spec.constants.get("sign_width").copied().unwrap_or(0.0);
+        Ok(match property {
+            JointProperty::Damping => {
+                Effect::Friction { joint, law: Friction::Viscous { coefficient: value } }
+            }
+            JointProperty::Friction => {
+                Effect::Friction { joint, law: Friction::Coulomb { torque: value, width } }
+            }
+            JointProperty::Armature => Effect::RotorInertia { joint, inertia: value },
+        })
+    };
+    model.effects.iter().map(effect).collect()
+}
+
+/// The noise is stated where it is made. An estimator that takes it for another weighs what it measures wrongly, and nothing else would tell.
+///
+/// # Errors
+/// The experiment knows the noise of a torque, and the estimator is told another one. Where there is no noise any will do: it stands for rounding.
+pub(crate) fn check_noise(
+    robot: &Robot,
+    experiment: &dyn Experiment,
+    estimator: &dyn Estimator,
+) -> Result<(), CurriculumError> {
+    let (Some(made), Some(told)) = (experiment.known_torque_noise(), estimator.torque_noise()) else {
+        return Ok(());
+    };
+    for ((joint, &made), &told) in robot.tree().joint_names().zip(&made).zip(told) {
+        if made > 0.0 && (told / made - 1.0).abs() > ROUNDED {
+            return Err(CurriculumError::Noise { joint: joint.to_owned(), made, told });
+        }
+    }
+    Ok(())
 }

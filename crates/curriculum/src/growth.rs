@@ -1,10 +1,10 @@
 //! The loop closed: what the residual says that the model lacks enters the model.
 
 use crate::rivalry::torques_along;
-use crate::whiteness::{coloured, residual};
+use crate::whiteness::{WhitenessSettings, coloured, residual};
 use crate::{CurriculumError, Measured, Robot, RobotModel};
+use phiw_effects::SignalRanges;
 use phiw_identification::{BlockSource, Data, EffectCatalogue, EffectSpec, Fold, identify};
-use phiw_residual::catalogue::SignalRanges;
 use phiw_residual::trace::{TraceInput, TraceOptions, trace};
 use phiw_telemetry::{Block, Recording, Survey, arrange_session};
 
@@ -59,10 +59,44 @@ pub trait Growth: Send + Sync {
 pub struct TraceResidual {
     /// When a candidate is believed.
     pub options: TraceOptions,
-    /// Measured time below which nothing is looked for \[s\].
+    /// Measured time below which nothing is looked for \[s\]. Default: 12.
     pub least_s: f64,
-    /// A rival counts if it has at least this probability.
+    /// A rival counts if it has at least this probability. Default: 0.1.
     pub least_rival: f64,
+    /// Which torques are traced.
+    pub whiteness: WhitenessSettings,
+    /// How logs are put together.
+    pub session: SessionSettings,
+}
+
+/// How the logs of a curriculum become one session for a trace.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SessionSettings {
+    /// Stretches that all logs together are cut into. Default: 14; a trace leaves out one after the other, so each costs time.
+    pub stretches: usize,
+    /// Stretches of each log at least. Default: 3, so that something is left beside the one that is held out and the one that is left out.
+    pub least_stretches: usize,
+    /// Stretches of each log at most. Default: 7.
+    pub most_stretches: usize,
+    /// Share of the stretches of each log, at its end, that is held out. Default: 2/7.
+    pub held_out: f64,
+    /// Time between two logs \[s\]. Default: 5; any time longer than a filter's reach does.
+    pub pause_s: f64,
+    /// Speed of a joint at rest over its RMS speed. Default: 0.01, not calibrated.
+    pub rest_share: f64,
+}
+
+impl Default for SessionSettings {
+    fn default() -> Self {
+        SessionSettings {
+            stretches: 14,
+            least_stretches: 3,
+            most_stretches: 7,
+            held_out: 2.0 / 7.0,
+            pause_s: 5.0,
+            rest_share: 0.01,
+        }
+    }
 }
 
 impl Default for TraceResidual {
@@ -78,18 +112,11 @@ impl Default for TraceResidual {
             },
             least_s: 12.0,
             least_rival: 0.1,
+            whiteness: WhitenessSettings::default(),
+            session: SessionSettings::default(),
         }
     }
 }
-
-/// Stretches of each log at most and at least, and of all together.
-const STRETCHES: [usize; 3] = [7, 3, 14];
-/// Share of the stretches that is held out: the end of each log.
-const HELD_OUT: f64 = 2.0 / 7.0;
-/// Time between two logs of a session \[s\].
-const PAUSE_S: f64 = 5.0;
-/// Speed of a joint at rest over its RMS speed.
-const REST_SHARE: f64 = 0.01;
 
 impl Growth for TraceResidual {
     fn name(&self) -> &'static str {
@@ -108,7 +135,7 @@ impl Growth for TraceResidual {
             return Ok(Found::default());
         }
         let present = &model.specs()[robot.declared().len()..];
-        let mut torques = coloured(robot, model, logs)?;
+        let mut torques = coloured(robot, model, logs, &self.whiteness)?;
         if torques.is_empty() && !doubted {
             return Ok(Found { effects: present.to_vec(), rivals: Vec::new() });
         }
@@ -116,8 +143,8 @@ impl Growth for TraceResidual {
         for spec in present {
             torques.extend(catalogue.build(spec, tree)?.entries().iter().map(|entry| entry.row));
         }
-        let session = Session::of(robot, model, logs)?;
-        let data = session.data();
+        let session = Session::of(robot, model, logs, &self.session)?;
+        let data = session.data(&self.session);
         let mut declared = Vec::new();
         for spec in robot.declared() {
             declared.push(vec![catalogue.build(spec, tree)?]);
@@ -159,7 +186,12 @@ struct Session {
 }
 
 impl Session {
-    fn of(robot: &Robot, model: &RobotModel, logs: &[Measured]) -> Result<Self, CurriculumError> {
+    fn of(
+        robot: &Robot,
+        model: &RobotModel,
+        logs: &[Measured],
+        settings: &SessionSettings,
+    ) -> Result<Self, CurriculumError> {
         let joints = robot.tree().joint_count();
         let (design, parameters) = (robot.design_of(model)?, model.parameters(robot)?);
         let (mut surveys, mut blocks) = (Vec::with_capacity(logs.len()), Vec::with_capacity(logs.len()));
@@ -178,22 +210,22 @@ impl Session {
             block.log = index;
             surveys.push(recording(robot, &block).survey()?);
             blocks.push(vec![block]);
-            start_s += log.duration_s() + PAUSE_S;
+            start_s += log.duration_s() + settings.pause_s;
         }
         arrange_session(&mut surveys);
         let speed = |joint: usize| {
             let squares = surveys.iter().map(|survey| survey.joints[joint].velocity_rms.powi(2));
-            REST_SHARE * (squares.sum::<f64>() / surveys.len() as f64).sqrt()
+            settings.rest_share * (squares.sum::<f64>() / surveys.len() as f64).sqrt()
         };
         let rest_speeds = (0..joints).map(speed).collect();
         let noise = squares.iter().map(|sum| (sum / pairs.max(1) as f64).sqrt()).collect();
         Ok(Session { surveys, blocks, noise, rest_speeds })
     }
 
-    fn data(&self) -> Data<'_> {
-        let [most, least, together] = STRETCHES;
-        let all = together.div_ceil(self.surveys.len().max(1)).clamp(least, most);
-        let trained = all - ((HELD_OUT * all as f64) as usize).max(1);
+    fn data(&self, settings: &SessionSettings) -> Data<'_> {
+        let all = settings.stretches.div_ceil(self.surveys.len().max(1));
+        let all = all.max(settings.least_stretches).min(settings.most_stretches);
+        let trained = all - ((settings.held_out * all as f64) as usize).max(1);
         let (mut train, mut held_out) = (Vec::new(), Vec::new());
         for (log, survey) in self.surveys.iter().enumerate() {
             let (start, end) = survey.time_range();

@@ -1,11 +1,28 @@
 //! Motions to choose from: the robot's motion dataset (Q₁ʳ, …, Q_Kʳ).
 
-use crate::CurriculumError;
+use crate::{CurriculumError, StepTolerance};
 use phiw_plant::Reference;
 use phiw_telemetry::{Block, Recording};
 
-/// How far the stamps of a motion may lie from even, as a share of its period.
-const EVEN: f64 = 1e-3;
+/// When the signals of a motion are taken for signals of one motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionTolerance {
+    /// How far stamps may lie from even, as a share of the period. Default: 10⁻³, more than stamps rounded to microseconds at 1 kHz.
+    pub stamps: f64,
+    /// RMS of the difference of a derivative from its signal's slope over the RMS of the larger, from which on they contradict each other. Default: 0.5; retargeted motions, by splines or
+    /// by backward differences, stay below 0.1 (`phiw retarget`, all embedded motions).
+    pub contradiction: f64,
+    /// RMS below which a derivative is rounding \[rad/s, m/s, rad/s², m/s²\]. Default: 10⁻³.
+    pub slow: f64,
+    /// How far steps from row to row may be from the velocities.
+    pub steps: StepTolerance,
+}
+
+impl Default for MotionTolerance {
+    fn default() -> Self {
+        MotionTolerance { stamps: 1e-3, contradiction: 0.5, slow: 1e-3, steps: StepTolerance::default() }
+    }
+}
 
 /// A reference motion Qʳ, sampled evenly.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,15 +37,9 @@ pub struct Motion {
     signals: [Vec<f64>; 3],
 }
 
-/// RMS of the difference of a derivative from its signal's slope over the RMS of the larger, from which on they contradict each other. Retargeted motions,
-/// by splines or by backward differences, stay below 0.1.
-const CONTRADICTION: f64 = 0.5;
-/// Below this RMS a derivative is rounding \[rad/s, m/s, rad/s², m/s²\].
-const SLOW: f64 = 1e-3;
-
 impl Motion {
     /// A motion of `joints` joints with a sample every `period_s` \[s\]. `signals` are positions \[rad, m\], velocities and accelerations,
-    /// row-major `[sample × joints]`.
+    /// row-major `[sample × joints]`, as `Retargeted::signals` of `phiw-bspline-retarget` has them.
     ///
     /// # Errors
     /// There are fewer than two samples, the signals do not fit each other, or a number is not finite.
@@ -58,10 +69,31 @@ impl Motion {
         Ok(Motion { name: name.to_owned(), task: task.to_owned(), period_s, joints, signals })
     }
 
+    /// The first `samples` samples of a reference, one every `period_s` \[s\].
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_reference(
+        name: &str,
+        task: &str,
+        joints: usize,
+        (samples, period_s): (usize, f64),
+        reference: &dyn Reference,
+    ) -> Result<Self, CurriculumError> {
+        let mut signals = [0; 3].map(|_| vec![0.0; samples * joints]);
+        let [q, v, a] = &mut signals;
+        for sample in 0..samples {
+            let row = sample * joints..(sample + 1) * joints;
+            let (q, v, a) = (&mut q[row.clone()], &mut v[row.clone()], &mut a[row]);
+            reference.at(sample as f64 * period_s, q, v, a);
+        }
+        Self::new(name, task, joints, period_s, signals)
+    }
+
     /// A motion from a log with positions, velocities and accelerations, as `phiw retarget` writes it.
     ///
     /// # Errors
-    /// A signal is missing, the stamps are not even, or a number is not finite.
+    /// A signal is missing, the stamps are not even, a number is not finite, or the signals contradict each other.
     pub fn from_recording(name: &str, task: &str, recording: &Recording) -> Result<Self, CurriculumError> {
         let wrong =
             |problem: &str| CurriculumError::Motion { name: name.to_owned(), problem: problem.to_owned() };
@@ -74,19 +106,27 @@ impl Motion {
             return Err(wrong("it has fewer than two rows"));
         };
         let period_s = (last - first) / (recording.t.len() - 1) as f64;
-        let even = |(row, t): (usize, &f64)| (t - first - row as f64 * period_s).abs() <= EVEN * period_s;
+        let tolerance = MotionTolerance::default();
+        let even = |(row, t): (usize, &f64)| {
+            (t - first - row as f64 * period_s).abs() <= tolerance.stamps * period_s
+        };
         if !recording.t.iter().enumerate().all(even) {
             return Err(wrong("its time stamps are not even: resample it"));
         }
         let signals = [recording.q.clone(), qd.clone(), qdd.clone()];
         let motion = Self::new(name, task, recording.joints.len(), period_s, signals)?;
-        motion.check_derivatives(&recording.joints)?;
+        motion.check_derivatives(&recording.joints, &tolerance)?;
+        motion.check_steps(&recording.joints, &[], &tolerance.steps)?;
         Ok(motion)
     }
 
     /// A robot that is sent positions at these times moves as they say, whatever the columns beside them say: a motion whose signals contradict each
     /// other is refused.
-    fn check_derivatives(&self, joints: &[String]) -> Result<(), CurriculumError> {
+    fn check_derivatives(
+        &self,
+        joints: &[String],
+        tolerance: &MotionTolerance,
+    ) -> Result<(), CurriculumError> {
         let rms = |sum: f64| (sum / self.samples() as f64).sqrt();
         for (joint, name) in joints.iter().enumerate() {
             for (order, column, unit) in [(0, "qd", "rad/s or m/s"), (1, "qdd", "rad/s² or m/s²")] {
@@ -101,7 +141,7 @@ impl Motion {
                     error += (slope - stated) * (slope - stated);
                 }
                 let larger = rms(differences.max(given));
-                if larger > SLOW && rms(error) > CONTRADICTION * larger {
+                if larger > tolerance.slow && rms(error) > tolerance.contradiction * larger {
                     let below = &column[..column.len() - 1];
                     return Err(CurriculumError::Motion {
                         name: self.name.clone(),

@@ -25,6 +25,37 @@ pub struct Learnt {
     pub torque_uncertainty: Option<[f64; 2]>,
 }
 
+impl Learnt {
+    /// From cond(Φ) and the torques' uncertainty after each iteration. None while nothing has been learnt: where cond was never finite, or is not now.
+    pub fn of(
+        first_alpha: f64,
+        condition_numbers: &[Option<f64>],
+        torque_uncertainties: &[Option<f64>],
+    ) -> Option<Self> {
+        let ends = |values: &[Option<f64>]| {
+            let finite = |value: &Option<f64>| value.filter(|value| value.is_finite());
+            Some([values.iter().find_map(finite)?, values.last().and_then(finite)?])
+        };
+        let [first_condition_number, condition_number] = ends(condition_numbers)?;
+        let torque_uncertainty = ends(torque_uncertainties);
+        Some(Learnt { first_alpha, first_condition_number, condition_number, torque_uncertainty })
+    }
+}
+
+/// α stays what it is: somebody has chosen it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConstantReduction(pub f64);
+
+impl Relaxation for ConstantReduction {
+    fn first(&self, _: &[Safety]) -> f64 {
+        self.0
+    }
+
+    fn next(&self, _: &Learnt) -> f64 {
+        self.0
+    }
+}
+
 /// How α_max is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Maximum {

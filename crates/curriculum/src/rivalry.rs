@@ -14,16 +14,20 @@ pub struct Rivalry {
     pub effects: [EffectSpec; 2],
 }
 
-/// Time between the samples that are looked at \[s\].
-const EVERY_S: f64 = 0.02;
-
 impl Rivalry {
-    /// RMS over a motion of how far the torques of the two differ, each joint's over its share `scale` \[N·m, N\].
+    /// RMS over a motion of how far the torques of the two differ, each joint's over its share `scale` \[N·m, N\]; a sample is looked at every
+    /// `period_s` \[s\].
     ///
     /// # Errors
     /// A belief or the motion is not of this robot.
-    pub fn difference(&self, robot: &Robot, motion: &Motion, scale: &[f64]) -> Result<f64, CurriculumError> {
-        let stride = ((EVERY_S / motion.period_s()).round() as usize).max(1);
+    pub fn difference(
+        &self,
+        robot: &Robot,
+        motion: &Motion,
+        scale: &[f64],
+        period_s: f64,
+    ) -> Result<f64, CurriculumError> {
+        let stride = ((period_s / motion.period_s()).round() as usize).max(1);
         let mut torques = Vec::with_capacity(2);
         for belief in &self.beliefs {
             let (design, parameters) = (robot.design_of(belief)?, belief.parameters(robot)?);
@@ -64,10 +68,7 @@ pub(crate) fn torques_along(
         // All of them in order, for effects with memory.
         scratch.evaluate(block, sample, &mut row)?;
         if sample % stride == 0 {
-            torques.extend(design.rows().iter().map(|layout| {
-                let columns = &row[layout.range.clone()];
-                columns.iter().zip(&layout.parameters).map(|(column, &k)| column * parameters[k]).sum::<f64>()
-            }));
+            torques.extend(design.rows().iter().map(|layout| layout.torque(&row, parameters)));
         }
     }
     Ok(torques)

@@ -1,10 +1,10 @@
 //! The robot as it is declared, and what is believed of it.
 
-use crate::CurriculumError;
+use crate::{CurriculumError, NewtonSettings};
 use phiw_dynamics::{InertialParameters, PARAMETERS_PER_BODY, Tree, check_size};
+use phiw_effects::Catalogue;
 use phiw_identification::{Design, EffectCatalogue, EffectSpec, ReferenceModel};
 use phiw_regressor::BaseParameters;
-use phiw_residual::catalogue::Catalogue;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
@@ -247,17 +247,12 @@ impl RobotModel {
     }
 }
 
-/// Radius of gyration of the spheres that stand for bodies \[m\].
-const SPHERE_RADIUS: f64 = 0.1;
-/// Least mass of a sphere \[kg\].
-const LEAST_MASS: f64 = 0.05;
-
 /// Bodies of the same mass and first moment that exist: spheres about their centres of mass.
-pub(crate) fn spheres(standard: &[f64]) -> Vec<f64> {
+pub(crate) fn spheres(standard: &[f64], settings: &NewtonSettings) -> Vec<f64> {
     let sphere = |body: &[f64]| {
-        let mass = body[0].max(LEAST_MASS);
+        let mass = body[0].max(settings.least_mass);
         let centre = phiw_dynamics::Vec3([body[1], body[2], body[3]].map(|moment| moment / mass));
-        let moment = mass * SPHERE_RADIUS * SPHERE_RADIUS;
+        let moment = mass * settings.sphere_radius * settings.sphere_radius;
         let tensor = phiw_dynamics::Mat3([[moment, 0.0, 0.0], [0.0, moment, 0.0], [0.0, 0.0, moment]]);
         phiw_dynamics::Inertia::from_center_of_mass(mass, centre, tensor).parameters()
     };

@@ -1,11 +1,12 @@
 //! The loop closed by the estimator's own likelihood.
 
+use crate::contest::{Contender, ScoreTestSettings, Winner};
 use crate::growth::{Found, Growth};
 use crate::{
     CurriculumError, Estimator, Evidence, Gain, Measured, MotionLikelihood, Robot, RobotModel, RowsAt,
 };
+use phiw_effects::{Constants, EffectKind, JointRange, SignalRanges};
 use phiw_identification::{EffectCatalogue, EffectSpec};
-use phiw_residual::catalogue::{Constants, JointRange, SignalRanges};
 
 /// Asks of every effect of the catalogue what it would save of −log L ([`MotionLikelihood::gains`]), fits the few best in full, adds the simplest
 /// of those that explain alike if it is worth its price, and asks again.
@@ -17,40 +18,14 @@ use phiw_residual::catalogue::{Constants, JointRange, SignalRanges};
 pub struct ScoreTest {
     /// The estimator that the curriculum runs with.
     pub estimator: MotionLikelihood,
-    /// −log L that an effect must save beyond the price of its parameters.
-    pub least_merit: f64,
-    /// Effects at most.
-    pub most_effects: usize,
-    /// Measured time below which nothing is looked for \[s\].
-    pub least_s: f64,
-    /// A rival counts if it has at least this probability beside the effect that is believed.
-    pub least_rival: f64,
-    /// Kinds that are not asked for. Every log of a curriculum has a clock of its own: of what changes with the time since a motor was switched on, nothing is known.
-    pub excluded: Vec<String>,
+    /// When an effect is believed.
+    pub settings: ScoreTestSettings,
 }
 
-/// An effect of one parameter must then be four standard deviations from nothing. Seventy such effects are asked for after each log of an 18-joint robot: with all of them
-/// together, one right model in two hundred gets a false name if their gains are χ² (arithmetic, not a count).
-const LEAST_MERIT: f64 = 5.0;
-/// Effects of at least this share of the best one's merit are fitted beside it, and so many at most.
-const NEAR: f64 = 0.6;
-const MOST_NEAR: usize = 5;
-/// Effects whose merits differ by no more explain the logs alike; then the simplest is believed.
-const ALIKE: f64 = 3.0;
-/// How often the constants of the best are refined.
-const REFINEMENTS: usize = 2;
-
 impl ScoreTest {
-    /// For a curriculum with this estimator: three effects at most, from 12 s of logs on; a rival is what has a chance of one in ten.
+    /// For a curriculum with this estimator.
     pub fn new(estimator: MotionLikelihood) -> Self {
-        ScoreTest {
-            estimator,
-            least_merit: LEAST_MERIT,
-            most_effects: 3,
-            least_s: 12.0,
-            least_rival: 0.1,
-            excluded: vec!["thermal_drift".to_owned()],
-        }
+        ScoreTest { estimator, settings: ScoreTestSettings::default() }
     }
 
     /// Every effect of the catalogue on every joint that a fit leaves something of, each with the constants that save most, the best first by gain
@@ -66,8 +41,7 @@ impl ScoreTest {
     ) -> Result<Vec<Gain>, CurriculumError> {
         let ranges = ranges(robot, logs);
         let present = model.specs();
-        let mut candidates = candidates(robot, &ranges, &present);
-        candidates.retain(|effect| !self.excluded.contains(&effect.kind));
+        let candidates = candidates(robot, &ranges, &present);
         let gains = self.estimator.gains(robot, model, logs, &candidates)?;
         let mut best = Vec::new();
         // Constants of one effect on one site follow each other.
@@ -120,27 +94,26 @@ impl ScoreTest {
         Ok((model.with_parameters(robot, &specs, &estimate.parameters)?, misfit))
     }
 
-    /// Those of `near` that are worth their price beside `known` once everything has been fitted again, the best first, each with its constants refined and what it is
-    /// worth. What the score foretells of a large effect is rough, and one that does half of its work may be foretold as much.
-    fn contest(
+    /// The effects of `near` once everything has been fitted again beside `known`, each with its constants refined, and what it is then worth. What the score foretells of a
+    /// large effect is rough, and one that does half of its work may be foretold as much.
+    fn contenders(
         &self,
         robot: &Robot,
         model: &RobotModel,
         known: &[EffectSpec],
         near: &[Gain],
         logs: &[Measured],
-    ) -> Result<Vec<(EffectSpec, f64)>, CurriculumError> {
+    ) -> Result<(Vec<EffectSpec>, Vec<Contender>), CurriculumError> {
         let (_, without) = self.fit(robot, model, known, logs)?;
-        let mut worth = Vec::with_capacity(near.len());
+        let (mut effects, mut contenders) = (Vec::new(), Vec::new());
         for gain in near {
             let effect = self.refined(robot, model, logs, gain.clone())?.effect;
             let (_, with) = self.fit(robot, model, &[known, std::slice::from_ref(&effect)].concat(), logs)?;
             let price = gain.gain - gain.merit;
-            worth.push((effect, without - with - price));
+            contenders.push(Contender { merit: without - with - price, size: size(robot, &effect) });
+            effects.push(effect);
         }
-        worth.retain(|(_, merit)| *merit >= self.least_merit);
-        worth.sort_by(|a, b| b.1.total_cmp(&a.1));
-        Ok(worth)
+        Ok((effects, contenders))
     }
 
     /// The same effect with constants between those that were tried.
@@ -152,7 +125,7 @@ impl ScoreTest {
         mut best: Gain,
     ) -> Result<Gain, CurriculumError> {
         let kind = robot.catalogue().kind(&best.effect.kind)?;
-        for step in 0..REFINEMENTS {
+        for step in 0..self.settings.refinements {
             let near: Vec<EffectSpec> = kind
                 .refine(&best.effect.constants, step)
                 .into_iter()
@@ -185,7 +158,7 @@ impl Growth for ScoreTest {
         refuted: &[EffectSpec],
     ) -> Result<Found, CurriculumError> {
         let mut found = Found::default();
-        if logs.iter().map(Measured::duration_s).sum::<f64>() < self.least_s {
+        if logs.iter().map(Measured::duration_s).sum::<f64>() < self.settings.least_s {
             return Ok(found);
         }
         // From the declared model on: what was found before may have been the wrong half of the truth.
@@ -193,25 +166,20 @@ impl Growth for ScoreTest {
             true => model.clone(),
             false => self.fitted(robot, model, &[], logs)?,
         };
-        while found.effects.len() < self.most_effects {
+        while found.effects.len() < self.settings.most_effects {
             let mut ranked = self.rank(robot, &model, logs)?;
             ranked.retain(|gain| !refuted.iter().any(|effect| is_alike(effect, &gain.effect)));
-            let Some(best) = ranked.first().filter(|best| best.merit >= self.least_merit) else { break };
-            let near =
-                ranked.iter().take_while(|gain| gain.merit >= NEAR * best.merit).count().min(MOST_NEAR);
-            let worth = self.contest(robot, &model, &found.effects, &ranked[..near], logs)?;
-            let Some((_, most)) = worth.first() else { break };
-            let alike: Vec<&EffectSpec> = worth
-                .iter()
-                .take_while(|(_, merit)| *merit >= most - ALIKE)
-                .map(|(effect, _)| effect)
-                .collect();
-            let Some(&simplest) = alike.iter().min_by_key(|effect| size(robot, effect)) else { break };
-            let least = most + self.least_rival.ln();
-            let rivals = worth.iter().filter(|(effect, merit)| *merit >= least && effect != simplest);
-            found.rivals.extend(rivals.map(|(rival, _)| [simplest.clone(), rival.clone()]));
-            found.effects.push(simplest.clone());
-            if found.effects.len() < self.most_effects {
+            let merits: Vec<f64> = ranked.iter().map(|gain| gain.merit).collect();
+            let near = &ranked[..self.settings.shortlist(&merits)];
+            if near.is_empty() {
+                break;
+            }
+            let (effects, contenders) = self.contenders(robot, &model, &found.effects, near, logs)?;
+            let Some(Winner { winner, rivals }) = self.settings.contest(&contenders) else { break };
+            let pairs = rivals.iter().map(|&rival| [effects[winner].clone(), effects[rival].clone()]);
+            found.rivals.extend(pairs);
+            found.effects.push(effects[winner].clone());
+            if found.effects.len() < self.settings.most_effects {
                 model = self.fitted(robot, &model, &found.effects, logs)?;
             }
         }
@@ -219,7 +187,7 @@ impl Growth for ScoreTest {
     }
 
     fn least_gain(&self) -> f64 {
-        self.least_merit
+        self.settings.least_merit
     }
 }
 
@@ -234,11 +202,13 @@ fn is_alike(one: &EffectSpec, other: &EffectSpec) -> bool {
     one.kind == other.kind && one.joints == other.joints
 }
 
-/// Every effect that may be beside `present`, with all constants to try.
+/// Every effect that may be beside `present`, with all constants to try. Every log of a curriculum has a clock of its own: of what changes with the time since a motor
+/// was switched on, nothing is known.
 fn candidates(robot: &Robot, ranges: &SignalRanges, present: &[EffectSpec]) -> Vec<EffectSpec> {
     let tree = robot.tree();
     let mut specs = Vec::new();
-    for kind in robot.catalogue().kinds().filter(|kind| !kind.needs_held_model()) {
+    let can_be_told = |kind: &&dyn EffectKind| !kind.needs_held_model() && !kind.needs_session_time();
+    for kind in robot.catalogue().kinds().filter(can_be_told) {
         for site in kind.sites(tree) {
             let joints: Vec<String> = site.iter().map(|&joint| tree.joint(joint).joint.clone()).collect();
             let spec = |constants: Constants| EffectSpec {

@@ -4,7 +4,8 @@
 //! cost 10 ms; both know nothing of the zeros, and all singular values but two are thrown away. Here the QR of one triangle on top of
 //! another touches the non-zeros only (n³/3 multiplications), and Lanczos' method finds the two in some tens of products.
 
-use phiw_regressor::factor::Factor;
+use phiw_dynamics::dense::dot;
+use phiw_regressor::factor::{Factor, solve_lower, solve_upper};
 
 /// An upper triangular matrix, column by column.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,20 +95,12 @@ impl Triangle {
 
     /// R⁻¹·x, in place.
     pub(crate) fn solve(&self, x: &mut [f64]) {
-        for column in (0..self.size).rev() {
-            let entries = self.column(column);
-            let value = x[column] / entries[column];
-            x[column] = value;
-            x[..column].iter_mut().zip(entries).for_each(|(rest, entry)| *rest -= value * entry);
-        }
+        solve_upper(|column| self.column(column), x);
     }
 
     /// R⁻ᵀ·x, in place.
     pub(crate) fn solve_transposed(&self, x: &mut [f64]) {
-        for column in 0..self.size {
-            let entries = self.column(column);
-            x[column] = (x[column] - dot(&entries[..column], &x[..column])) / entries[column];
-        }
+        solve_lower(|column| self.column(column), x);
     }
 
     /// The largest and the smallest singular value; the smallest is 0 where a diagonal element is.
@@ -172,19 +165,6 @@ impl Triangle {
         }
         if sum.is_finite() { sum } else { f64::INFINITY }
     }
-}
-
-pub(crate) fn dot(left: &[f64], right: &[f64]) -> f64 {
-    // Four sums at a time, so that the processor adds them side by side; in a fixed order, so that the result is always the same.
-    let mut sums = [0.0; 4];
-    let (left_fours, right_fours) = (left.chunks_exact(4), right.chunks_exact(4));
-    let rest: f64 = left_fours.remainder().iter().zip(right_fours.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in left_fours.zip(right_fours) {
-        for lane in 0..4 {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
 /// Change of the eigenvalue over one step, as a share, at which it counts as found.

@@ -3,12 +3,22 @@
 use crate::rivalry::torques_along;
 use crate::{CurriculumError, Measured, Robot, RobotModel};
 
-/// How far back a residual is compared with itself \[s\]: friction, springs and their like change slower.
-const REACH_S: f64 = 0.2;
-/// Standard deviations that the sum of its autocorrelations may be from nothing, and the sum of their squares above what chance gives, in any of all
-/// torques.
-const SUM: f64 = 4.0;
-const SQUARES: f64 = 6.0;
+/// When a residual is white. Each threshold is in standard deviations of what white noise gives, in any of all torques: higher asks for fewer traces and misses small effects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WhitenessSettings {
+    /// How far back a residual is compared with itself \[s\]. Default: 0.2, since friction, springs and their like change slower.
+    pub reach_s: f64,
+    /// Largest sum of the autocorrelations. Default: 4 (`chance_is_told_from_what_goes_on`, 200 seeds without a false alarm).
+    pub sum: f64,
+    /// Largest sum of their squares above what chance gives. Default: 6 (the same test).
+    pub squares: f64,
+}
+
+impl Default for WhitenessSettings {
+    fn default() -> Self {
+        WhitenessSettings { reach_s: 0.2, sum: 4.0, squares: 6.0 }
+    }
+}
 
 /// The torques whose residual under a belief is not white. Noise of the actuators that is new in every period leaves nothing else under a right
 /// model, since the rows balance the command exactly; what the model lacks depends on the motion, and goes on as the motion does. Costs a
@@ -20,18 +30,19 @@ pub(crate) fn coloured(
     robot: &Robot,
     model: &RobotModel,
     logs: &[Measured],
+    settings: &WhitenessSettings,
 ) -> Result<Vec<usize>, CurriculumError> {
     let joints = robot.tree().joint_count();
     let mut correlations: Vec<Correlations> = (0..joints).map(|_| Correlations::default()).collect();
     for log in logs {
-        let lags = ((REACH_S / log.period_s).round() as usize).max(1);
+        let lags = ((settings.reach_s / log.period_s).round() as usize).max(1);
         let residual = residual(robot, model, log)?;
         for (joint, correlations) in correlations.iter_mut().enumerate() {
             let own: Vec<f64> = residual.iter().skip(joint).step_by(joints).copied().collect();
             correlations.add(&own, lags);
         }
     }
-    Ok((0..joints).filter(|&joint| !correlations[joint].are_chance()).collect())
+    Ok((0..joints).filter(|&joint| !correlations[joint].are_chance(settings)).collect())
 }
 
 /// What a belief leaves of the torques of a log: measured minus modelled over each period, `[period × joint]` \[N·m, N\].
@@ -66,7 +77,7 @@ impl Correlations {
     }
 
     /// Under white noise each autocorrelation is normal with the variance 1/rows.
-    fn are_chance(&self) -> bool {
+    fn are_chance(&self, settings: &WhitenessSettings) -> bool {
         let [whole, products @ ..] = self.products.as_slice() else { return true };
         if *whole == 0.0 {
             return true;
@@ -76,13 +87,13 @@ impl Correlations {
         let squares: f64 = products.iter().map(|product| (product / whole).powi(2)).sum();
         let sum = sum * (rows / lags).sqrt();
         let squares = (rows * squares - lags) / (2.0 * lags).sqrt();
-        sum.abs() <= SUM && squares <= SQUARES
+        sum.abs() <= settings.sum && squares <= settings.squares
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Correlations;
+    use super::{Correlations, WhitenessSettings};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
@@ -104,7 +115,8 @@ mod tests {
             for (square, ripple, white) in [(0.0, 0.0, true), (0.3, 0.0, false), (0.0, 0.5, false)] {
                 let mut correlations = Correlations::default();
                 residual(seed, square, ripple).chunks(700).for_each(|log| correlations.add(log, 20));
-                assert_eq!(correlations.are_chance(), white, "seed {seed}: {square} {ripple}");
+                let settings = WhitenessSettings::default();
+                assert_eq!(correlations.are_chance(&settings), white, "seed {seed}: {square} {ripple}");
             }
         }
     }

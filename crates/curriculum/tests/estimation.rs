@@ -65,7 +65,10 @@ fn noise_inside_the_loop_biases_least_squares_and_not_the_likelihood() {
 fn the_likelihood_has_one_minimum_wherever_it_is_sought_from() {
     let arm = Arm::new(0.05);
     let (design, evidence) = measure(&arm, RowsAt::Periods, 2);
-    let estimator = MotionLikelihood { settled: 1e-5, ..arm.estimator() };
+    let estimator = MotionLikelihood {
+        newton: NewtonSettings { settled: 1e-5, ..NewtonSettings::default() },
+        ..arm.estimator()
+    };
     let from = |seed: u64| {
         let initial = unreliable_model(&arm.truth, seed);
         let w = initial.parameters(&arm.robot).unwrap();

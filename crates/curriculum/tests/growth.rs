@@ -152,7 +152,7 @@ fn rivals_are_told_apart_by_the_motion_on_which_they_differ() {
     let motions = one_joint_each(joints, &[0.5, 0.4, 0.1, 0.3, 0.2]);
     let scale: Vec<f64> = (0..joints).map(|joint| 2.0 + joint as f64).collect();
     for (index, motion) in motions.iter().enumerate() {
-        let found = rivalry.difference(&arm.robot, motion, &scale).unwrap();
+        let found = rivalry.difference(&arm.robot, motion, &scale, 0.02).unwrap();
         let rows = (0..motion.samples()).step_by(2);
         let squares =
             rows.clone().map(|row| (difference * motion.sample(row)[1][moved] / scale[moved]).powi(2));

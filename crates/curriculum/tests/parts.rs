@@ -218,8 +218,10 @@ fn the_controller_s_torque_is_that_of_the_model() {
         effects: Vec::new(),
         controller: Box::new(FeedForward { gains }),
         actuator_noise: 0.0,
+        sensors: phiw_plant::Sensors::exact(0.01),
         timing: phiw_plant::Timing { settle_s: 0.0, ..Default::default() },
         fall_tilt_rad: 0.3,
+        stillness: Default::default(),
         build: Box::new(|tree, world| {
             Ok(Box::new(phiw_dynamics::AnalyticBackend::in_world(tree.clone(), world)?))
         }),

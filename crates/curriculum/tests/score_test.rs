@@ -101,7 +101,7 @@ fn a_right_model_lacks_nothing() {
         let model = test.fitted(&arm.robot, &arm.truth, &[], &logs).unwrap();
         let ranked = test.rank(&arm.robot, &model, &logs).unwrap();
         let best = &ranked[0];
-        assert!(best.merit < test.least_merit, "seed {seed}: {best:?}");
+        assert!(best.merit < test.settings.least_merit, "seed {seed}: {best:?}");
         for joint in arm.tree.joint_names() {
             let offset = EffectSpec::new("torque_offset", &[joint]);
             let ripple = EffectSpec::new("asymmetric_friction", &[joint]).with("part", 0.0);
@@ -125,7 +125,8 @@ fn an_effect_that_was_found_does_not_change_what_cond_is_of() {
     let mut experiment = arm.experiment();
     experiment.effects.push(spring);
     let (estimator, end) = (arm.estimator(), FixedCount(3));
-    let growth = ScoreTest { least_s: 5.0, ..test_of(&arm) };
+    let growth =
+        ScoreTest { settings: ScoreTestSettings { least_s: 5.0, ..Default::default() }, ..test_of(&arm) };
     let curriculum = Curriculum { growth: Some(&growth), ..arm.curriculum(&experiment, &estimator, &end) };
     let mut run = Run::new(1, unreliable_model(&arm.truth, 1));
     curriculum.run::<CurriculumError>(&mut run, |_| Ok(())).unwrap();
@@ -135,7 +136,7 @@ fn an_effect_that_was_found_does_not_change_what_cond_is_of() {
     let design = arm.robot.design(arm.robot.declared()).unwrap();
     let mut evidence = Evidence::none(&design, RowsAt::Periods).unwrap();
     run.logs.iter().for_each(|log| evidence.add(&design, log).unwrap());
-    let declared = arm.candidates.measured(evidence.factor()).unwrap().condition_number();
+    let declared = arm.candidates.measured(&evidence).unwrap().condition_number();
     let kept = run.history.last().unwrap().condition_number.unwrap();
     assert!((kept / declared - 1.0).abs() < 1e-6, "{kept}, not {declared}");
 }

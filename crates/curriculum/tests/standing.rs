@@ -3,10 +3,10 @@
 use phiw_curriculum::standing::*;
 use phiw_curriculum::*;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
-use phiw_dynamics::{BackendError, DynamicsBackend, Foot, Tree, Workspace, World};
+use phiw_dynamics::{BackendError, Foot, SimulationBackend, Tree, Workspace, World};
 use phiw_plant::{Gains, Timing, feet_from_toml};
 use phiw_regressor::BaseParameters;
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 const URDF: &str = include_str!("../../../models/humanoid30.urdf");
@@ -17,9 +17,7 @@ struct Humanoid {
     floating: Tree,
     chain: Tree,
     world: World,
-    feet: Feet,
-    stance: Vec<f64>,
-    legs: Vec<usize>,
+    legs: Legs,
 }
 
 impl Humanoid {
@@ -30,99 +28,84 @@ impl Humanoid {
         let text = with_virtual_base(URDF, &floating.bodies()[0].link).unwrap();
         let chain = read_urdf(&text, &UrdfOptions::default()).unwrap().tree;
         let world = World { feet: feet_from_toml(SUPPORT, &floating).unwrap(), ..World::default() };
-        let own: Vec<Foot> =
-            world.feet.iter().map(|foot| Foot { body: foot.body + 5, sole: foot.sole.clone() }).collect();
-        let mut q = vec![0.0; chain.joint_count()];
-        q[2] = 0.06 + 0.66 + 0.09;
+        let mut posture = vec![0.0; chain.joint_count()];
         for side in ["left", "right"] {
             for (joint, angle) in [("hip_pitch", -0.38), ("knee", 0.82), ("ankle_pitch", -0.44)] {
-                q[chain.joint_index(&format!("{side}_{joint}")).unwrap()] = angle;
+                posture[chain.joint_index(&format!("{side}_{joint}")).unwrap()] = angle;
             }
         }
-        let feet = Feet::new(&chain, &own, &q).unwrap();
-        let legs = [feet.leg(0), feet.leg(1)].concat();
-        Humanoid { floating, chain, world, feet, stance: q, legs }
+        let legs = Legs::new(&chain, &world.feet, posture).unwrap();
+        Humanoid { floating, chain, world, legs }
     }
 
     /// The base sways and squats, the arms swing: all of it, or a `share`.
     fn motion(&self, duration_s: f64, share: f64) -> Motion {
-        let joints = self.chain.joint_count();
+        let swing = |joint: usize, t: f64| {
+            let reach = [0.02, 0.03, -0.05, 0.15, 0.08, 0.05].get(joint).copied().unwrap_or(0.15) * share;
+            let rate = 2.0 + 0.17 * joint as f64 % 2.3;
+            // Begins at rest.
+            let (sine, cosine) = (rate * t).sin_cos();
+            [
+                reach * sine * sine,
+                2.0 * reach * rate * sine * cosine,
+                2.0 * reach * rate * rate * (cosine * cosine - sine * sine),
+            ]
+        };
         let rows = (duration_s / PERIOD_S) as usize + 1;
-        let mut signals = [0; 3].map(|_| Vec::with_capacity(rows * joints));
-        let (mut q, mut v, mut a) = (self.stance.clone(), vec![0.0; joints], vec![0.0; joints]);
-        for row in 0..rows {
-            let t = row as f64 * PERIOD_S;
-            for joint in (0..joints).filter(|joint| !self.legs.contains(joint)) {
-                let reach = [0.02, 0.03, -0.05, 0.15, 0.08, 0.05].get(joint).copied().unwrap_or(0.15) * share;
-                let rate = 2.0 + 0.17 * joint as f64 % 2.3;
-                // Begins at rest.
-                let (sine, cosine) = (rate * t).sin_cos();
-                q[joint] = self.stance[joint] + reach * sine * sine;
-                v[joint] = 2.0 * reach * rate * sine * cosine;
-                a[joint] = 2.0 * reach * rate * rate * (cosine * cosine - sine * sine);
-            }
-            self.feet.close(&self.legs, &[0, 1], [&mut q, &mut v, &mut a]).unwrap();
-            signals
-                .iter_mut()
-                .zip([&q, &v, &a])
-                .for_each(|(signal, values)| signal.extend_from_slice(values));
-        }
-        Motion::new("sway", "sway", joints, PERIOD_S, signals).unwrap()
+        let upper: Vec<usize> = self.legs.upper_joints().collect();
+        let signals = [0, 1, 2].map(|order| {
+            let row = |row: usize| upper.iter().map(move |&joint| swing(joint, row as f64 * PERIOD_S)[order]);
+            (0..rows).flat_map(row).collect()
+        });
+        let upper = Motion::new("sway", "sway", upper.len(), PERIOD_S, signals).unwrap();
+        let base = |t: f64| [0, 1, 2].map(|order| std::array::from_fn(|joint| swing(joint, t)[order]));
+        self.legs.follow(&upper, base).unwrap().unwrap()
     }
 
     /// What motions with both feet on the floor tell apart, from random ones.
     fn base(&self) -> BaseParameters {
-        let joints = self.chain.joint_count();
-        let mut random = ChaCha8Rng::seed_from_u64(7);
-        let mut states: Vec<[Vec<f64>; 3]> = Vec::new();
-        while states.len() < 120 {
-            let [mut q, mut v, mut a] = [self.stance.clone(), vec![0.0; joints], vec![0.0; joints]];
-            for joint in (0..joints).filter(|joint| !self.legs.contains(joint)) {
-                let reach = [0.05, 0.05, 0.05, 0.3, 0.2, 0.15].get(joint).copied().unwrap_or(1.5);
-                q[joint] += reach * random.random_range(-1.0..1.0) - if joint == 2 { 0.06 } else { 0.0 };
-                v[joint] = random.random_range(-3.0..3.0);
-                a[joint] = random.random_range(-10.0..10.0);
-            }
-            if self.feet.close(&self.legs, &[0, 1], [&mut q, &mut v, &mut a]).is_ok() {
-                states.push([q, v, a]);
-            }
-        }
-        let states = states.iter().map(|[q, v, a]| [q.as_slice(), v.as_slice(), a.as_slice()]);
-        BaseParameters::of_states(&self.chain, states, &[0, 1, 2, 3, 4], Default::default()).unwrap()
+        let states = StandingStates { count: 120, seed: 7, ..StandingStates::default() };
+        self.legs.base_parameters(&states).unwrap()
     }
 
     fn gains(&self) -> Gains {
         let stiffness = |joint: usize| {
             let limit = self.floating.joint(joint).limits.effort;
-            if self.legs.contains(&(joint + 6)) { 12.0 * limit } else { 0.5 * limit }
+            if self.legs.joints().contains(&(joint + 6)) { 12.0 * limit } else { 0.5 * limit }
         };
         let position: Vec<f64> = (0..self.floating.joint_count()).map(stiffness).collect();
         Gains { velocity: position.iter().map(|gain| 0.004 * gain).collect(), position }
     }
 
     fn experiment(&self, build: Box<BuildBackend>) -> StandingRobot {
-        let controller =
-            StandingFeedForward { gains: self.gains(), feet: self.feet.clone(), stance: self.stance.clone() };
+        let feet = self.legs.feet();
+        let controller = StandingFeedForward {
+            gains: self.gains(),
+            feet: feet.clone(),
+            stance: self.legs.stance().to_vec(),
+        };
         let plant = SimulatedRobot {
             tree: self.floating.clone(),
             world: self.world.clone(),
             effects: Vec::new(),
             controller: Box::new(controller),
             actuator_noise: 0.0,
+            sensors: phiw_plant::Sensors::exact(1e-3),
             timing: Timing { control_period_s: 1e-3, longest_step_s: 5e-4, settle_s: 1.0 },
             fall_tilt_rad: 0.3,
+            stillness: Default::default(),
             build,
         };
         let wrench_noise = WrenchNoise { force_n: 0.0, moment_nm: 0.0 };
-        StandingRobot { plant, feet: self.feet.clone(), wrench_noise }
+        StandingRobot { plant, feet: feet.clone(), wrench_noise }
     }
 }
 
-fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     Ok(Box::new(phiw_sim_rapier::RapierBackend::new(tree, world)?))
 }
 
-fn mujoco(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+fn mujoco(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     let backend = phiw_sim_mujoco::MujocoBackend::new(tree, world);
     let backend =
         backend.map_err(|error| BackendError::Backend { backend: "mujoco", message: error.to_string() })?;
@@ -139,6 +122,61 @@ fn feet_on_the_floor_hide_parameters() {
     assert!(base.rank_gap() > 1e8, "{}", base.rank_gap());
     // Massless links stay massless.
     assert!(base.independent().iter().all(|&parameter| parameter >= 50));
+    // More states, and others, tell the same.
+    let other = humanoid.legs.base_parameters(&StandingStates::default()).unwrap();
+    assert_eq!(other.count(), base.count());
+}
+
+/// The soles are level and on the floor, whatever height the posture was given in.
+#[test]
+fn soles_of_the_stance_lie_on_the_floor() {
+    let humanoid = Humanoid::new();
+    for height_m in [0.0, -0.4, 1.3] {
+        let mut posture = humanoid.legs.stance().to_vec();
+        posture[2] = height_m;
+        let legs = Legs::new(&humanoid.chain, &humanoid.world.feet, posture).unwrap();
+        for foot in legs.feet().all() {
+            assert!(foot.placement.point(foot.sole).0[2].abs() < 1e-12, "{height_m}");
+        }
+        assert_eq!(legs.sole_corners().len(), 8);
+    }
+}
+
+/// Legs that cannot reach are no error but no motion, and the caller makes the motion smaller.
+#[test]
+fn a_base_out_of_the_legs_reach_has_no_motion() {
+    let humanoid = Humanoid::new();
+    let upper = humanoid.legs.upper_joints().count();
+    let still = |joints: usize| {
+        Motion::new("still", "", joints, PERIOD_S, [0; 3].map(|_| vec![0.0; 5 * joints])).unwrap()
+    };
+    let at = |place: [f64; 6]| humanoid.legs.follow(&still(upper), |_| [place, [0.0; 6], [0.0; 6]]).unwrap();
+    assert!(at([0.0; 6]).is_some());
+    assert!(at([0.0, 0.0, -0.1, 0.0, 0.0, 0.0]).is_some());
+    // Over the length of the legs, below the knees' limits, and faster than they are.
+    assert!(at([0.0, 0.0, 0.3, 0.0, 0.0, 0.0]).is_none());
+    assert!(at([0.0, 0.0, -0.7, 0.0, 0.0, 0.0]).is_none());
+    let fast = |_| [[0.0; 6], [0.0, 0.0, 90.0, 0.0, 0.0, 0.0], [0.0; 6]];
+    assert!(humanoid.legs.follow(&still(upper), fast).unwrap().is_none());
+    assert!(humanoid.legs.follow(&still(upper + 1), |_| [[0.0; 6]; 3]).is_err());
+}
+
+#[test]
+fn legs_that_are_none_are_refused_by_name() {
+    let humanoid = Humanoid::new();
+    let stance = humanoid.legs.stance().to_vec();
+    let feet = |bodies: &[usize]| -> Vec<Foot> {
+        bodies.iter().map(|&body| Foot { body, sole: vec![[0.0; 3]] }).collect()
+    };
+    for (feet, posture, message) in [
+        (feet(&[]), stance.clone(), "the number of feet"),
+        (feet(&[1000]), stance.clone(), "the body of a foot is 1000"),
+        (feet(&[0]), stance.clone(), "joints of the legs"),
+        (humanoid.world.feet.clone(), vec![0.0; 3], "the posture"),
+    ] {
+        let error = Legs::new(&humanoid.chain, &feet, posture).unwrap_err().to_string();
+        assert!(error.contains(message), "{error}");
+    }
 }
 
 /// The loop that the feet close: they stay, and velocities and accelerations are derivatives.
@@ -148,12 +186,12 @@ fn legs_follow_the_base() {
     let motion = humanoid.motion(0.5, 1.0);
     for sample in 1..motion.samples() - 1 {
         let [q, v, _] = motion.sample(sample);
-        let [linear, angular] = humanoid.feet.speeds(q, v).unwrap();
+        let [linear, angular] = humanoid.legs.feet().speeds(q, v).unwrap();
         assert!(linear < 1e-9 && angular < 1e-9);
         let [[before, speed_before, _], [after, speed_after, _]] =
             [motion.sample(sample - 1), motion.sample(sample + 1)];
         let [_, v, a] = motion.sample(sample);
-        for &joint in &humanoid.legs {
+        for &joint in humanoid.legs.joints() {
             assert!(((after[joint] - before[joint]) / (2.0 * PERIOD_S) - v[joint]).abs() < 2e-3);
             assert!(((speed_after[joint] - speed_before[joint]) / (2.0 * PERIOD_S) - a[joint]).abs() < 2e-2);
         }
@@ -168,7 +206,7 @@ fn feet_carry_the_base() {
     let [q, v, a] = motion.sample(30);
     let mut force = vec![0.0; q.len()];
     humanoid.chain.inverse_dynamics(q, v, a, &mut Workspace::new(&humanoid.chain), &mut force).unwrap();
-    humanoid.feet.take_load(q, &mut force).unwrap();
+    humanoid.legs.feet().take_load(q, &mut force).unwrap();
     assert!(force[..6].iter().all(|force| force.abs() < 1e-9), "{:?}", &force[..6]);
     // Knees that are bent bear a part of the weight.
     let knee = humanoid.chain.joint_index("left_knee").unwrap();
@@ -252,4 +290,17 @@ fn positions_and_velocities_are_of_one_instant() {
         println!("{name}: the mean velocity follows {share:.3} of a change");
         assert!((share - 0.5).abs() < 0.03, "{name}: {share}");
     }
+}
+
+/// A foot on a body beyond the last ended the program.
+#[test]
+fn a_foot_on_a_body_that_is_not_there_is_refused() {
+    let Humanoid { chain, legs, .. } = Humanoid::new();
+    let bodies = chain.bodies().len();
+    let foot = Foot { body: bodies, sole: vec![[0.0; 3]; 3] };
+    let error = Feet::new(&chain, &[foot], legs.stance()).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        format!("body {bodies} does not exist: there are {bodies}, counted from 0")
+    );
 }

@@ -1,9 +1,12 @@
-//! The analytic backend: this crate's algorithms behind [`DynamicsBackend`].
+//! The analytic backend: this crate's algorithms behind [`DynamicsBackend`], [`SimulationBackend`] and [`BodyKinematics`].
 
 use crate::backend::check_finite;
 use crate::configuration::{normalised, quaternion_product};
 use crate::motion::floating_placement;
-use crate::{BackendError, DimensionError, DynamicsBackend, Tree, Vec3, Workspace, World, check_size};
+use crate::{
+    BackendError, BodyJoint, BodyKinematics, BodyMotion, DimensionError, DynamicsBackend, SimulationBackend,
+    Tree, Vec3, Workspace, World, check_size,
+};
 
 /// Largest distance of a quaternion's length from 1.
 const QUATERNION_TOLERANCE: f64 = 1e-6;
@@ -13,7 +16,7 @@ const RUNGE_KUTTA: [(f64, f64); 4] = [(1.0 / 6.0, 0.5), (1.0 / 3.0, 0.5), (1.0 /
 
 /// A [`Tree`] in empty space: a floating base falls freely.
 ///
-/// [`step`](DynamicsBackend::step) is one step of the classical Runge-Kutta method of order four. The friction and
+/// [`step`](SimulationBackend::step) is one step of the classical Runge-Kutta method of order four. The friction and
 /// the limits that the URDF declares are not part of it.
 #[derive(Clone, Debug)]
 pub struct AnalyticBackend {
@@ -125,28 +128,6 @@ impl DynamicsBackend for AnalyticBackend {
         self.tree.configuration_size()
     }
 
-    fn state(&self, q: &mut [f64], v: &mut [f64]) -> Result<(), BackendError> {
-        self.tree.check_state(q, v)?;
-        q.copy_from_slice(&self.q);
-        v.copy_from_slice(&self.v);
-        Ok(())
-    }
-
-    fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), BackendError> {
-        self.tree.check_state(q, v)?;
-        check_finite("the configuration q", q)?;
-        check_finite("the velocity v", v)?;
-        if self.tree.is_floating() {
-            let length = q[3..7].iter().map(|x| x * x).sum::<f64>().sqrt();
-            if (length - 1.0).abs() > QUATERNION_TOLERANCE {
-                return Err(BackendError::NotUnitQuaternion { length });
-            }
-        }
-        self.q.copy_from_slice(q);
-        self.v.copy_from_slice(v);
-        Ok(())
-    }
-
     fn inverse_dynamics(
         &mut self,
         q: &[f64],
@@ -172,6 +153,34 @@ impl DynamicsBackend for AnalyticBackend {
     ) -> Result<(), BackendError> {
         accelerate(&self.tree, &self.rotor_inertia, [q, v, force], &mut self.workspace, acceleration)?;
         check_finite("the acceleration", acceleration).map_err(|_| BackendError::Singular)
+    }
+
+    fn base_wrench(&self) -> [f64; 6] {
+        self.base_wrench
+    }
+}
+
+impl SimulationBackend for AnalyticBackend {
+    fn state(&self, q: &mut [f64], v: &mut [f64]) -> Result<(), BackendError> {
+        self.tree.check_state(q, v)?;
+        q.copy_from_slice(&self.q);
+        v.copy_from_slice(&self.v);
+        Ok(())
+    }
+
+    fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), BackendError> {
+        self.tree.check_state(q, v)?;
+        check_finite("the configuration q", q)?;
+        check_finite("the velocity v", v)?;
+        if self.tree.is_floating() {
+            let length = q[3..7].iter().map(|x| x * x).sum::<f64>().sqrt();
+            if (length - 1.0).abs() > QUATERNION_TOLERANCE {
+                return Err(BackendError::NotUnitQuaternion { length });
+            }
+        }
+        self.q.copy_from_slice(q);
+        self.v.copy_from_slice(v);
+        Ok(())
     }
 
     fn step(&mut self, torque: &[f64], dt: f64) -> Result<(), BackendError> {
@@ -214,9 +223,31 @@ impl DynamicsBackend for AnalyticBackend {
         self.base_wrench = base_wrench.unwrap_or(self.base_wrench);
         Ok(())
     }
+}
 
-    fn base_wrench(&self) -> [f64; 6] {
-        self.base_wrench
+impl BodyKinematics for AnalyticBackend {
+    type Error = DimensionError;
+
+    fn body_count(&self) -> usize {
+        self.tree.bodies().len()
+    }
+
+    fn body_joint(&self, body: usize) -> BodyJoint {
+        BodyKinematics::<f64>::body_joint(&&self.tree, body)
+    }
+
+    fn gravity(&self) -> [f64; 3] {
+        self.tree.gravity
+    }
+
+    fn body_motions(
+        &mut self,
+        q: &[f64],
+        v: &[f64],
+        a: &[f64],
+        motions: &mut [BodyMotion<f64>],
+    ) -> Result<(), DimensionError> {
+        BodyKinematics::body_motions(&mut &self.tree, q, v, a, motions)
     }
 }
 

@@ -1,4 +1,4 @@
-//! The contract between algorithms that need a robot's dynamics and what provides it.
+//! The contracts between algorithms that need a robot's dynamics, or a robot that moves, and what provides them.
 
 use crate::DimensionError;
 
@@ -11,7 +11,7 @@ pub enum BackendError {
     Dimension(#[from] DimensionError),
     /// The world does not fit the robot.
     #[error(transparent)]
-    World(crate::WorldError),
+    World(#[from] crate::WorldError),
     /// A number given to the backend is NaN or infinite.
     #[error("{what} has an element that is not a finite number")]
     NotFinite {
@@ -45,15 +45,18 @@ pub enum BackendError {
     },
 }
 
-/// A robot's dynamics, whoever computes them: the analytic algorithms here, or a physics engine.
+/// A robot's dynamics, whoever computes them: the analytic algorithms here, a physics engine, or another library.
+///
+/// This is the half that computes. It needs no simulator: who has one implements [`SimulationBackend`] as well, and who knows how
+/// the bodies move implements [`BodyKinematics`](crate::BodyKinematics), for the regressor and the ZMP.
 ///
 /// **Coordinates** are those of [`crate::Tree`]: the configuration `q` is `[x, y, z, qx, qy, qz, qw]` of a floating base
 /// (absent on a fixed one), then one position for each joint of [`joint_names`](Self::joint_names), in their order; the
 /// velocity `v` is the base's linear and angular velocity in its own frame, then one for each joint. Accelerations and
 /// generalised forces follow `v`. SI units throughout.
 ///
-/// **The world** of a backend may hold a ground or noise; `inverse_dynamics` and `forward_dynamics` are the robot's own
-/// equation `M(q)·a + h(q, v) = force`, without contacts, friction or noise, and leave the state as it is.
+/// `inverse_dynamics` and `forward_dynamics` are the robot's own equation `M(q)·a + h(q, v) = force`, without contacts, friction or
+/// noise.
 pub trait DynamicsBackend {
     /// The backend's name, for messages.
     fn name(&self) -> &str;
@@ -66,18 +69,6 @@ pub trait DynamicsBackend {
 
     /// Elements of a configuration: one for each joint, seven more for a floating base.
     fn configuration_size(&self) -> usize;
-
-    /// Copies the present state into `q` and `v`.
-    ///
-    /// # Errors
-    /// A slice does not fit the robot.
-    fn state(&self, q: &mut [f64], v: &mut [f64]) -> Result<(), BackendError>;
-
-    /// Puts the robot into a state.
-    ///
-    /// # Errors
-    /// A slice does not fit the robot, a number is not finite, or a base's quaternion is not unit (to 1e-6).
-    fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), BackendError>;
 
     /// The generalised force that the motion needs.
     ///
@@ -103,6 +94,32 @@ pub trait DynamicsBackend {
         acceleration: &mut [f64],
     ) -> Result<(), BackendError>;
 
+    /// The wrench that the world gives to the robot at its base, along the world's axes: force \[N\], then moment about
+    /// the world's origin \[N·m\]. The measured ZMP comes from it.
+    ///
+    /// It belongs to the motion of the last [`inverse_dynamics`](Self::inverse_dynamics) (what the base must be given),
+    /// or of the last [`step`](SimulationBackend::step) of a simulation at the instant at which the step began, whichever came later;
+    /// zero before either. Bodies that move are counted; the root link of a fixed base is not, as its inertia is not part of
+    /// the robot.
+    fn base_wrench(&self) -> [f64; 6];
+}
+
+/// A robot that moves in a world of its own, which may hold a floor or noise: the half that simulates.
+///
+/// The state is the backend's. [`step`](Self::step) moves it on; inverse and forward dynamics leave it as it is.
+pub trait SimulationBackend: DynamicsBackend {
+    /// Copies the present state into `q` and `v`.
+    ///
+    /// # Errors
+    /// A slice does not fit the robot.
+    fn state(&self, q: &mut [f64], v: &mut [f64]) -> Result<(), BackendError>;
+
+    /// Puts the robot into a state.
+    ///
+    /// # Errors
+    /// A slice does not fit the robot, a number is not finite, or a base's quaternion is not unit (to 1e-6).
+    fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), BackendError>;
+
     /// Moves the state on by `dt` \[s\] under constant joint torques, one for each joint \[N·m, N\].
     ///
     /// A floating base is moved by gravity and by the contacts of the backend's world alone. After an error the state is
@@ -112,18 +129,9 @@ pub trait DynamicsBackend {
     /// The slice does not fit the robot, a number is not finite, `dt` is not positive, or the motion diverges.
     fn step(&mut self, torque: &[f64], dt: f64) -> Result<(), BackendError>;
 
-    /// The wrench that the world gives to the robot at its base, along the world's axes: force \[N\], then moment about
-    /// the world's origin \[N·m\]. The measured ZMP comes from it.
-    ///
-    /// It belongs to the motion of the last [`inverse_dynamics`](Self::inverse_dynamics) (what the base must be given),
-    /// or of the last [`step`](Self::step) at the instant at which the step began, whichever came later; zero before
-    /// either. Bodies that move are counted; the root link of a fixed base is not, as its inertia is not part of the
-    /// robot.
-    fn base_wrench(&self) -> [f64; 6];
-
-    /// The part of [`base_wrench`](Self::base_wrench) that the floor gave to one foot of the world in the last [`step`](Self::step), about the
-    /// world's origin as well, as a force plate under that foot would say; `foot` counts [`World::feet`](crate::World::feet). None from a backend
-    /// without contacts, and before a step.
+    /// The part of [`base_wrench`](DynamicsBackend::base_wrench) that the floor gave to one foot of the world in the last
+    /// [`step`](Self::step), about the world's origin as well, as a force plate under that foot would say; `foot` counts
+    /// [`World::feet`](crate::World::feet). None from a backend without contacts, and before a step.
     fn foot_wrench(&self, foot: usize) -> Option<[f64; 6]> {
         let _ = foot;
         None

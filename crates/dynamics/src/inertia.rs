@@ -1,5 +1,6 @@
 //! Spatial inertia of a rigid body at an arbitrary origin: linear in the standard parameters, no division by the mass.
 
+use crate::dense::Cholesky;
 use crate::{BodyMotion, InertialParameters, Mat3, Placement, Scalar, Spatial, Vec3};
 
 /// Inertia of a body (or of several welded together) in one frame, at its origin.
@@ -98,9 +99,53 @@ impl Inertia<f64> {
         self.tensor - lever.tensor
     }
 
+    /// Whether a distribution of positive mass has this inertia: the pseudo-inertia \[½tr(I)·1 − I, h; hᵀ, m\] is positive definite
+    /// (Wensing, Kim & Slotine 2018).
+    pub fn is_physical(&self) -> bool {
+        let (Vec3(h), Mat3(tensor)) = (self.moment, self.tensor);
+        let half = 0.5 * (tensor[0][0] + tensor[1][1] + tensor[2][2]);
+        let entry = |row: usize, column: usize| match (row, column) {
+            (3, 3) => self.mass,
+            (3, axis) => h[axis],
+            _ if row == column => half - tensor[row][row],
+            _ => -tensor[row][column],
+        };
+        Cholesky::of(4, entry).is_some()
+    }
+
     /// The standard parameters, in the order of [`crate::PARAMETER_NAMES`].
     pub fn parameters(self) -> InertialParameters {
         let ([x, y, z], i) = (self.moment.0, self.tensor.0);
         [self.mass, x, y, z, i[0][0], i[0][1], i[1][1], i[0][2], i[1][2], i[2][2]]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Inertia;
+    use crate::{Mat3, Vec3};
+
+    #[test]
+    fn real_bodies_are_physical_and_others_are_not() {
+        let body = |mass, center, moments: [f64; 3]| {
+            let [x, y, z] = moments;
+            let tensor = Mat3([[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]]);
+            Inertia::from_center_of_mass(mass, Vec3(center), tensor).parameters()
+        };
+        for (parameters, physical) in [
+            (body(2.0, [0.3, -1.0, 0.5], [0.1, 0.1, 0.1]), true),
+            (body(2.0, [0.0; 3], [0.1, 0.1, 0.1999]), true),
+            // One principal moment above the sum of the others.
+            (body(2.0, [0.3, -1.0, 0.5], [0.1, 0.1, 0.21]), false),
+            (body(-2.0, [0.0; 3], [0.1, 0.1, 0.1]), false),
+            (body(2.0, [0.0; 3], [-0.1, 0.1, 0.1]), false),
+            ([0.0; 10], false),
+        ] {
+            assert_eq!(
+                Inertia::<f64>::from_parameters(&parameters).is_physical(),
+                physical,
+                "{parameters:?}"
+            );
+        }
     }
 }

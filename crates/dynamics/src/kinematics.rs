@@ -1,6 +1,8 @@
 //! Where bodies and the centre of mass are, and how they move with the coordinates.
 
-use crate::{DimensionError, Inertia, JointType, Mat3, Placement, Scalar, Spatial, Tree, Vec3, check_size};
+use crate::{
+    DimensionError, Inertia, JointType, Mat3, Placement, Scalar, Spatial, Tree, Vec3, check_index, check_size,
+};
 
 impl Tree {
     /// Placement of every body's frame in the world, one for each body.
@@ -45,13 +47,7 @@ impl Tree {
         let size = self.velocity_size;
         check_size("the placements", placements.len(), self.bodies.len())?;
         check_size("the Jacobian", jacobian.len(), 6 * size)?;
-        if body >= self.bodies.len() {
-            return Err(DimensionError {
-                what: "the body index",
-                found: body,
-                expected: self.bodies.len() - 1,
-            });
-        }
+        check_index("body", body, self.bodies.len())?;
         jacobian.fill(T::zero());
         let point = placements[body].point(point);
         self.for_each_axis(placements, body, point, |column, motion| {

@@ -1,13 +1,15 @@
 #![doc = include_str!("../README.md")]
 
 mod analytic;
+mod articulated_body;
 mod backend;
+mod body_kinematics;
 mod configuration;
+pub mod dense;
 mod forward_dynamics;
 mod inertia;
 mod inverse_dynamics;
 mod kinematics;
-mod ldl;
 mod mass_matrix;
 mod motion;
 pub mod random_tree;
@@ -19,7 +21,8 @@ mod workspace;
 mod world;
 
 pub use analytic::AnalyticBackend;
-pub use backend::{BackendError, DynamicsBackend};
+pub use backend::{BackendError, DynamicsBackend, SimulationBackend};
+pub use body_kinematics::{BodyJoint, BodyKinematics, MotionSubspace};
 pub use inertia::Inertia;
 pub use motion::BodyMotion;
 pub use scalar::{Dual, Lanes, Scalar};
@@ -28,19 +31,42 @@ pub use tree::{Body, InertialParameters, JointType, Limits, PARAMETER_NAMES, PAR
 pub use workspace::Workspace;
 pub use world::{Foot, World, WorldError};
 
-/// A slice whose length does not match the robot.
+/// An argument that does not match the robot.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{what} has {found} elements, but this robot needs {expected}")]
-pub struct DimensionError {
-    /// Which argument.
+pub enum DimensionError {
+    /// A slice of another length.
+    #[error("{what} has {found} elements, but this robot needs {expected}")]
+    Length {
+        /// Which argument.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length that it must have.
+        expected: usize,
+    },
+    /// An index of something that the robot has not.
+    #[error(transparent)]
+    Index(#[from] IndexError),
+}
+
+/// An index that lies beyond what it indexes.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{what} {index} does not exist: there are {count}, counted from 0")]
+pub struct IndexError {
+    /// What is indexed, in the singular.
     pub what: &'static str,
-    /// Its length.
-    pub found: usize,
-    /// The length that it must have.
-    pub expected: usize,
+    /// The index.
+    pub index: usize,
+    /// How many of them there are.
+    pub count: usize,
+}
+
+/// `Ok` if `index` is below `count`, else an error that names `what` it should index.
+pub fn check_index(what: &'static str, index: usize, count: usize) -> Result<(), IndexError> {
+    if index < count { Ok(()) } else { Err(IndexError { what, index, count }) }
 }
 
 /// `Ok` if `found` is `expected`, else an error that names `what`.
 pub fn check_size(what: &'static str, found: usize, expected: usize) -> Result<(), DimensionError> {
-    if found == expected { Ok(()) } else { Err(DimensionError { what, found, expected }) }
+    if found == expected { Ok(()) } else { Err(DimensionError::Length { what, found, expected }) }
 }

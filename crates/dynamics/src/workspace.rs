@@ -1,5 +1,6 @@
 //! Preallocated scratch of the dynamics algorithms.
 
+use crate::articulated_body::ArticulatedBody;
 use crate::{BodyMotion, DimensionError, Inertia, Placement, Scalar, Spatial, Tree, check_size};
 
 /// Scratch memory for the algorithms of a [`Tree`]: make it once per thread, reuse it for every sample.
@@ -11,7 +12,7 @@ pub struct Workspace<T> {
     pub(crate) forces: Vec<Spatial<T>>,
     pub(crate) placements: Vec<Placement<T>>,
     pub(crate) composites: Vec<Inertia<T>>,
-    pub(crate) articulated: Vec<crate::forward_dynamics::ArticulatedBody<T>>,
+    pub(crate) articulated: Vec<ArticulatedBody<T>>,
     /// `velocity_size`² elements: the mass matrix where forward dynamics has to solve it.
     pub(crate) matrix: Vec<T>,
     /// `velocity_size` elements.
@@ -27,7 +28,7 @@ impl<T: Scalar> Workspace<T> {
             forces: vec![Spatial::zero(); bodies],
             placements: vec![Placement::identity(); bodies],
             composites: vec![Inertia::zero(); bodies],
-            articulated: vec![crate::forward_dynamics::ArticulatedBody::default(); bodies],
+            articulated: vec![ArticulatedBody::default(); bodies],
             matrix: vec![T::zero(); coordinates * coordinates],
             vector: vec![T::zero(); coordinates],
         }

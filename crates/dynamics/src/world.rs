@@ -1,6 +1,6 @@
 //! What surrounds a simulated robot: a floor under its feet, rotors behind its joints.
 
-use crate::{BackendError, DimensionError, Tree, check_size};
+use crate::{DimensionError, Tree, check_size};
 
 /// The world of a simulated robot, the same for every physics engine.
 ///
@@ -110,10 +110,4 @@ pub enum WorldError {
         /// Its corners.
         corners: usize,
     },
-}
-
-impl From<WorldError> for BackendError {
-    fn from(error: WorldError) -> Self {
-        BackendError::World(error)
-    }
 }

@@ -5,7 +5,8 @@ mod arbitrary;
 use arbitrary::{assert_close, dot, mass_matrix, times};
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, RandomTreeOptions, random_state, random_tree};
 use phiw_dynamics::{
-    AnalyticBackend, BackendError, DynamicsBackend, Foot, Placement, Tree, World, WorldError,
+    AnalyticBackend, BackendError, DynamicsBackend, Foot, Placement, SimulationBackend, Tree, World,
+    WorldError,
 };
 
 fn robot(seed: u64, options: RandomTreeOptions) -> (Tree, RandomState) {

@@ -3,7 +3,9 @@
 mod arbitrary;
 
 use arbitrary::{assert_close, inverse_dynamics, options, robot, times};
-use phiw_dynamics::random_tree::{RandomNumbers, RandomState, random_state, random_tree, random_urdf};
+use phiw_dynamics::random_tree::{
+    RandomNumbers, RandomState, RandomTreeOptions, random_state, random_tree, random_urdf,
+};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Placement, Tree, Vec3};
 use proptest::prelude::*;
@@ -83,4 +85,17 @@ proptest! {
         a.remove(at_v);
         assert_close(&inverse_dynamics(&merged, &q, &v, &a), &expected, 1e-11);
     }
+}
+
+/// The body was reported as a slice: "the body index has 9 elements, but this robot needs 8".
+#[test]
+fn the_jacobian_of_a_body_that_is_not_there_names_its_index() {
+    let tree = random_tree(3, &RandomTreeOptions::default()).unwrap();
+    let (bodies, size) = (tree.bodies().len(), tree.velocity_size());
+    let now = placements(&tree, &tree.neutral_configuration());
+    let error = tree.point_jacobian(&now, bodies, Vec3::zero(), &mut vec![0.0; 6 * size]).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        format!("body {bodies} does not exist: there are {bodies}, counted from 0")
+    );
 }

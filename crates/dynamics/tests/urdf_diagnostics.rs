@@ -185,6 +185,10 @@ fn mimics() {
     assert_eq!((thumb.ratio, thumb.offset, thumb.velocity_index), (-6.0, -0.5, 0));
 
     let none = UrdfOptions::default();
+    // Two multipliers that are numbers, and a product that is none.
+    let steep =
+        chain.replace("multiplier='-3'", "multiplier='1e40'").replace("multiplier='2'", "multiplier='1e40'");
+    refuses(&steep, &none, "joint `thumb`: what the chain of its mimics multiplies up to is not");
     finds(&pair("<mimic joint='pivot' multiplier='0' offset='0.2'/>"), &["taken as fixed at 0.2"]);
     refuses(
         &pair("<mimic joint='pivott'/>"),
@@ -343,8 +347,71 @@ fn missing_parts() {
     refuses(
         &robot.replace("revolute", "ball"),
         &none,
-        "joint `pivot` is of the type ball, which is not supported",
+        "joint `pivot` is of the type ball, which is not supported: URDF has revolute",
     );
+    refuses(
+        &format!("\n{}", single(SOLID, "<axis/>")),
+        &none,
+        "line 2: joint `pivot` lacks the xyz of its <axis>: add it",
+    );
+    refuses(&single(SOLID, "<mimic/>"), &none, "line 1: joint `pivot` lacks the joint of its <mimic>");
+    refuses(&robot.replace("<link name='arm'", "<link"), &none, "line 1: link `` lacks a name");
+}
+
+/// Which of two would count is not for the reader to choose.
+#[test]
+fn a_part_that_is_there_twice_is_refused_with_its_line() {
+    let none = UrdfOptions::default();
+    let twice = |content: &str| format!("{content}\n{content}");
+    refuses(
+        &single(&twice(SOLID), LIMIT),
+        &none,
+        "line 2: link `arm` has a second <inertial>: remove one of them",
+    );
+    let masses = SOLID.replace("<mass value='2'/>", &twice("<mass value='2'/>"));
+    refuses(&single(&masses, LIMIT), &none, "line 2: link `arm` has a second <mass>");
+    for part in ["<origin/>", "<axis xyz='1 0 0'/>", LIMIT, "<dynamics/>", "<mimic joint='pivot'/>"] {
+        let tag = part[1..].split([' ', '/']).next().unwrap();
+        refuses(
+            &single(SOLID, &twice(part)),
+            &none,
+            &format!("line 2: joint `pivot` has a second <{tag}>: remove one of them"),
+        );
+    }
+}
+
+/// The limits went by the joint's name, which two XML readers spelled in two ways.
+#[test]
+fn a_joint_whose_name_holds_a_line_break_keeps_its_limits() {
+    let reading = finds(&single(SOLID, LIMIT).replace("'pivot'", "'pi\nvot'"), &[]);
+    assert_eq!(reading.tree.joint(0).joint, "pi vot");
+    assert_eq!((reading.tree.joint(0).limits.lower, reading.tree.joint(0).limits.effort), (-1.0, 5.0));
+}
+
+/// `version` of the robot, content of a joint: the origin's rotation and the limits.
+#[test]
+fn versions() {
+    let reads = |version: &str, content: &str| {
+        let robot = format!("<robot name='r' version='{version}'>{}</robot>", single(SOLID, content));
+        let tree = read_urdf(&robot, &UrdfOptions::default()).unwrap().tree;
+        let joint = tree.joint(0);
+        (joint.origin.rotation.0[1].map(|x| x.round()), joint.limits.lower, joint.limits.upper)
+    };
+    let content = "<origin quat_xyzw='0 0 1 1'/><limit upper='1'/>";
+    assert_eq!(reads("1.0", content), ([0.0, 1.0, 0.0], 0.0, 1.0));
+    assert_eq!(reads("1.1", content), ([1.0, 0.0, 0.0], 0.0, 1.0));
+    assert_eq!(reads("1.2", content), ([1.0, 0.0, 0.0], -f64::INFINITY, 1.0));
+    let refuses_content = |content: &str, expected: &str| {
+        let robot = format!("<robot name='r' version='1.1'>{}</robot>", single(SOLID, content));
+        refuses_text(&robot, expected);
+    };
+    refuses_content(
+        "<origin rpy='0 0 0' quat_xyzw='0 0 0 1'/>",
+        "line 1: an <origin> of joint `pivot` has both rpy and quat_xyzw: remove one of them",
+    );
+    refuses_content("<origin quat_xyzw='0 0 1'/>", "quat_xyzw=\"0 0 1\" is not four numbers");
+    refuses_content("<origin quat_xyzw='0 0 nan 1'/>", "joint `pivot`: its origin is not a finite number");
+    refuses_content("<origin quat_xyzw='0 0 1e200 1'/>", "joint `pivot`: its origin is not a finite number");
 }
 
 #[test]

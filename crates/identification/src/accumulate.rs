@@ -1,28 +1,12 @@
 //! Blocks of conditioned samples into factors, one for each torque and fold, in parallel and in constant memory.
 
-use crate::{Design, IdentificationError};
+use crate::block_source::try_for_each_batch;
+use crate::{BlockSource, Design, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, FactorBuilder};
 use phiw_regressor::least_squares::{Group, GroupedFactor};
-use phiw_telemetry::{Block, FilterScratch, LogError};
+use phiw_telemetry::{Block, FilterScratch};
 use rayon::prelude::*;
-
-/// Where blocks come from: a log on disk, a recording in memory, a simulator. Each call brings the same blocks again.
-pub trait BlockSource: Sync {
-    /// Hands every block to `sink`, in order.
-    ///
-    /// # Errors
-    /// The log cannot be read.
-    fn blocks(&self, sink: &mut dyn FnMut(Block)) -> Result<(), LogError>;
-}
-
-/// Blocks in memory, such as those of a [`Recording`](phiw_telemetry::Recording::blocks).
-impl BlockSource for Vec<Block> {
-    fn blocks(&self, sink: &mut dyn FnMut(Block)) -> Result<(), LogError> {
-        self.iter().cloned().for_each(sink);
-        Ok(())
-    }
-}
 
 /// A stretch of time of one log whose rows are kept apart: to be left out, or held out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,14 +24,6 @@ impl Fold {
     pub fn contains(&self, log: usize, t: f64) -> bool {
         self.log == log && self.start <= t && t < self.end
     }
-}
-
-/// Blocks that wait for the processors; more would cost memory only.
-const BLOCKS_PER_THREAD: usize = 2;
-
-/// Blocks that are worked on at a time.
-pub(crate) fn batch_size() -> usize {
-    BLOCKS_PER_THREAD * rayon::current_num_threads()
 }
 
 /// The factors of `design` over each fold: \[Φ f\] of each torque, after the parallel filter.
@@ -70,23 +46,7 @@ pub fn accumulate(
         }
     });
     let mut merged: Vec<Vec<Option<Factor>>> = vec![vec![None; design.rows().len()]; folds.len()];
-    let batch_size = batch_size();
-    let mut failure = None;
-    for source in sources {
-        let mut batch = Vec::with_capacity(batch_size);
-        source.blocks(&mut |block| {
-            batch.push(block);
-            if batch.len() == batch_size && failure.is_none() {
-                failure = reduce(design, &folds, std::mem::take(&mut batch), &mut merged).err();
-            }
-        })?;
-        if failure.is_none() {
-            failure = reduce(design, &folds, batch, &mut merged).err();
-        }
-        if let Some(error) = failure {
-            return Err(error);
-        }
-    }
+    try_for_each_batch(sources, |batch| reduce(design, &folds, batch, &mut merged))?;
     let group = |(factor, layout): (Option<Factor>, &crate::RowLayout)| Group {
         factor: factor.unwrap_or_else(|| Factor::empty(layout.range.len())),
         parameters: layout.parameters.clone(),
@@ -154,21 +114,10 @@ impl<'a> Worker<'a> {
         let (scratch, builders, rows) = (&mut self.scratch, &mut self.builders, design.rows());
         let mut pieces = Vec::new();
         let mut current = None;
-        let mut failure = None;
-        let mut failed = |result: Result<(), RegressorError>| {
-            if let Err(error) = result {
-                failure.get_or_insert(error);
-            }
-        };
-        let mut evaluated = Ok(());
-        block.filter(
+        block.try_filter(
             self.design.evaluation_width(),
             &mut self.filter,
-            |sample, row| {
-                if evaluated.is_ok() {
-                    evaluated = scratch.evaluate(&block, sample, row);
-                }
-            },
+            |sample, row| Ok(scratch.evaluate(&block, sample, row)?),
             |_, t, row| {
                 let fold = folds.iter().position(|fold| fold.contains(block.log, t));
                 if fold != current {
@@ -178,15 +127,15 @@ impl<'a> Worker<'a> {
                 if fold.is_some() {
                     for (joint, (builder, layout)) in builders.iter_mut().zip(rows).enumerate() {
                         if design.counts(row, joint) {
-                            failed(builder.push_row(&row[layout.range.clone()]));
+                            builder.push_row(&row[layout.range.clone()])?;
                         }
                     }
                 }
+                Ok::<(), RegressorError>(())
             },
-        );
+        )?;
         finish(current, builders, &mut pieces);
-        evaluated?;
-        failure.map_or(Ok(pieces), Err)
+        Ok(pieces)
     }
 }
 

@@ -1,8 +1,9 @@
 //! Whether logs and a robot fit each other, before anything is computed.
 
-use crate::Design;
+use crate::{Design, Effect};
 use phiw_dynamics::{JointType, Tree};
 use phiw_limits::Limits;
+use phiw_regressor::{JointTorqueRegressor, fewest_base_parameters};
 use phiw_telemetry::Survey;
 use std::path::PathBuf;
 
@@ -106,7 +107,7 @@ pub enum InputError {
     },
     /// A robot whose factors do not fit into memory.
     #[error(
-        "{joints} joints with {parameters} parameters need {:.1} GB for their factors, more than {:.1} GB: \
+        "{joints} joints with {parameters} parameters or more need {:.1} GB for their factors, more than {:.1} GB: \
          hold joints that need not be identified together (--hold JOINT)", *bytes as f64 / 1e9, *most as f64 / 1e9
     )]
     TooLarge {
@@ -121,7 +122,7 @@ pub enum InputError {
     },
     /// Nothing moves in what is held out.
     #[error(
-        "{held_out}: no joint moves there, so nothing can be said of the model's error on motion held out; \
+        "{held_out}: no joint moves there for long enough, so nothing can be said of the model's error on motion held out; \
          name a log with motion (--validate), or cut the rest off the log"
     )]
     NothingHeldOut {
@@ -247,11 +248,44 @@ pub fn check_logs(tree: &Tree, train: &[Survey], validate: &[Survey]) -> Result<
 /// # Errors
 /// [`InputError::TooLarge`].
 pub fn check_size_of_factors(design: &Design, folds: usize, limits: &Limits) -> Result<(), InputError> {
-    let copies = (folds + rayon::current_num_threads()) as u64;
-    let of_row = |row: &crate::RowLayout| (row.range.len() as u64).pow(2) * size_of::<f64>() as u64;
-    let bytes = copies * design.rows().iter().map(of_row).sum::<u64>();
+    let widths = design.rows().iter().map(|row| row.range.len());
+    check_size(widths, design.parameter_count(), folds, limits)
+}
+
+/// The same from the fewest parameters that a robot and its effects can have, before the base parameters are searched for, which takes long and much
+/// memory where there are many joints.
+///
+/// # Errors
+/// [`InputError::TooLarge`].
+pub fn check_size_of_robot<'a>(
+    tree: &Tree,
+    effects: impl IntoIterator<Item = &'a dyn Effect>,
+    folds: usize,
+    limits: &Limits,
+) -> Result<(), InputError> {
+    let fewest = fewest_base_parameters(tree);
+    let regressor = JointTorqueRegressor::new(tree);
+    // A row's last number is the measured torque.
+    let mut widths: Vec<usize> = (0..regressor.rows())
+        .map(|row| 1 + regressor.row_bodies(row).iter().map(|&body| fewest[body]).sum::<usize>())
+        .collect();
+    let mut parameters = fewest.iter().sum();
+    for effect in effects {
+        parameters += effect.parameters().len();
+        effect.entries().iter().for_each(|entry| widths[entry.row] += 1);
+    }
+    check_size(widths.into_iter(), parameters, folds, limits)
+}
+
+fn check_size(
+    widths: impl ExactSizeIterator<Item = usize>,
+    parameters: usize,
+    folds: usize,
+    limits: &Limits,
+) -> Result<(), InputError> {
+    let (joints, copies) = (widths.len(), (folds + rayon::current_num_threads()) as u64);
+    let bytes = copies * widths.map(|width| (width as u64).pow(2) * size_of::<f64>() as u64).sum::<u64>();
     let most = limits.factor_bytes;
-    let (joints, parameters) = (design.rows().len(), design.parameter_count());
     if bytes > most { Err(InputError::TooLarge { joints, parameters, bytes, most }) } else { Ok(()) }
 }
 

@@ -21,6 +21,20 @@ pub struct RowLayout {
     effects: Vec<usize>,
 }
 
+impl RowLayout {
+    /// The model's torque \[N·m, N\]: the row's columns times their parameters, given an evaluation of all rows
+    /// ([`DesignScratch::evaluate`]) and all parameters of the design.
+    pub fn torque(&self, evaluation: &[f64], parameters: &[f64]) -> f64 {
+        let columns = &evaluation[self.range.clone()];
+        columns.iter().zip(&self.parameters).map(|(column, &parameter)| column * parameters[parameter]).sum()
+    }
+
+    /// The measured torque \[N·m, N\] of an evaluation of all rows; zero where the block has none.
+    pub fn measured_torque(&self, evaluation: &[f64]) -> f64 {
+        evaluation[self.range.end - 1]
+    }
+}
+
 /// Whether a joint moves, given the filtered share of samples in which it does.
 pub(crate) fn moves(share: f64) -> bool {
     share >= 0.5

@@ -1,6 +1,6 @@
 //! What an effect is to a fit: some columns beside the inertial ones.
 //!
-//! This crate knows no effect by name. A catalogue (`phiw-residual` has one) or a user brings them.
+//! This crate knows no effect by name. A catalogue (`phiw-effects` is one) or a user brings them.
 
 use crate::{Needs, Sample};
 use phiw_dynamics::Tree;
@@ -69,6 +69,17 @@ pub trait Effect: Send + Sync {
     /// What its columns need beside the signals.
     fn needs(&self) -> Needs {
         Needs::default()
+    }
+    /// Whether the columns of a parameter (an index into [`Effect::parameters`]) are linear in the motion: at a given position they change with the velocities or the accelerations
+    /// of the same sample, they are affine in both, and they depend on nothing else (time, torque, what was before). Viscous friction and rotor inertia are.
+    ///
+    /// No is always safe. It costs a little of what noisy logs tell: such a column is then taken of the motion at the beginning of a control period.
+    fn is_linear_in_motion(&self, _parameter: usize) -> bool {
+        false
+    }
+    /// Whether the columns of a sample depend on that sample and earlier ones alone. A rate of change of the torque depends on later samples too.
+    fn is_causal(&self) -> bool {
+        true
     }
     /// A new evaluator of its columns.
     fn evaluator(&self) -> Box<dyn Evaluator + '_>;

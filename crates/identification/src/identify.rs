@@ -53,6 +53,9 @@ pub fn identify(
     data: &Data<'_>,
 ) -> Result<Identified, IdentificationError> {
     let Data { train, held_out, sources, rest_speeds } = data;
+    let folds = train.len() + held_out.len();
+    let of_variants = effects.iter().flatten().map(|effect| effect.as_ref());
+    crate::check_size_of_robot(tree, of_variants, folds, &Limits::default())?;
     let base = BaseParameters::of_tree(tree, BaseParametersOptions::default())?;
     let mut slots = Vec::with_capacity(effects.len());
     let mut all = Vec::new();

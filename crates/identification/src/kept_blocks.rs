@@ -2,6 +2,7 @@
 
 use crate::{BlockSource, IdentificationError};
 use phiw_telemetry::{Block, LogError};
+use std::ops::ControlFlow;
 
 /// Conditioned blocks of a source, kept if they are few.
 pub struct KeptBlocks<'a> {
@@ -45,11 +46,10 @@ fn size(block: &Block) -> usize {
 }
 
 impl BlockSource for KeptBlocks<'_> {
-    fn blocks(&self, sink: &mut dyn FnMut(Block)) -> Result<(), LogError> {
+    fn stream(&self, sink: &mut dyn FnMut(Block) -> ControlFlow<()>) -> Result<(), LogError> {
         match &self.kept {
-            Some(blocks) => blocks.iter().cloned().for_each(sink),
-            None => self.source.blocks(sink)?,
+            Some(blocks) => blocks.stream(sink),
+            None => self.source.stream(sink),
         }
-        Ok(())
     }
 }

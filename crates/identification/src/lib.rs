@@ -1,10 +1,14 @@
 #![doc = include_str!("../README.md")]
 
+pub mod accuracy;
+
 mod accumulate;
+mod block_source;
 mod checks;
 mod design;
 mod effect;
 mod error;
+mod factor_rows;
 mod fit;
 mod identify;
 mod kept_blocks;
@@ -16,18 +20,19 @@ mod reference;
 mod robot_findings;
 mod sample;
 
-pub use accumulate::{BlockSource, Fold, accumulate};
-pub use checks::{InputError, check_excitation, check_logs, check_size_of_factors};
+pub use accumulate::{Fold, accumulate};
+pub use block_source::{BlockSource, try_for_each_block};
+pub use checks::{InputError, check_excitation, check_logs, check_size_of_factors, check_size_of_robot};
 pub use design::{Design, DesignScratch, RowLayout};
 pub use effect::{Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Entry, Evaluator};
 pub use error::IdentificationError;
+pub use factor_rows::FactorRows;
 pub use fit::{Fit, TorqueError, fit, merge, tells_of_torques, torque_error};
 pub use identify::{Data, Identified, Variants, identify};
 pub use kept_blocks::KeptBlocks;
 pub use log_set::{HELD_OUT_SHARE, LogFile, LogSet, Progress};
 pub use model::{
-    BodyParameters, EffectParameters, FactorRows, Model, NamedParameter, parameter_name, standard_unit,
-    with_masses,
+    BodyParameters, EffectParameters, Model, NamedParameter, parameter_name, standard_unit, with_masses,
 };
 pub use predict::{Prediction, predict};
 pub use reference::ReferenceModel;

@@ -178,13 +178,10 @@ pub struct LogFile<'a> {
 }
 
 impl BlockSource for LogFile<'_> {
-    fn blocks(&self, sink: &mut dyn FnMut(Block)) -> Result<(), LogError> {
+    fn stream(&self, sink: &mut dyn FnMut(Block) -> ControlFlow<()>) -> Result<(), LogError> {
         let what = reading("reading", &self.survey.path);
         let mut report = |done: u64, total: u64| (self.progress)(&what, done, total);
-        phiw_telemetry::stream(self.survey, self.conditioning, &mut report, &mut |block| {
-            sink(block);
-            ControlFlow::Continue(())
-        })?;
+        phiw_telemetry::stream(self.survey, self.conditioning, &mut report, sink)?;
         Ok(())
     }
 }

@@ -1,9 +1,12 @@
 //! An identified model as one thing: rigid body, effects, what it was fitted to; written to `model.json` and read back.
 
-use crate::{Design, EffectCatalogue, EffectError, EffectSpec, Fit, IdentificationError, ReferenceModel};
+use crate::{
+    Design, Effect, EffectCatalogue, EffectError, EffectSpec, FactorRows, Fit, IdentificationError,
+    ReferenceModel, check_size_of_robot,
+};
 use phiw_dynamics::{PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree};
+use phiw_limits::Limits;
 use phiw_regressor::BaseParameters;
-use phiw_regressor::factor::Factor;
 use serde::{Deserialize, Serialize};
 
 /// Version of the file's form.
@@ -70,48 +73,6 @@ pub struct EffectParameters {
     pub parameters: Vec<NamedParameter>,
     /// Whether the user declared it; else it was found.
     pub declared: bool,
-}
-
-/// An upper triangular factor, row by row from the diagonal on.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct FactorRows {
-    /// The parameters that its columns stand for; the right-hand side follows them.
-    pub parameters: Vec<usize>,
-    /// Number of rows of Φ.
-    pub rows: u64,
-    /// The entries.
-    pub entries: Vec<f64>,
-}
-
-impl FactorRows {
-    fn of(factor: &Factor, parameters: Vec<usize>) -> Self {
-        let size = factor.columns();
-        let entries =
-            (0..size).flat_map(|row| (row..size).map(move |column| factor.entry(row, column))).collect();
-        FactorRows { parameters, rows: factor.rows(), entries }
-    }
-
-    /// The factor itself.
-    ///
-    /// # Errors
-    /// The number of entries is not that of a triangle.
-    pub fn factor(&self) -> Result<Factor, IdentificationError> {
-        let size = self.parameters.len() + 1;
-        if self.entries.len() != size * (size + 1) / 2 {
-            let message =
-                format!("the model's factor has {} entries, but {} columns", self.entries.len(), size);
-            return Err(IdentificationError::Model(message));
-        }
-        let mut entries = self.entries.iter();
-        let mut rows = vec![0.0; size * size];
-        for row in 0..size {
-            rows[row * size + row..(row + 1) * size]
-                .iter_mut()
-                .zip(&mut entries)
-                .for_each(|(to, from)| *to = *from);
-        }
-        Ok(Factor::of_rows(size, &rows)?.standing_for(self.rows))
-    }
 }
 
 /// Standard deviations that the logs could not tell are `null`.
@@ -231,32 +192,45 @@ impl Model {
         catalogue: &dyn EffectCatalogue,
     ) -> Result<(Design, Vec<f64>), IdentificationError> {
         let joints: Vec<&str> = tree.joint_names().collect();
-        if joints != self.joints {
+        let own: Vec<&str> = self.joints.iter().map(String::as_str).collect();
+        if let Some(difference) = first_difference("joint", &own, &joints) {
             let message = format!(
-                "the model is of the joints {}, but the URDF with its held joints has {}: use the URDF and --hold that it was made with",
-                self.joints.join(", "),
-                joints.join(", ")
+                "{difference}, its held joints left out: use the URDF and --hold that the model was made with"
             );
             return Err(IdentificationError::Model(message));
         }
-        let base = BaseParameters::of_tree(tree, Default::default())?;
-        if base.count() != self.base_parameters.len() {
+        if self.bodies.len() != tree.bodies().len() {
+            let (model, urdf) = (self.bodies.len(), tree.bodies().len());
             let message = format!(
-                "the model has {} base parameters, but the URDF {}: the kinematics differ",
-                self.base_parameters.len(),
-                base.count()
+                "the model has {model} bodies, but the URDF {urdf}: use the URDF that it was made with"
             );
             return Err(IdentificationError::Model(message));
         }
         let effects = self.effects.iter().map(|effect| catalogue.build(&effect.spec, tree));
+        let effects: Vec<Box<dyn Effect>> = effects.collect::<Result<_, _>>()?;
+        let of_effects = effects.iter().map(|effect| effect.as_ref());
+        check_size_of_robot(tree, of_effects, 1, &Limits::default())?;
+        let base = BaseParameters::of_tree(tree, Default::default())?;
+        if base.count() != self.base_parameters.len() {
+            let own: Vec<&str> =
+                self.base_parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+            let names: Vec<String> =
+                base.independent().iter().map(|&column| parameter_name(tree, column)).collect();
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            let difference = first_difference("base parameter", &own, &names).unwrap_or_default();
+            let message =
+                format!("the kinematics differ, {difference}: use the URDF that the model was made with");
+            return Err(IdentificationError::Model(message));
+        }
         let reference = self.reference(tree, catalogue)?;
-        let design =
-            Design::new(tree.clone(), base, effects.collect::<Result<_, _>>()?).with_reference(reference);
+        let design = Design::new(tree.clone(), base, effects).with_reference(reference);
         let values =
             self.base_parameters.iter().chain(self.effects.iter().flat_map(|effect| &effect.parameters));
         let parameters: Vec<f64> = values.map(|parameter| parameter.value).collect();
         if parameters.len() != design.parameter_count() {
-            let message = "an effect of the model has not the parameters that its kind has".to_owned();
+            let message =
+                "an effect of the model has not the parameters that its kind has; write it again with phiw"
+                    .to_owned();
             return Err(IdentificationError::Model(message));
         }
         self.check()?;
@@ -287,6 +261,23 @@ impl Model {
         identified.set_inertial_parameters(&parameters)?;
         Ok(identified)
     }
+}
+
+/// Where two lists of names part, in words: how many there are of what, and the first that differ.
+fn first_difference(what: &str, model: &[&str], urdf: &[&str]) -> Option<String> {
+    let place = (0..model.len().max(urdf.len())).find(|&place| model.get(place) != urdf.get(place))?;
+    let name = |names: &[&str]| names.get(place).map_or("absent".to_owned(), |name| format!("`{name}`"));
+    let count = if model.len() == urdf.len() {
+        String::new()
+    } else {
+        format!("the model has {} {what}s, the URDF {}, and ", model.len(), urdf.len())
+    };
+    Some(format!(
+        "{count}{what} {} is {} in the model but {} in the URDF",
+        place + 1,
+        name(model),
+        name(urdf)
+    ))
 }
 
 /// Radius of the sphere that stands for a body of which the URDF says nothing \[m\].

@@ -1,5 +1,6 @@
 //! What a fitted design predicts over logs, sample by sample, in constant memory.
 
+use crate::block_source::try_for_each_batch;
 use crate::{BlockSource, Design, DesignScratch, IdentificationError};
 use phiw_dynamics::{DimensionError, check_size};
 use phiw_telemetry::{Block, FilterScratch};
@@ -52,24 +53,7 @@ pub fn predict(
     sink: &mut dyn FnMut(&Prediction<'_>),
 ) -> Result<(), IdentificationError> {
     check_size("parameters", parameters.len(), design.parameter_count())?;
-    let batch_size = crate::accumulate::batch_size();
-    let mut failure = None;
-    for source in sources {
-        let mut batch = Vec::with_capacity(batch_size);
-        source.blocks(&mut |block| {
-            batch.push(block);
-            if batch.len() == batch_size && failure.is_none() {
-                failure = flush(design, parameters, std::mem::take(&mut batch), sink).err();
-            }
-        })?;
-        if failure.is_none() {
-            failure = flush(design, parameters, batch, sink).err();
-        }
-        if let Some(error) = failure {
-            return Err(error.into());
-        }
-    }
-    Ok(())
+    try_for_each_batch(sources, |batch| Ok(flush(design, parameters, batch, sink)?))
 }
 
 fn flush(
@@ -140,23 +124,17 @@ impl<'a> Predictor<'a> {
             values: Vec::with_capacity(3 * torques * block.outputs.len()),
             signals: Vec::with_capacity(3 * block.joints * block.outputs.len()),
         };
-        let mut evaluated = Ok(());
-        block.filter(
+        block.try_filter(
             3 * torques,
             &mut self.filter,
             |sample, row| {
-                if evaluated.is_err() {
-                    return;
-                }
-                evaluated = scratch.evaluate(&block, sample, evaluation);
+                scratch.evaluate(&block, sample, evaluation)?;
                 for (torque, layout) in design.rows().iter().enumerate() {
-                    let columns = &evaluation[layout.range.clone()];
-                    let terms = columns.iter().zip(&layout.parameters);
-                    row[torque] = columns[layout.parameters.len()];
-                    row[torques + torque] =
-                        terms.map(|(column, &parameter)| column * parameters[parameter]).sum();
+                    row[torque] = layout.measured_torque(evaluation);
+                    row[torques + torque] = layout.torque(evaluation, parameters);
                     row[2 * torques + torque] = evaluation[design.width() + torque];
                 }
+                Ok::<(), DimensionError>(())
             },
             |output, t, row| {
                 outputs.t.push(t);
@@ -165,8 +143,9 @@ impl<'a> Predictor<'a> {
                 for signal in [&block.q, &block.qd, &block.qdd] {
                     outputs.signals.extend_from_slice(&signal[at.clone()]);
                 }
+                Ok(())
             },
-        );
-        evaluated.map(|()| outputs)
+        )?;
+        Ok(outputs)
     }
 }

@@ -5,6 +5,29 @@ mod synthetic;
 use phiw_regressor::JointTorqueRegressor;
 use proptest::prelude::*;
 
+/// Bytes of the factors of 18 folds and of each thread.
+fn exact_bytes(design: &phiw_identification::Design) -> u64 {
+    let copies = (18 + rayon::current_num_threads()) as u64;
+    copies * design.rows().iter().map(|row| 8 * (row.range.len() as u64).pow(2)).sum::<u64>()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
+
+    /// What the search for base parameters finds is never less than what is told from the joints alone: no robot whose factors fit is refused early.
+    #[test]
+    fn no_robot_is_refused_early_whose_factors_fit(seed in 0u64..100_000, joints in 1usize..9) {
+        let tree = synthetic::robot(seed, joints);
+        let fewest: usize = phiw_regressor::fewest_base_parameters(&tree).iter().sum();
+        let design = synthetic::design(&tree);
+        prop_assert!(fewest <= design.base().count(), "{fewest} of {}", design.base().count());
+        let mut limits = phiw_limits::Limits::default();
+        limits.factor_bytes = exact_bytes(&design);
+        let effects = design.effects().iter().map(|effect| effect.as_ref());
+        prop_assert!(phiw_identification::check_size_of_robot(&tree, effects, 18, &limits).is_ok());
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
@@ -68,4 +91,31 @@ fn factors_that_do_not_fit_into_memory_are_refused_before_the_work() {
     limits.factor_bytes = 1000;
     let error = phiw_identification::check_size_of_factors(&design, 18, &limits).unwrap_err().to_string();
     assert!(error.contains("5 joints") && error.contains("--hold"), "{error}");
+}
+
+/// 200 joints with friction took 40 s and 20 GB in the search for their base parameters, before their size was looked at.
+#[test]
+fn a_robot_of_200_joints_is_refused_before_its_base_parameters_are_searched_for() {
+    let joint = |number: usize| {
+        let axis = ["1 0 0", "0 1 0", "0 0 1"][number % 3];
+        format!(
+            r#"<link name="l{number}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+            <joint name="j{number}" type="continuous"><parent link="l{}"/><child link="l{number}"/><origin xyz="0.1 0.2 0.3"/><axis xyz="{axis}"/></joint>"#,
+            number - 1
+        )
+    };
+    let chain = |joints: usize| {
+        let joints: String = (1..=joints).map(joint).collect();
+        let xml = format!(r#"<robot name="chain"><link name="l0"/>{joints}</robot>"#);
+        phiw_dynamics::urdf::read_urdf(&xml, &Default::default()).unwrap().tree
+    };
+    let limits = phiw_limits::Limits::default();
+    let check = |joints: usize| phiw_identification::check_size_of_robot(&chain(joints), [], 18, &limits);
+    let error = check(200).unwrap_err().to_string();
+    // The first body has one, each after it seven.
+    assert!(error.contains("200 joints with 1394 parameters or more") && error.contains("--hold"), "{error}");
+    assert!(check(60).is_ok());
+    let base = phiw_regressor::BaseParameters::of_tree(&chain(6), Default::default()).unwrap();
+    assert_eq!(phiw_regressor::fewest_base_parameters(&chain(6)).iter().sum::<usize>(), 36);
+    assert!((36..=38).contains(&base.count()), "{}", base.count());
 }

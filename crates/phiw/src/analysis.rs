@@ -3,7 +3,8 @@
 use crate::session::Session;
 use crate::traces::Traces;
 use crate::{Error, warnings};
-use phiw_identification::{Data, Identified, Model, merge};
+use phiw_effects::JointProperty;
+use phiw_identification::{Data, EffectSpec, Identified, Model, merge};
 use phiw_regressor::RegressorError;
 
 /// A residual up to this many times the noise floor is noise.
@@ -92,7 +93,9 @@ impl<'a> Analysis<'a> {
 pub fn noise_floor(session: &Session, data: &Data<'_>, model: &Model) -> Result<Vec<f64>, Error> {
     let tree = model.identified_tree(&session.tree)?;
     let mut rotor = vec![0.0; tree.joint_count()];
-    for effect in model.effects.iter().filter(|effect| effect.spec.kind == "rotor_inertia") {
+    let armature = Some(JointProperty::Armature);
+    let adds_inertia = |spec: &EffectSpec| session.catalogue.joint_property(spec) == armature;
+    for effect in model.effects.iter().filter(|effect| adds_inertia(&effect.spec)) {
         let joint = effect.spec.joints.first().and_then(|joint| tree.joint_index(joint));
         if let (Some(joint), Some(inertia)) = (joint, effect.parameters.first()) {
             rotor[joint] += inertia.value;

@@ -66,6 +66,16 @@ pub enum Error {
         /// What is wrong with it.
         source: Box<IdentificationError>,
     },
+    /// A model file of another robot.
+    #[error("{} does not fit {}: {source}", path.display(), urdf.display())]
+    ModelOfAnother {
+        /// The model.
+        path: PathBuf,
+        /// The robot.
+        urdf: PathBuf,
+        /// The first difference.
+        source: Box<IdentificationError>,
+    },
     /// The robot's base floats.
     #[error("{}: the robot's base floats, and a log does not hold its motion; make its joint of type floating a fixed one", path.display())]
     FloatingBase {
@@ -153,7 +163,7 @@ pub enum Error {
         /// The log.
         path: PathBuf,
         /// What is wrong with it.
-        source: CurriculumError,
+        source: Box<CurriculumError>,
     },
     /// A joint that no motion moves.
     #[error(
@@ -180,46 +190,23 @@ pub enum Error {
         /// What is wrong with it.
         source: phiw_plant::SupportError,
     },
-    /// Soles that carry nothing.
+    /// Feet that give no support.
     #[error("{}: {source}", path.display())]
-    SupportPolygon {
+    Stance {
         /// The support file.
         path: PathBuf,
         /// What is wrong with it.
-        source: phiw_zmp::SupportError,
-    },
-    /// A foot that joints move.
-    #[error(
-        "{}: the foot `{link}` is moved by the joint `{joint}`, but motions are planned for a robot whose base stands still; hold its legs with --hold {joint},…",
-        path.display()
-    )]
-    FootMoves {
-        /// The support file.
-        path: PathBuf,
-        /// The foot's link.
-        link: String,
-        /// A joint between it and the base.
-        joint: String,
+        source: phiw_curriculum::StanceError,
     },
     /// Every motion would topple the robot.
-    #[error(
-        "none of the {motions} motions keeps the ZMP over the support under the present estimate: the safest, {safest}, leaves it by {:.1} mm; \
-         add calmer motions, or start from a better model with --model", 1e3 * outside_m
-    )]
-    NothingSafe {
-        /// How many there are.
-        motions: usize,
-        /// The one that comes nearest.
-        safest: String,
-        /// How far its ZMP is outside \[m\].
-        outside_m: f64,
-    },
+    #[error("{0} (--model takes one)")]
+    Refused(CurriculumError),
     /// The choice of a motion.
     #[error(transparent)]
     Curriculum(#[from] CurriculumError),
     /// The identified parameters cannot be written as a URDF.
     #[error("identified.urdf: {0}")]
-    IdentifiedUrdf(UrdfError),
+    IdentifiedUrdf(Box<UrdfError>),
     /// All logs of the training together.
     #[error("{logs}: {source}")]
     TrainingLogs {
@@ -253,6 +240,7 @@ impl Error {
             | Error::FloatingBase { .. }
             | Error::NotAModel { .. }
             | Error::Model { .. }
+            | Error::ModelOfAnother { .. }
             | Error::Map { .. }
             | Error::Robot { .. }
             | Error::Recording(_)
@@ -264,9 +252,8 @@ impl Error {
             | Error::Motion { .. }
             | Error::JointStandsStill { .. }
             | Error::Support { .. }
-            | Error::SupportPolygon { .. }
-            | Error::FootMoves { .. }
-            | Error::NothingSafe { .. }
+            | Error::Stance { .. }
+            | Error::Refused(_)
             | Error::OutIsFolder { .. }
             | Error::MotionNamedJson { .. }
             | Error::TrainingLogs { .. }

@@ -6,19 +6,18 @@ use crate::console::Console;
 use crate::draws::Draws;
 use crate::explain_page;
 use crate::identify::{Outcome, outputs};
-use crate::input::read_text;
+use crate::model_file::ModelFile;
 use crate::output::take_folder;
 use crate::report_json::{by_joint, report_json};
 use crate::session::Session;
 use crate::{Error, summary};
+use phiw_effects::SignalRanges;
 use phiw_identification::{Data, Identified, Model, TorqueError, identify};
-use phiw_limits::Limits;
 use phiw_report::ReportJson;
 use phiw_report::json::{
     DrawsJson, EffectJson, EvidenceJson, JointMap, NamedInDrawsJson, ParameterJson, ProgramJson,
     RemainingJson, RivalJson, TorqueErrors, Verdict,
 };
-use phiw_residual::SignalRanges;
 use phiw_residual::trace::{self, HeldModel, TraceInput, TraceOptions, Tracing, trace};
 use phiw_result_folder::{Disk, replace_folder};
 use std::fmt::Write;
@@ -148,13 +147,12 @@ fn start(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Re
             held: None,
         });
     };
-    let text = read_text(path, Limits::default().model_bytes)?;
-    let model: Model =
-        serde_json::from_str(&text).map_err(|source| Error::NotAModel { path: path.clone(), source })?;
-    model.check().map_err(|source| Error::Model { path: path.clone(), source: Box::new(source) })?;
-    let (design, parameters) = model.design(&session.tree, &session.catalogue)?;
+    let file = ModelFile::read(path)?;
+    let (design, parameters) = file.design(&session.arguments.urdf, &session.tree, &session.catalogue)?;
+    let factor = file.factor()?;
+    let model = file.model;
     let held = HeldModel {
-        factor: model.factor.factor()?,
+        factor,
         determined: model.factor.parameters.clone(),
         residual_std: model.residual_std.clone(),
     };

@@ -2,6 +2,7 @@
 
 use crate::analysis::Analysis;
 use crate::{Error, page as identified_page};
+use phiw_effects::Signal;
 use phiw_identification::{Data, Design, predict};
 use phiw_report::IdentificationPage;
 use phiw_report::json::{CannotBeToldJson, Verdict};
@@ -10,7 +11,6 @@ use phiw_report::page::{
     CandidateRow, CannotBeTold, EffectParameter, EffectSection, Picture, Remaining, Rival,
 };
 use phiw_report::plot::{Line, ResidualAgainstSignal, residual_against_signal};
-use phiw_residual::catalogue::sentence;
 use phiw_residual::trace::{self, FoundEffect, Ranked, Tracing};
 
 /// Points of a scatter; more would only blacken it.
@@ -68,7 +68,7 @@ pub fn headline(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<String> {
             percent(before)
         )),
         trace::Verdict::Explained | trace::Verdict::PartlyExplained => {
-            lines.extend((0..tracing.effects.len()).map(|index| sentence_of(tracing, index)));
+            lines.extend((0..tracing.effects.len()).map(|index| sentence_of(analysis, tracing, index)));
             lines.push(format!("Held-out error {} % → {} %.", percent(before), percent(after)));
         }
     }
@@ -122,7 +122,7 @@ fn place(tracing: &Tracing, index: usize) -> usize {
     tracing.specs.len() - tracing.effects.len() + index
 }
 
-fn sentence_of(tracing: &Tracing, index: usize) -> String {
+fn sentence_of(analysis: &Analysis<'_>, tracing: &Tracing, index: usize) -> String {
     let place = place(tracing, index);
     let effect = &tracing.model.design.effects()[place];
     let fitted: Vec<f64> = tracing
@@ -131,7 +131,7 @@ fn sentence_of(tracing: &Tracing, index: usize) -> String {
         .effect_parameters(place)
         .map(|parameter| tracing.model.fit.parameters[parameter])
         .collect();
-    sentence(&effect.spec(), &effect.parameters(), &fitted)
+    analysis.session.catalogue.sentence(&effect.spec(), &effect.parameters(), &fitted)
 }
 
 fn section(
@@ -157,7 +157,7 @@ fn section(
     EffectSection {
         kind: found.spec.kind.clone(),
         joints: found.spec.joints.clone(),
-        sentence: sentence_of(tracing, index),
+        sentence: sentence_of(analysis, tracing, index),
         parameters: named.iter().zip(info).map(parameter).collect(),
         relative_before: found.relative_before,
         relative_after: found.relative,
@@ -251,15 +251,6 @@ struct Scatter {
     points: [Thinned; 2],
 }
 
-#[derive(Clone, Copy)]
-enum Signal {
-    Position,
-    Velocity,
-    Acceleration,
-    Torque,
-    Time,
-}
-
 /// At most [`POINTS`] points, spread evenly over all that came.
 #[derive(Default)]
 struct Thinned {
@@ -289,13 +280,14 @@ impl Thinned {
 
 impl Scatters {
     fn new(analysis: &Analysis<'_>, tracing: &Tracing) -> Self {
+        let catalogue = &analysis.session.catalogue;
         let scatter = |found: &FoundEffect| {
             // An effect on the whole robot is shown on the first joint that it names, or the first of all.
             let name = found.spec.joints.first().cloned().unwrap_or_else(|| analysis.joints()[0].clone());
             Scatter {
                 joint: analysis.session.tree.joint_index(&name).unwrap_or_default(),
                 name,
-                signal: signal_of(&found.spec.kind),
+                signal: catalogue.kind(&found.spec.kind).map_or(Signal::Velocity, |kind| kind.seen_against()),
                 points: [Thinned::default(), Thinned::default()],
             }
         };
@@ -339,17 +331,5 @@ impl Scatters {
                 .to_owned(),
             svg,
         }]
-    }
-}
-
-/// The signal that an effect's torque is best seen against.
-fn signal_of(kind: &str) -> Signal {
-    match kind {
-        "joint_spring" | "gravity_balancer" | "torque_ripple" | "end_stop" | "encoder_offset" | "payload"
-        | "gravity_tilt" | "external_force" | "torque_offset" => Signal::Position,
-        "rotor_inertia" | "joint_elasticity" => Signal::Acceleration,
-        "torque_gain" | "actuator_saturation" | "load_dependent_friction" => Signal::Torque,
-        "thermal_drift" => Signal::Time,
-        _ => Signal::Velocity,
     }
 }

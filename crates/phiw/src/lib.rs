@@ -3,7 +3,6 @@
 pub mod analysis;
 pub mod arguments;
 pub mod check;
-mod consistency;
 pub mod console;
 mod date;
 mod draws;
@@ -13,6 +12,7 @@ mod explain_page;
 pub mod identified_urdf;
 pub mod identify;
 mod input;
+mod model_file;
 pub mod next;
 mod not_identified;
 pub mod output;

@@ -11,10 +11,16 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     // A fault of ours is one message and status 1, like any other failure that is not the input's.
     std::panic::set_hook(Box::new(|fault| {
-        console::say("error: phiw itself is at fault, please report it: ", &fault.to_string());
+        // A library's way of saying that the system gave no memory.
+        match fault.to_string().contains("AllocError") {
+            true => console::say(
+                "error: ",
+                "there is not enough memory; give phiw more (ulimit -v), or hold joints (--hold)",
+            ),
+            false => console::say("error: phiw itself is at fault, please report it: ", &fault.to_string()),
+        }
     }));
-    threads::start();
-    std::panic::catch_unwind(|| run(&arguments)).unwrap_or(ExitCode::FAILURE)
+    std::panic::catch_unwind(|| threads::with(|| run(&arguments))).unwrap_or(ExitCode::FAILURE)
 }
 
 /// Does what was asked for and says what became of it.

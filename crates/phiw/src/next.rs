@@ -1,10 +1,8 @@
 //! `phiw next`: which motion a real robot should run next, given what has been measured so far.
 
-mod balance;
 mod estimate;
 mod motions;
-mod plan;
-mod selection;
+mod plan_file;
 mod standing;
 mod telling;
 
@@ -12,9 +10,13 @@ use crate::arguments::NextArguments;
 use crate::console::Console;
 use crate::output::check_file;
 use crate::{Error, session};
-use estimate::Estimate;
-use phiw_curriculum::Robot;
-use phiw_residual::Catalogue;
+use estimate::Present;
+use phiw_curriculum::selection::SmallestCondition;
+use phiw_curriculum::{
+    Belief, Constraint, CurriculumError, CurriculumSettings, MeasuredSoFar, MotionMargin, Plan, Policy,
+    Relaxation, Unconstrained, ZmpConstraint, plan,
+};
+use phiw_curriculum::{ConditionRelaxation, ConstantReduction};
 use phiw_result_folder::{Disk, Lock, ResultFile, check_inputs, replace_files};
 use standing::Standing;
 use std::path::PathBuf;
@@ -53,25 +55,22 @@ pub fn next(arguments: &NextArguments, console: &Console) -> Result<NextOutcome,
     let named = [Some(&arguments.urdf), arguments.support.as_ref(), arguments.model.as_ref()];
     let inputs = named.into_iter().flatten().chain(&arguments.measured).chain(&motions.files).cloned();
     check_inputs(&inputs.collect::<Vec<_>>(), &[arguments.out.clone(), report_json.clone()])?;
-    let estimate = Estimate::new(arguments, &tree, &motions, &progress)?;
-    let robot = Robot::new(tree, standing.base_link, estimate.model.specs(), Catalogue::default())?;
-    let choice = selection::choose(arguments, &robot, &estimate, &standing, &motions.dataset)?;
-    let motion = &motions.dataset.motions()[choice.motion];
-    let balance = match &standing.stance {
-        Some(stance) => Some(balance::of_motion(&robot, &estimate, stance, motion, arguments.urdf_error)?),
-        None => None,
-    };
-    let plan = plan::Plan::new(&estimate, motion)?;
+    let present = Present::new(arguments, &tree, standing.base_link, &motions, &progress)?;
+    let plan = planned(arguments, &present, &standing, &motions)?;
+    let motion = &motions.dataset.motions()[plan.choice.motion];
+    let Present { robot, model, estimate, prior, .. } = &present;
+    let margin = |stance| MotionMargin::of_motion(robot, model, estimate, prior, stance, motion);
+    let balance = standing.stance.as_ref().map(margin).transpose()?;
+    let torque = motion.torques(&present.design, &estimate.parameters)?;
     console.finish();
 
     let story = telling::Telling {
         arguments,
-        robot: &robot,
         motions: &motions,
-        estimate: &estimate,
-        choice: &choice,
-        balance: balance.as_ref(),
+        present: &present,
         plan: &plan,
+        balance: balance.as_ref(),
+        torque: &torque,
         base_mass: standing.base_link[0],
         findings: &findings,
     };
@@ -81,9 +80,54 @@ pub fn next(arguments: &NextArguments, console: &Console) -> Result<NextOutcome,
     let name = |path: &std::path::Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let files = [
         ResultFile::new(name(&report_json), text),
-        ResultFile::new(name(&arguments.out), plan.csv(motion, robot.tree())),
+        ResultFile::new(name(&arguments.out), plan_file::csv(motion, &torque, robot.tree())),
     ];
     let folder = place.target().parent().unwrap_or(std::path::Path::new("."));
     replace_files(&Disk, folder, &name(&arguments.out), &files)?;
     Ok(NextOutcome { summary: story.text(&report_json), warnings: story.warnings(), report, report_json })
+}
+
+/// The curriculum's plan with the policy for a real robot.
+fn planned(
+    arguments: &NextArguments,
+    present: &Present,
+    standing: &Standing,
+    motions: &motions::Motions,
+) -> Result<Plan, Error> {
+    let constraint: Box<dyn Constraint> = match &standing.stance {
+        Some(stance) => Box::new(ZmpConstraint::new(stance.clone())),
+        None => Box::new(Unconstrained),
+    };
+    let relaxation: Box<dyn Relaxation> = match arguments.alpha {
+        Some(alpha) => Box::new(ConstantReduction(alpha)),
+        None => Box::new(ConditionRelaxation::default()),
+    };
+    let CurriculumSettings { none_allowed, rivalry_period_s, .. } = CurriculumSettings::default();
+    let belief = Belief {
+        robot: &present.robot,
+        dataset: &motions.dataset,
+        candidates: &present.candidates,
+        model: &present.model,
+        initial: &present.prior.model,
+        rivalry: None,
+    };
+    let measured = MeasuredSoFar {
+        triangle: present.triangle.as_ref(),
+        condition_numbers: &present.condition_numbers,
+        ..MeasuredSoFar::default()
+    };
+    let policy = Policy {
+        selection: &SmallestCondition,
+        constraint: constraint.as_ref(),
+        relaxation: relaxation.as_ref(),
+        none_allowed,
+        rivalry_period_s,
+        seed: 0,
+    };
+    plan(&belief, &measured, &policy).map_err(|error| match error {
+        error @ (CurriculumError::NothingSafe { .. } | CurriculumError::FellOnAll { .. }) => {
+            Error::Refused(error)
+        }
+        error => error.into(),
+    })
 }

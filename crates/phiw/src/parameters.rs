@@ -1,8 +1,8 @@
 //! The parameters as the report lists them.
 
 use crate::analysis::Analysis;
-use crate::consistency::is_consistent;
-use phiw_identification::{NamedParameter, parameter_name};
+use phiw_dynamics::Inertia;
+use phiw_identification::{BodyParameters, NamedParameter, parameter_name};
 use phiw_report::number::significant;
 use phiw_report::page::{BaseParameter, ParameterRow, Parameters};
 
@@ -38,7 +38,8 @@ fn rows(analysis: &Analysis<'_>) -> Vec<ParameterRow> {
 
 fn note(analysis: &Analysis<'_>) -> String {
     let bodies = &analysis.model.bodies;
-    let consistent = bodies.iter().filter(|body| is_consistent(&body.inertial)).count();
+    let is_physical = |body: &&BodyParameters| Inertia::<f64>::from_parameters(&body.inertial).is_physical();
+    let consistent = bodies.iter().filter(is_physical).count();
     format!(
         "Least squares, each torque weighted by its residual; standard deviations by leaving out one twelfth of the training motion after \
          the other, so that correlated samples are not counted as independent. cond of the weighted regressor {}. Logs determine base \

@@ -10,13 +10,14 @@ use crate::arguments::RetargetArguments;
 use crate::console::Console;
 use crate::input::read_text;
 use crate::output::check_folder;
+use batch::stem;
 use phiw_bspline_retarget::human::{MapError, MarkerMap};
 use phiw_bspline_retarget::{MarkerRecording, RetargetOptions, Retargeter, read_recording};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_limits::Limits;
 use phiw_result_folder::{Disk, Lock, check_inputs, remove_partial_files};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Retargets all recordings: for each a log `<name>.csv` without torques, and `<name>.json` with what it is worth.
 ///
@@ -84,9 +85,4 @@ fn default_map(files: &[PathBuf]) -> Result<MarkerMap, MapError> {
 fn share_named(map: &MarkerMap, recording: &MarkerRecording) -> f64 {
     let found = map.names().filter(|name| recording.marker(name).is_some()).count();
     found as f64 / map.names().count().max(1) as f64
-}
-
-/// A file's name without folder and extension.
-fn stem(path: &Path) -> String {
-    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }

@@ -5,13 +5,13 @@ use crate::arguments::SessionArguments;
 use crate::input::read_text;
 use phiw_dynamics::urdf::{Finding, UrdfOptions, read_urdf};
 use phiw_dynamics::{JointType, Tree};
+use phiw_effects::{Catalogue, SignalRanges};
 use phiw_identification::{
     BlockSource, Data, EffectError, IdentificationError, InputError, LogFile, LogSet, Progress, Variants,
     check_excitation, tells_of_torques,
 };
 use phiw_limits::Limits;
 use phiw_regressor::least_squares::GroupedFactor;
-use phiw_residual::{Catalogue, SignalRanges};
 use phiw_telemetry::ConditioningOptions;
 use std::path::PathBuf;
 

@@ -150,7 +150,33 @@ fn against_a_held_model_a_payload_is_found() {
 #[test]
 fn a_model_that_does_not_fit_is_refused() {
     let scene = Scene::new(|_, _, _| ());
-    for (text, expected) in [("{}", "not a model.json of phiw"), ("nonsense", "not a model.json of phiw")] {
+    scene.run("identify", "out", &[]);
+    let good: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(scene.path("out/model.json")).unwrap()).unwrap();
+    let spoiled = |spoil: &dyn Fn(&mut serde_json::Value)| {
+        let mut model = good.clone();
+        spoil(&mut model);
+        model.to_string()
+    };
+    let other_joint = spoiled(&|model| model["joints"][1] = "elbow".into());
+    let other_kinematics = spoiled(&|model| {
+        let parameters = model["base_parameters"].as_array_mut().unwrap();
+        let mut more = parameters[0].clone();
+        more["name"] = "elbow.m".into();
+        parameters.insert(0, more);
+    });
+    let other_bodies = spoiled(&|model| {
+        model["bodies"].as_array_mut().unwrap().remove(0);
+    });
+    for (text, expected) in [
+        ("{}", "model.json: not a model.json of phiw"),
+        ("nonsense", "model.json: not a model.json of phiw"),
+        // The file and the first difference were not named.
+        (&other_joint, "robot.urdf: joint 2 is `elbow` in the model but `joint_2` in the URDF"),
+        (&other_kinematics, "robot.urdf: the kinematics differ"),
+        (&other_kinematics, "base parameter 1 is `elbow.m` in the model"),
+        (&other_bodies, "robot.urdf: the model has 2 bodies, but the URDF 3"),
+    ] {
         fs::write(scene.path("model.json"), text).unwrap();
         let mut phiw = Command::cargo_bin("phiw").unwrap();
         phiw.arg("explain")

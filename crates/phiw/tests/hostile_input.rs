@@ -58,6 +58,9 @@ fn entities_that_expand_to_gigabytes_are_refused() {
 fn a_urdf_of_many_links_or_joints_is_refused() {
     let links: String = (0..300_000).map(|index| format!("<link name=\"l{index}\"/>")).collect();
     refused(identify(Some(&urdf_with(&links)), None), "more than 200000 elements");
+    // Each link's line was sought from the beginning of the file.
+    let links: String = (0..150_000).map(|index| format!("<link name=\"l{index}\"/>\n")).collect();
+    refused(identify(Some(&urdf_with(&links)), None), "several links have no parent");
     let joints: String = (0..500)
         .map(|index| {
             let parent = if index == 0 { "tool".to_owned() } else { format!("l{}", index - 1) };
@@ -127,7 +130,9 @@ fn a_pipe_in_the_place_of_a_file_is_refused() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_small_address_space_is_no_panic() {
-    for (kilobytes, threads) in [(200_000, "1"), (200_000, ""), (80_000, "1"), (80_000, "64")] {
+    for (kilobytes, threads) in
+        [(1_000_000, ""), (200_000, "1"), (200_000, ""), (80_000, "1"), (80_000, "64")]
+    {
         let folder = TempDir::new().unwrap();
         fs::write(folder.path().join("robot.urdf"), synthetic::URDF).unwrap();
         fs::write(folder.path().join("train.csv"), synthetic::csv(&synthetic::recording(1, 15.0))).unwrap();

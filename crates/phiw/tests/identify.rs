@@ -10,10 +10,10 @@ use phiw::traces::{Role, Traces};
 use phiw_dynamics::random_tree::{RandomNumbers, random_state};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Tree, Workspace};
+use phiw_effects::Catalogue;
 use phiw_identification::Model;
 use phiw_regressor::{BaseParameters, JointTorqueRegressor};
 use phiw_report::json::Verdict;
-use phiw_residual::Catalogue;
 use std::path::Path;
 use tempfile::TempDir;
 

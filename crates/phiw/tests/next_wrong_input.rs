@@ -135,3 +135,52 @@ fn a_motion_whose_stamps_contradict_its_velocities_is_refused() {
         check_refused(spoiled(column, factor), &["motions", "over the time stamps changes by"]);
     }
 }
+
+/// The comparison of whole columns let a short jump pass: 0.02 rad between two rows is 2 rad/s that no column states.
+#[test]
+fn a_motion_that_jumps_between_two_rows_is_refused() {
+    let jump = |size: f64, rows: std::ops::Range<usize>| {
+        move |scene: &Scene| {
+            let path = scene.path("motions/m19.csv");
+            let joints: Vec<String> = tree(&urdf(), false).joint_names().map(str::to_owned).collect();
+            let mut motion = Recording::from_csv(&path, &joints, TorqueColumns::Absent).unwrap();
+            rows.for_each(|row| motion.q[JOINTS * row + 1] += size);
+            motion.write_csv(&path).unwrap();
+            ""
+        }
+    };
+    for size in [0.02, -0.03, 0.05] {
+        for rows in [300..301, 300..340] {
+            let parts = ["m19.csv", "q.joint_2 goes from", "lines 301 and 302", "the robot would jump"];
+            check_refused(jump(size, rows), &parts);
+        }
+        check_refused(jump(size, 599..600), &["m19.csv", "q.joint_2 goes from", "lines 600 and 601"]);
+    }
+    // So long a jump is seen in whole columns, too.
+    for size in [-0.2, 0.5] {
+        check_refused(jump(size, 300..301), &["m19.csv", "q.joint_2"]);
+    }
+}
+
+/// At a thousand rows a second a jump of 4 mrad is no longer than a rounded position, but 4 rad/s.
+#[test]
+fn a_step_beyond_the_joints_speed_is_refused() {
+    let fast = |scene: &Scene| {
+        let path = scene.path("motions/m07.csv");
+        let joints: Vec<String> = tree(&urdf(), false).joint_names().map(str::to_owned).collect();
+        let mut motion = Recording::from_csv(&path, &joints, TorqueColumns::Absent).unwrap();
+        motion.t.iter_mut().for_each(|t| *t *= 0.1);
+        motion.qd.as_mut().unwrap().iter_mut().for_each(|v| *v *= 10.0);
+        motion.qdd.as_mut().unwrap().iter_mut().for_each(|a| *a *= 100.0);
+        // Ten times as slow again: the motion itself stays.
+        for signal in [&mut motion.q, motion.qd.as_mut().unwrap(), motion.qdd.as_mut().unwrap()] {
+            signal.iter_mut().for_each(|value| *value *= 0.1);
+        }
+        motion.q[JOINTS * 300 + 1] += 0.004;
+        motion.write_csv(&path).unwrap();
+        let robot = std::fs::read_to_string(scene.path("robot.urdf")).unwrap();
+        std::fs::write(scene.path("robot.urdf"), robot.replace("velocity=\"4\"", "velocity=\"2\"")).unwrap();
+        ""
+    };
+    check_refused(fast, &["m07.csv", "q.joint_2 goes from", "lines 301 and 302", "the robot would jump"]);
+}

@@ -207,3 +207,37 @@ fn wrong_input_is_named() {
         &["robot.urdf"],
     );
 }
+
+/// Motions as they are written here must not be taken for motions that jump.
+#[test]
+fn what_retarget_writes_has_no_jumps() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let mut files = Vec::new();
+    // Four of them, whole; the twentieth has the fastest turn of a forearm of all.
+    for (number, motion) in embedded_motions(5).unwrap().enumerate() {
+        if [0, 19, 50, 84].contains(&number) {
+            files.push(path(&format!("m{number}.c3d")));
+            std::fs::write(&files[files.len() - 1], motion.to_c3d()).unwrap();
+        }
+    }
+    let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/upper_body18.urdf");
+    for derivatives in ["analytic", "backward-differences"] {
+        let mut retarget = Command::cargo_bin("phiw").unwrap();
+        retarget.arg("retarget").arg("--urdf").arg(&robot).arg("--c3d").args(&files);
+        retarget
+            .args(["--quiet", "--derivatives", derivatives, "--out"])
+            .arg(path(derivatives))
+            .assert()
+            .success();
+        let joints: Vec<String> = {
+            let tree = phiw_dynamics::urdf::read_urdf_file(&robot, &Default::default()).unwrap().tree;
+            tree.joint_names().map(str::to_owned).collect()
+        };
+        for file in names(&path(derivatives)).iter().filter(|name| name.ends_with(".csv")) {
+            let log =
+                Recording::from_csv(&path(derivatives).join(file), &joints, TorqueColumns::Absent).unwrap();
+            phiw_curriculum::Motion::from_recording(file, "", &log).unwrap();
+        }
+    }
+}

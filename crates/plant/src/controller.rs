@@ -91,6 +91,80 @@ impl Gains {
     }
 }
 
+/// How stiff a controller is whose commands are held for a control period T.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GainSettings {
+    /// Bandwidth that is wanted of each joint \[rad/s\]; 0 for none.
+    pub bandwidth: f64,
+    /// Position gain over the effort limit \[1/rad, 1/m\] that a joint has at least, as dry friction would hold a light joint wherever it is.
+    pub stiffness: f64,
+    /// Largest K_p·T² over the joint's inertia, as commands that are held are a delay: the square of the largest bandwidth times T.
+    pub held_inertia: f64,
+    /// Largest K_p·T over the joint's viscous friction, which allows that much more.
+    pub held_friction: f64,
+}
+
+impl Default for GainSettings {
+    /// Small gains, as the paper's: half of the effort limit for a radian, of which a robot's own weight pulls a third. The bounds of held commands leave
+    /// the loops of `cargo xtask paper` (0.01 s) stable in both engines.
+    fn default() -> Self {
+        GainSettings { bandwidth: 0.0, stiffness: 0.5, held_inertia: 0.04, held_friction: 0.3 }
+    }
+}
+
+impl Gains {
+    /// Critically damped gains that stay stable when commands are held for `period_s` \[s\].
+    ///
+    /// `inertia` is what each joint feels \[kg·m², kg\], as [`apparent_inertia`] or [`least_apparent_inertia`] tells, and `viscous` the viscous friction that damps
+    /// it already \[N·m·s/rad, N·s/m\]; none if empty.
+    ///
+    /// # Errors
+    /// A list does not fit the robot.
+    pub fn held(
+        tree: &Tree,
+        inertia: &[f64],
+        viscous: &[f64],
+        period_s: f64,
+        settings: &GainSettings,
+    ) -> Result<Self, DimensionError> {
+        let joints = tree.joint_count();
+        check_size("the joints' inertias", inertia.len(), joints)?;
+        if !viscous.is_empty() {
+            check_size("the joints' viscous friction", viscous.len(), joints)?;
+        }
+        let GainSettings { bandwidth, stiffness, held_inertia, held_friction } = *settings;
+        let viscous = |joint: usize| viscous.get(joint).copied().unwrap_or(0.0);
+        let stiff = |joint: usize| {
+            let wanted =
+                (bandwidth * bandwidth * inertia[joint]).max(stiffness * tree.joint(joint).limits.effort);
+            let most =
+                held_inertia * inertia[joint] / period_s.powi(2) + held_friction * viscous(joint) / period_s;
+            wanted.min(most)
+        };
+        let position: Vec<f64> = (0..joints).map(stiff).collect();
+        let damping =
+            |joint: usize| (2.0 * (position[joint] * inertia[joint]).sqrt() - viscous(joint)).max(0.0);
+        Ok(Gains { velocity: (0..joints).map(damping).collect(), position })
+    }
+}
+
+/// The least [`apparent_inertia`] of each joint over configurations.
+///
+/// # Errors
+/// A list does not fit the robot.
+pub fn least_apparent_inertia(
+    tree: &Tree,
+    rotor_inertia: &[f64],
+    configurations: impl IntoIterator<Item = Vec<f64>>,
+) -> Result<Vec<f64>, DimensionError> {
+    let mut inertia = vec![f64::INFINITY; tree.joint_count()];
+    for q in configurations {
+        let felt = apparent_inertia(tree, rotor_inertia, &q)?;
+        inertia.iter_mut().zip(felt).for_each(|(least, felt)| *least = least.min(felt));
+    }
+    Ok(inertia)
+}
+
 /// What each joint feels of the robot when all other joints are free and the base is held \[kg·m², kg\]: 1/(M⁻¹)ⱼⱼ, with
 /// `rotor_inertia` on the mass matrix's diagonal (none if empty).
 ///
@@ -151,6 +225,64 @@ impl ComputedTorque {
         for (joint, command) in command.iter_mut().enumerate() {
             *command += self.gains.position[joint] * (q_ref[joint] - q[joint])
                 + self.gains.velocity[joint] * (v_ref[joint] - v[joint]);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use phiw_dynamics::random_tree::{RandomTreeOptions, random_tree};
+
+    /// Each case asks for more or less than a held command allows: K_p and K_d of inertias of 0.5 kg·m² at a limit that the settings name.
+    #[test]
+    fn gains_are_as_stiff_as_wanted_and_held_commands_allow() -> Result<(), Box<dyn std::error::Error>> {
+        let tree = random_tree(3, &RandomTreeOptions::default())?;
+        let joints = tree.joint_count();
+        let (inertia, friction) = (vec![0.5; joints], vec![2.0; joints]);
+        let effort = |joint: usize| tree.joint(joint).limits.effort;
+        let settings = |bandwidth, stiffness| GainSettings {
+            bandwidth,
+            stiffness,
+            held_inertia: 0.04,
+            held_friction: 0.3,
+        };
+        for joint in 0..joints {
+            let stiff = 3.0 / effort(joint);
+            for (settings, viscous, period_s, position) in [
+                // 8² · 0.5, and what the stiffness asks for if that is more.
+                (settings(8.0, 0.0), &[][..], 0.01, 32.0),
+                (settings(1.0, stiff), &[], 0.01, 3.0),
+                // 0.04 · 0.5 / 0.1², and with friction 0.3 · 2 / 0.1 more.
+                (settings(8.0, 0.0), &[], 0.1, 2.0),
+                (settings(8.0, 0.0), &friction, 0.1, 8.0),
+            ] {
+                let gains = Gains::held(&tree, &inertia, viscous, period_s, &settings)?;
+                let damping = 2.0 * (0.5_f64 * position).sqrt() - viscous.get(joint).copied().unwrap_or(0.0);
+                assert!((gains.position[joint] - position).abs() < 1e-9, "{settings:?}: {gains:?}");
+                assert!((gains.velocity[joint] - damping).abs() < 1e-9, "{settings:?}: {gains:?}");
+            }
+        }
+        // Friction that damps more than enough leaves nothing to do.
+        let gains = Gains::held(&tree, &inertia, &vec![1e3; joints], 0.01, &settings(1.0, 0.0))?;
+        assert!(gains.velocity.iter().all(|&gain| gain == 0.0));
+        assert!(Gains::held(&tree, &inertia[1..], &[], 0.01, &GainSettings::default()).is_err());
+        assert!(Gains::held(&tree, &inertia, &friction[1..], 0.01, &GainSettings::default()).is_err());
+        Ok(())
+    }
+
+    #[test]
+    fn the_least_inertia_is_below_that_of_each_configuration() -> Result<(), Box<dyn std::error::Error>> {
+        use phiw_dynamics::random_tree::{RandomNumbers, random_state};
+        let tree = random_tree(5, &RandomTreeOptions::default())?;
+        let mut random = RandomNumbers::new(2);
+        let poses: Vec<Vec<f64>> = (0..10).map(|_| random_state(&tree, &mut random).q).collect();
+        let least = least_apparent_inertia(&tree, &[], poses.iter().cloned())?;
+        let felt = poses.iter().map(|q| apparent_inertia(&tree, &[], q)).collect::<Result<Vec<_>, _>>()?;
+        for joint in 0..tree.joint_count() {
+            assert!(felt.iter().all(|felt| least[joint] <= felt[joint]));
+            assert!(felt.iter().any(|felt| least[joint] == felt[joint]));
         }
         Ok(())
     }

@@ -31,7 +31,7 @@ pub struct History {
     /// Wrench at the base at the beginning of the step, 6 numbers a row (see
     /// [`base_wrench`](phiw_dynamics::DynamicsBackend::base_wrench)).
     pub wrench: Vec<f64>,
-    /// The same of each foot (see [`foot_wrench`](phiw_dynamics::DynamicsBackend::foot_wrench)), 6 numbers a foot, one foot after the other in a
+    /// The same of each foot (see [`foot_wrench`](phiw_dynamics::SimulationBackend::foot_wrench)), 6 numbers a foot, one foot after the other in a
     /// row; empty if the backend does not tell.
     pub foot_wrenches: Vec<f64>,
 }

@@ -21,7 +21,10 @@ mod standing;
 mod step_solver;
 mod support;
 
-pub use controller::{ComputedTorque, Gains, RigidBodyModel, TorqueModel, apparent_inertia};
+pub use controller::{
+    ComputedTorque, GainSettings, Gains, RigidBodyModel, TorqueModel, apparent_inertia,
+    least_apparent_inertia,
+};
 pub use effect::{Coupling, Effect};
 pub use error::PlantError;
 pub use friction::Friction;
@@ -30,6 +33,6 @@ pub use mechanism::Mechanism;
 pub use plant::{Plant, PlantSetup, Timing};
 pub use presliding::Presliding;
 pub use reference::{FadedSines, MultiSine, Reference};
-pub use run::{Reaction, Run};
-pub use sensors::{Clock, Sensors};
+pub use run::{PlantRun, Reaction};
+pub use sensors::{Clock, Derivatives, Sensors};
 pub use support::{SupportError, feet_from_toml};

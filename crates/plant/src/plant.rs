@@ -4,8 +4,8 @@ use crate::error::check_value;
 use crate::joint_drive::JointDrive;
 use crate::motion::Motion;
 use crate::robot_as_built::robot_as_built;
-use crate::{ComputedTorque, Coupling, Effect, PlantError, Reaction, Reference, Run, Sensors};
-use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World};
+use crate::{ComputedTorque, Coupling, Effect, PlantError, PlantRun, Reaction, Reference, Sensors};
+use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -58,7 +58,7 @@ impl PlantSetup {
     }
 }
 
-/// A simulated robot that behaves like a real one, over any [`DynamicsBackend`].
+/// A simulated robot that behaves like a real one, over any [`SimulationBackend`].
 ///
 /// Each control period the controller reads the encoders and commands torques, clipped at the effort limits. The actuators
 /// deliver them with their noise and faults. Between two commands the backend is stepped, under the torque that is left after
@@ -72,7 +72,7 @@ pub struct Plant {
     /// The robot as built.
     pub(crate) tree: Tree,
     pub(crate) world: World,
-    pub(crate) backend: Box<dyn DynamicsBackend>,
+    pub(crate) backend: Box<dyn SimulationBackend>,
     pub(crate) controller: ComputedTorque,
     pub(crate) effects: Vec<Effect>,
     pub(crate) drives: Vec<JointDrive>,
@@ -96,7 +96,7 @@ impl Plant {
         tree: &Tree,
         world: &World,
         setup: PlantSetup,
-        build: impl FnOnce(&Tree, &World) -> Result<Box<dyn DynamicsBackend>, BackendError>,
+        build: impl FnOnce(&Tree, &World) -> Result<Box<dyn SimulationBackend>, BackendError>,
     ) -> Result<Self, PlantError> {
         let PlantSetup { controller, effects, actuator_noise, sensors, timing, fall_tilt_rad } = setup;
         world.check(tree)?;
@@ -182,7 +182,7 @@ impl Plant {
         reference: &dyn Reference,
         duration_s: f64,
         random: &mut impl Rng,
-    ) -> Result<Run, PlantError> {
+    ) -> Result<PlantRun, PlantError> {
         check_value(|| "the duration".to_owned(), duration_s, "> 0", |value| value > 0.0)?;
         let seed: u64 = random.random();
         let stream = |number| {
@@ -202,7 +202,7 @@ impl Plant {
             let component = |axis| history.mean(&history.wrench, 6, axis, from, to);
             Reaction::of_wrench([0, 1, 2, 3, 4, 5].map(component))
         };
-        Ok(Run {
+        Ok(PlantRun {
             reactions: windows.iter().map(reaction).collect(),
             recording,
             fell_at_s,

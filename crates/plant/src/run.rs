@@ -5,7 +5,7 @@ use phiw_telemetry::Recording;
 
 /// What the plant did when it followed a reference.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Run {
+pub struct PlantRun {
     /// The log: what a real robot would have written. Its stamps go on from run to run of one plant.
     pub recording: Recording,
     /// What the floor (or the mounting of a fixed base) gave to the robot, one for each row of the recording.

@@ -6,6 +6,7 @@ use phiw_dynamics::{Tree, check_size};
 use phiw_telemetry::Recording;
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
+use std::f64::consts::TAU;
 
 /// When samples are taken, and what is stamped on them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,6 +17,19 @@ pub enum Clock {
     StampedJitter(f64),
     /// Up to this share of the period early or late, stamped as if even.
     HiddenJitter(f64),
+}
+
+/// Which velocities and accelerations a log has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Derivatives {
+    /// None: encoders tell positions alone.
+    #[default]
+    Unlogged,
+    /// The drives' own, as a simulator knows them: without noise, the acceleration a mean over the torque's window.
+    Exact,
+    /// Central differences of the logged positions over their stamps, and of these velocities again: what is made of encoders alone. One-sided in the first
+    /// and the last row.
+    Differences,
 }
 
 /// Sensors and sampling. Lists have one element for each joint, or none for a perfect sensor.
@@ -36,9 +50,8 @@ pub struct Sensors {
     pub torque_delay_s: f64,
     /// The clock.
     pub clock: Clock,
-    /// Whether the log has velocities and accelerations too, as a simulator's would: without noise, the acceleration a mean
-    /// over the torque's window.
-    pub derivatives: bool,
+    /// Which velocities and accelerations the log has.
+    pub derivatives: Derivatives,
 }
 
 impl Default for Sensors {
@@ -52,12 +65,25 @@ impl Default for Sensors {
             torque_window_s: 0.01,
             torque_delay_s: 0.0,
             clock: Clock::Even,
-            derivatives: false,
+            derivatives: Derivatives::Unlogged,
         }
     }
 }
 
 impl Sensors {
+    /// Without any error: exact positions, velocities and accelerations, and the command itself, every `period_s` \[s\]. If that is the control period, a row's
+    /// torque is the one that is held until the next row.
+    pub fn exact(period_s: f64) -> Self {
+        Sensors { period_s, torque_window_s: 0.0, derivatives: Derivatives::Exact, ..Sensors::default() }
+    }
+
+    /// The same with encoders of 2^`bits` steps a turn on each of `joints` revolute joints, and velocities and accelerations from their differences. The step
+    /// of a prismatic joint's encoder is a length: set [`Self::angle_quantum`].
+    pub fn with_encoder_bits(self, bits: u8, joints: usize) -> Self {
+        let angle_quantum = vec![TAU * 0.5_f64.powi(i32::from(bits)); joints];
+        Sensors { angle_quantum, derivatives: Derivatives::Differences, ..self }
+    }
+
     pub(crate) fn check(&self, tree: &Tree) -> Result<(), PlantError> {
         let lists = [
             ("the angle noise", &self.angle_noise),
@@ -156,7 +182,7 @@ impl Sensors {
                 let noise = self.torque_noise.get(joint).copied().unwrap_or(0.0);
                 let torque = history.mean(&history.command, joints, joint, from, to);
                 recording.tau.push(if noise > 0.0 { torque + noise * normal(random) } else { torque });
-                if self.derivatives {
+                if self.derivatives == Derivatives::Exact {
                     let reach = half.max(history.step_s);
                     let [before, after] =
                         [-reach, reach].map(|shift| history.drive_speed_at(joint, taken + shift));
@@ -165,11 +191,27 @@ impl Sensors {
                 }
             }
         }
-        if self.derivatives {
+        if self.derivatives == Derivatives::Differences {
+            speeds = slopes(&recording.t, &recording.q, joints);
+            accelerations = slopes(&recording.t, &speeds, joints);
+        }
+        if self.derivatives != Derivatives::Unlogged {
             (recording.qd, recording.qdd) = (Some(speeds), Some(accelerations));
         }
         (recording, windows)
     }
+}
+
+/// Central differences of the rows of `values` over their stamps, one-sided at both ends; 0 of a single row.
+fn slopes(stamps: &[f64], values: &[f64], joints: usize) -> Vec<f64> {
+    let last = stamps.len().saturating_sub(1);
+    let slope = |index: usize| {
+        let (row, joint) = (index / joints, index % joints);
+        let [before, after] = [row.saturating_sub(1), (row + 1).min(last)];
+        let change = values[after * joints + joint] - values[before * joints + joint];
+        if after > before { change / (stamps[after] - stamps[before]) } else { 0.0 }
+    };
+    (0..values.len()).map(slope).collect()
 }
 
 /// A draw from the standard normal distribution.

@@ -9,6 +9,7 @@
 use crate::joint_drive::{DriveStep, Flexible, JointDrive};
 use crate::root::rising_root;
 use crate::{Coupling, PlantError};
+use phiw_dynamics::dense::Cholesky;
 use phiw_dynamics::{Tree, Workspace};
 
 /// Sweeps over all joints at most, and the change of speed below which they are done \[rad/s, m/s\].
@@ -249,42 +250,12 @@ fn other(joints: [usize; 2], joint: usize) -> usize {
     if joints[0] == joint { joints[1] } else { joints[0] }
 }
 
-/// Inverse of the part of a symmetric positive definite matrix from row and column `first` on, by Cholesky's factor.
+/// Inverse of the part of a symmetric positive definite matrix from row and column `first` on; not a number where the matrix is none such, which
+/// the motion that follows from it reports.
 pub(crate) fn inverse(matrix: &[f64], size: usize, first: usize) -> Vec<f64> {
     let n = size - first;
-    let mut lower = vec![0.0; n * n];
-    for row in 0..n {
-        for column in 0..=row {
-            let mut sum = matrix[(row + first) * size + column + first];
-            for k in 0..column {
-                sum -= lower[row * n + k] * lower[column * n + k];
-            }
-            lower[row * n + column] =
-                if row == column { sum.sqrt() } else { sum / lower[column * n + column] };
-        }
-    }
-    let mut inverse = vec![0.0; n * n];
-    let mut unit = vec![0.0; n];
-    for column in 0..n {
-        unit.fill(0.0);
-        unit[column] = 1.0;
-        for row in 0..n {
-            for k in 0..row {
-                unit[row] -= lower[row * n + k] * unit[k];
-            }
-            unit[row] /= lower[row * n + row];
-        }
-        for row in (0..n).rev() {
-            for k in row + 1..n {
-                unit[row] -= lower[k * n + row] * unit[k];
-            }
-            unit[row] /= lower[row * n + row];
-        }
-        for row in 0..n {
-            inverse[row * n + column] = unit[row];
-        }
-    }
-    inverse
+    let entry = |row: usize, column: usize| matrix[(row + first) * size + column + first];
+    Cholesky::of(n, entry).map_or_else(|| vec![f64::NAN; n * n], |factor| factor.inverse())
 }
 
 #[cfg(test)]

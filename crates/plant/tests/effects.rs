@@ -4,7 +4,7 @@
 mod plants;
 
 use phiw_dynamics::{Placement, Tree, Vec3, Workspace, World};
-use phiw_plant::{Coupling, Effect, Friction, Mechanism, Presliding, Run, Sensors};
+use phiw_plant::{Coupling, Effect, Friction, Mechanism, PlantRun, Presliding, Sensors};
 use plants::{TrueStep, model, rms, rotors, run, setup, true_steps};
 
 /// What an effect adds to a joint's torque, step by step.
@@ -36,7 +36,7 @@ fn check(name: &str, effect: Effect, tolerance: f64, formula: Formula) {
 }
 
 /// Means over the windows of the log's rows.
-fn at_rows(run: &Run, series: &[f64]) -> Vec<f64> {
+fn at_rows(run: &PlantRun, series: &[f64]) -> Vec<f64> {
     let half = 0.5 * Sensors::default().torque_window_s;
     let mean = |&stamp: &f64| {
         let t_s = stamp - run.recording.t[0];
@@ -378,7 +378,7 @@ fn check_flexible(stiffness: f64, damping: f64, backlash: f64, tolerance: f64) {
     assert!((motor - link).abs() > 1e-4);
 }
 
-fn link_angle(run: &Run, t_s: f64) -> f64 {
+fn link_angle(run: &PlantRun, t_s: f64) -> f64 {
     run.history.mean(&run.history.link_angle, 2, 0, t_s, t_s)
 }
 

@@ -2,10 +2,12 @@
 
 mod plants;
 
-use phiw_dynamics::{BackendError, DimensionError, DynamicsBackend, Foot, Placement, Tree, World};
+use phiw_dynamics::{
+    BackendError, DimensionError, DynamicsBackend, Foot, Placement, SimulationBackend, Tree, World,
+};
 use phiw_plant::{
-    Clock, ComputedTorque, Coupling, Effect, Friction, Gains, Mechanism, Plant, PlantError, PlantSetup, Run,
-    Sensors, Timing, TorqueModel,
+    Clock, ComputedTorque, Coupling, Derivatives, Effect, Friction, Gains, Mechanism, Plant, PlantError,
+    PlantRun, PlantSetup, Sensors, Timing, TorqueModel,
 };
 use plants::{analytic, model, motion, poor_controller, random, rms, rotors, run, setup, true_steps};
 
@@ -79,7 +81,7 @@ fn sensors_add_what_they_are_told() {
     let coarse = with(Sensors { angle_quantum: list(quantum), ..Sensors::default() });
     assert!(coarse.recording.q.iter().all(|q| (q / quantum - (q / quantum).round()).abs() < 1e-9));
     let angle =
-        |run: &Run, row: usize| run.history.drive_angle_at(2, run.recording.t[row] - run.recording.t[0]);
+        |run: &PlantRun, row: usize| run.history.drive_angle_at(2, run.recording.t[row] - run.recording.t[0]);
     let error =
         rms((0..coarse.recording.len()).map(|row| coarse.recording.q[row * 6 + 2] - angle(&coarse, row)));
     assert!((error / (quantum / 12.0_f64.sqrt()) - 1.0).abs() < 0.15, "{error}");
@@ -93,7 +95,7 @@ fn sensors_add_what_they_are_told() {
         (jittered.recording.q[row * 6 + 1] - truth).abs() < 1e-12,
         "the motion starts 1 s after switching on"
     );
-    let derived = with(Sensors { derivatives: true, ..Sensors::default() }).recording;
+    let derived = with(Sensors { derivatives: Derivatives::Exact, ..Sensors::default() }).recording;
     let (speeds, accelerations) = (derived.qd.unwrap(), derived.qdd.unwrap());
     for row in 1..derived.t.len() - 1 {
         let by_differences = (derived.q[(row + 1) * 6] - derived.q[(row - 1) * 6]) / 0.02;
@@ -101,6 +103,36 @@ fn sensors_add_what_they_are_told() {
     }
     assert_eq!(accelerations.len(), derived.q.len());
     assert!(rms(accelerations) > 0.1);
+}
+
+/// The velocities of a coarse encoder are steps of a quantum over two periods, around the true ones.
+#[test]
+fn velocities_from_differences_are_as_coarse_as_the_encoder() {
+    let tree = model("arm7", false);
+    let world = rotors(&tree);
+    // The true speeds, the logged ones, and the RMS of their difference between the first row and the last. The motion is the controller's, who sees the encoders.
+    let with = |sensors: Sensors| {
+        let run = run(&tree, &world, PlantSetup { sensors, ..setup(&tree, &world, Vec::new()) }, 3);
+        let log = run.recording;
+        let inner = 7..log.q.len() - 7;
+        let true_speed = |index: usize| run.history.drive_speed_at(index % 7, log.t[index / 7] - log.t[0]);
+        let truth: Vec<f64> = inner.clone().map(true_speed).collect();
+        let logged = log.qd.unwrap()[inner].to_vec();
+        assert_eq!(log.qdd.unwrap().len(), log.q.len());
+        let error = rms(truth.iter().zip(&logged).map(|(truth, logged)| truth - logged));
+        (truth, logged, error)
+    };
+    let (truth, _, exact) = with(Sensors::exact(0.01));
+    assert!(exact < 1e-12, "{exact}");
+    let (_, _, fine) = with(Sensors { derivatives: Derivatives::Differences, ..Sensors::exact(0.01) });
+    assert!(fine > 0.0 && fine < 0.01 * rms(truth), "{fine}");
+    let (_, coarse, error) = with(Sensors::exact(0.01).with_encoder_bits(12, 7));
+    let quantum = std::f64::consts::TAU / 4096.0;
+    let steps = |speed: &f64| speed * 0.02 / quantum;
+    assert!(coarse.iter().all(|speed| (steps(speed) - steps(speed).round()).abs() < 1e-6));
+    // Two roundings, each of a variance of quantum²/12, over two periods.
+    let expected = quantum / 6.0_f64.sqrt() / 0.02;
+    assert!((error / expected - 1.0).abs() < 0.2, "{error}, {expected} expected");
 }
 
 #[test]
@@ -156,7 +188,7 @@ fn limp(joints: usize, effects: Vec<Effect>) -> PlantSetup {
 }
 
 /// A double pendulum swings from level: its energy, springs and motors included, at all steps.
-fn energies(effects: Vec<Effect>, stored: &dyn Fn(&Run, usize) -> f64) -> Vec<f64> {
+fn energies(effects: Vec<Effect>, stored: &dyn Fn(&PlantRun, usize) -> f64) -> Vec<f64> {
     let tree = model("planar2", false);
     let world = World { rotor_inertia: vec![0.05, 0.02], ..World::default() };
     let flexible = effects.iter().any(|effect| matches!(effect, Effect::Flexibility { .. }));
@@ -190,7 +222,7 @@ fn at(values: &[f64], row: usize, joint: usize) -> f64 {
 
 #[test]
 fn what_stores_energy_keeps_it_and_what_rubs_takes_it() {
-    let check_kept = |effects: Vec<Effect>, stored: &dyn Fn(&Run, usize) -> f64| {
+    let check_kept = |effects: Vec<Effect>, stored: &dyn Fn(&PlantRun, usize) -> f64| {
         let energies = energies(effects, stored);
         let drift = energies.iter().map(|energy| (energy - energies[0]).abs()).fold(0.0, f64::max);
         assert!(drift < 0.02, "{drift} J of some 60 J exchanged");
@@ -234,27 +266,19 @@ impl DynamicsBackend for Leaning {
     fn name(&self) -> &str {
         "leaning"
     }
+
     fn joint_names(&self) -> &[String] {
         &self.names
     }
+
     fn velocity_size(&self) -> usize {
         self.q.len() - 1
     }
+
     fn configuration_size(&self) -> usize {
         self.q.len()
     }
-    fn state(&self, q: &mut [f64], v: &mut [f64]) -> Result<(), BackendError> {
-        q.copy_from_slice(&self.q);
-        let (sine, cosine) = (0.1 * self.t_s).sin_cos();
-        q[3..7].copy_from_slice(&[0.0, sine, 0.0, cosine]);
-        v.fill(0.0);
-        Ok(())
-    }
-    fn set_state(&mut self, q: &[f64], _: &[f64]) -> Result<(), BackendError> {
-        self.q.copy_from_slice(q);
-        self.t_s = 0.0;
-        Ok(())
-    }
+
     fn inverse_dynamics(
         &mut self,
         _: &[f64],
@@ -264,6 +288,7 @@ impl DynamicsBackend for Leaning {
     ) -> Result<(), BackendError> {
         Ok(())
     }
+
     fn forward_dynamics(
         &mut self,
         _: &[f64],
@@ -273,13 +298,31 @@ impl DynamicsBackend for Leaning {
     ) -> Result<(), BackendError> {
         Ok(())
     }
-    fn step(&mut self, _: &[f64], dt: f64) -> Result<(), BackendError> {
-        self.t_s += dt;
-        Ok(())
-    }
+
     fn base_wrench(&self) -> [f64; 6] {
         // 100 N pressing at x = 0.2 m, y = −0.1 m.
         [0.0, 0.0, 100.0, -10.0, -20.0, 0.0]
+    }
+}
+
+impl SimulationBackend for Leaning {
+    fn state(&self, q: &mut [f64], v: &mut [f64]) -> Result<(), BackendError> {
+        q.copy_from_slice(&self.q);
+        let (sine, cosine) = (0.1 * self.t_s).sin_cos();
+        q[3..7].copy_from_slice(&[0.0, sine, 0.0, cosine]);
+        v.fill(0.0);
+        Ok(())
+    }
+
+    fn set_state(&mut self, q: &[f64], _: &[f64]) -> Result<(), BackendError> {
+        self.q.copy_from_slice(q);
+        self.t_s = 0.0;
+        Ok(())
+    }
+
+    fn step(&mut self, _: &[f64], dt: f64) -> Result<(), BackendError> {
+        self.t_s += dt;
+        Ok(())
     }
 }
 
@@ -288,7 +331,7 @@ fn a_robot_that_leans_too_far_has_fallen() {
     let tree = model("upper_body18", true);
     let sole = vec![[0.1, 0.1, -0.02], [-0.1, 0.1, -0.02], [-0.1, -0.1, -0.02], [0.1, -0.1, -0.02]];
     let world = World { feet: vec![Foot { body: 0, sole }], ..World::default() };
-    let build = |tree: &Tree, _: &World| -> Result<Box<dyn DynamicsBackend>, BackendError> {
+    let build = |tree: &Tree, _: &World| -> Result<Box<dyn SimulationBackend>, BackendError> {
         Ok(Box::new(Leaning {
             names: tree.joint_names().map(str::to_owned).collect(),
             q: tree.neutral_configuration(),

@@ -2,20 +2,20 @@
 
 mod plants;
 
-use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World};
+use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
 use phiw_plant::{
-    ComputedTorque, Gains, Plant, PlantSetup, Reference, RigidBodyModel, Run, Timing, feet_from_toml,
+    ComputedTorque, Gains, Plant, PlantRun, PlantSetup, Reference, RigidBodyModel, Timing, feet_from_toml,
 };
 use phiw_sim_rapier::RapierBackend;
 use plants::{model, random};
 
-fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     Ok(Box::new(RapierBackend::new(tree, world)?.with_solver_iterations(4)?))
 }
 
 /// A model on its soles follows a reference for `duration_s`. The controller takes the base as held, so legs must be stiff: all gains
 /// are those of position-controlled humanoids, in proportion to the joints' effort limits.
-fn stand(name: &str, reference: &dyn Reference, duration_s: f64) -> Run {
+fn stand(name: &str, reference: &dyn Reference, duration_s: f64) -> PlantRun {
     let tree = model(name, true);
     let path = format!("{}/../../models/{name}.support.toml", env!("CARGO_MANIFEST_DIR"));
     let feet = feet_from_toml(&std::fs::read_to_string(&path).expect(&path), &tree).unwrap();
@@ -50,7 +50,7 @@ fn a_slow_motion_leaves_the_upper_body_standing_and_a_violent_one_topples_it() {
     assert_eq!(slow.fell_at_s, None);
     assert_eq!(slow.recording.len(), 401);
     let weight = model("upper_body18", true).mass() * 9.81;
-    let inside = |run: &Run| {
+    let inside = |run: &PlantRun| {
         run.reactions
             .iter()
             .filter(|reaction| {

@@ -1,6 +1,6 @@
 //! What can go wrong in this crate.
 
-use phiw_dynamics::DimensionError;
+use phiw_dynamics::{DimensionError, IndexError};
 
 /// An input that this crate cannot work with.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -8,6 +8,9 @@ pub enum RegressorError {
     /// A slice of the wrong length.
     #[error(transparent)]
     Dimension(#[from] DimensionError),
+    /// A column, parameter or group that does not exist.
+    #[error(transparent)]
+    Index(#[from] IndexError),
     /// Columns that the rows do not determine.
     #[error(
         "the rows do not determine {} of {columns} columns (the first is column {}): drop them or add motion that excites them",

@@ -1,7 +1,7 @@
 //! The joint torque regressor φ(q, q̇, q̈): τ = φ · π with π the standard parameters of all bodies (paper, equation 2).
 
 use phiw_dynamics::{
-    BodyMotion, DimensionError, Lanes, PARAMETERS_PER_BODY, Scalar, Spatial, Tree, check_size,
+    BodyKinematics, BodyMotion, DimensionError, Lanes, PARAMETERS_PER_BODY, Scalar, Spatial, check_size,
 };
 
 /// Which bodies act on which torque, and the kernel that fills in their numbers.
@@ -12,7 +12,6 @@ use phiw_dynamics::{
 pub struct JointTorqueRegressor {
     bodies: usize,
     velocity_size: usize,
-    configuration_size: usize,
     /// `row_bodies[row]`: the bodies that coordinate `row` moves, ascending.
     row_bodies: Vec<Vec<usize>>,
     /// `row_offsets[row]`: index of the row's first pair; one more at the end.
@@ -37,18 +36,22 @@ pub struct RegressorScratch<T> {
 }
 
 impl JointTorqueRegressor {
-    /// The structure of φ for a robot.
-    pub fn new(tree: &Tree) -> Self {
-        let bodies = tree.bodies();
+    /// The structure of φ for a robot: `&tree`, or whatever else knows how the robot's bodies hang together.
+    ///
+    /// # Panics
+    /// A body comes before its parent, which [`BodyKinematics`] rules out.
+    pub fn new(robot: impl BodyKinematics) -> Self {
+        let bodies = robot.body_count();
         // Coordinates of each body's chain, from the root down.
-        let mut coordinates: Vec<Vec<usize>> = Vec::with_capacity(bodies.len());
-        for body in bodies {
-            let mut chain = body.parent.map(|parent| coordinates[parent].clone()).unwrap_or_default();
-            let own = if body.joint_type == phiw_dynamics::JointType::Floating { 6 } else { 1 };
-            chain.extend(body.velocity_index..body.velocity_index + own);
+        let mut coordinates: Vec<Vec<usize>> = Vec::with_capacity(bodies);
+        for body in 0..bodies {
+            let joint = robot.body_joint(body);
+            let mut chain = joint.parent.map(|parent| coordinates[parent].clone()).unwrap_or_default();
+            chain.extend(joint.velocity_index..joint.velocity_index + joint.motion_subspace.dimension());
             coordinates.push(chain);
         }
-        let mut row_bodies = vec![Vec::new(); tree.velocity_size()];
+        let velocity_size = coordinates.iter().flatten().max().map_or(0, |last| last + 1);
+        let mut row_bodies = vec![Vec::new(); velocity_size];
         for (body, chain) in coordinates.iter().enumerate() {
             for &row in chain {
                 if row_bodies[row].last() != Some(&body) {
@@ -71,14 +74,7 @@ impl JointTorqueRegressor {
                 chain.iter().enumerate().map(axis).collect()
             })
             .collect();
-        JointTorqueRegressor {
-            bodies: bodies.len(),
-            velocity_size: tree.velocity_size(),
-            configuration_size: tree.configuration_size(),
-            row_bodies,
-            row_offsets,
-            chains,
-        }
+        JointTorqueRegressor { bodies, velocity_size, row_bodies, row_offsets, chains }
     }
 
     /// Number of rows: one for each velocity coordinate (a floating base's wrench first).
@@ -121,26 +117,24 @@ impl JointTorqueRegressor {
 
     /// φ for one state, as pairs.
     ///
-    /// `q` \[rad, m\], `v`, `a` as in [`Tree::body_motions`]; `pairs` has [`Self::buffer_size`] numbers. Allocates nothing.
+    /// `robot` is the one that this structure was made for: `&tree`, or `&mut backend` of another library, whose own kinematics are then
+    /// used. `q` \[rad, m\], `v`, `a` are its coordinates (see [`BodyKinematics`]); `pairs` has [`Self::buffer_size`] numbers.
+    /// Allocates nothing.
     ///
     /// # Errors
-    /// A slice of the wrong length.
-    pub fn compute<T: Scalar>(
+    /// A slice of the wrong length, or the robot's motion can not be computed.
+    pub fn compute<T: Scalar, K: BodyKinematics<T>>(
         &self,
-        tree: &Tree,
+        robot: K,
         q: &[T],
         v: &[T],
         a: &[T],
         scratch: &mut RegressorScratch<T>,
         pairs: &mut [T],
-    ) -> Result<(), DimensionError> {
-        check_size("bodies of the tree", tree.bodies().len(), self.bodies)?;
-        check_size("configuration", q.len(), self.configuration_size)?;
-        check_size("velocity", v.len(), self.velocity_size)?;
-        check_size("acceleration", a.len(), self.velocity_size)?;
+    ) -> Result<(), K::Error> {
+        check_size("bodies of the robot", robot.body_count(), self.bodies)?;
         check_size("regressor buffer", pairs.len(), self.buffer_size())?;
-        self.kernel(tree, q, v, a, scratch, pairs);
-        Ok(())
+        self.kernel(robot, q, v, a, scratch, pairs)
     }
 
     /// φ for `N` states at once, with the widest vector instructions that the processor has.
@@ -148,19 +142,19 @@ impl JointTorqueRegressor {
     /// As [`Self::compute`]; lane k of every number belongs to state k.
     ///
     /// # Errors
-    /// A slice of the wrong length.
-    pub fn compute_lanes<const N: usize>(
+    /// As [`Self::compute`].
+    pub fn compute_lanes<const N: usize, K: BodyKinematics<Lanes<N>>>(
         &self,
-        tree: &Tree,
+        robot: K,
         q: &[Lanes<N>],
         v: &[Lanes<N>],
         a: &[Lanes<N>],
         scratch: &mut RegressorScratch<Lanes<N>>,
         pairs: &mut [Lanes<N>],
-    ) -> Result<(), DimensionError> {
+    ) -> Result<(), K::Error> {
         pulp::Arch::new().dispatch(
             #[inline(always)]
-            || self.compute(tree, q, v, a, scratch, pairs),
+            || self.compute(robot, q, v, a, scratch, pairs),
         )
     }
 
@@ -186,35 +180,27 @@ impl JointTorqueRegressor {
     /// Each axis is pushed down to the bodies that it moves and multiplied there with the body's own 6×10 regressor: one
     /// product for each (axis, body) pair and none for the zeros.
     #[inline(always)]
-    fn kernel<T: Scalar>(
+    fn kernel<T: Scalar, K: BodyKinematics<T>>(
         &self,
-        tree: &Tree,
+        mut robot: K,
         q: &[T],
         v: &[T],
         a: &[T],
         scratch: &mut RegressorScratch<T>,
         pairs: &mut [T],
-    ) {
-        tree.body_motions(q, v, a, &mut scratch.motions);
-        for (index, body) in tree.bodies().iter().enumerate() {
+    ) -> Result<(), K::Error> {
+        robot.body_motions(q, v, a, &mut scratch.motions)?;
+        for index in 0..self.bodies {
+            let joint = robot.body_joint(index);
             let motion = scratch.motions[index];
             let (before, rest) = scratch.axes.split_at_mut(index);
             let axes = &mut rest[0];
-            let inherited: &[Spatial<T>] = body.parent.map_or(&[], |parent| &before[parent]);
+            let inherited: &[Spatial<T>] = joint.parent.map_or(&[], |parent| &before[parent]);
             for (axis, outer) in axes.iter_mut().zip(inherited) {
                 *axis = motion.placement.motion_inverse(*outer);
             }
-            if body.joint_type == phiw_dynamics::JointType::Floating {
-                for (coordinate, axis) in axes.iter_mut().enumerate() {
-                    *axis = Spatial::zero();
-                    if coordinate < 3 {
-                        axis.linear.0[coordinate] = T::one();
-                    } else {
-                        axis.angular.0[coordinate - 3] = T::one();
-                    }
-                }
-            } else if let Some(own) = axes.last_mut() {
-                *own = body.motion_axis();
+            if let Some(own) = axes.get_mut(inherited.len()..) {
+                joint.motion_subspace.axes(own);
             }
             for (axis, target) in axes.iter().zip(&self.chains[index]) {
                 let start = target.pair * PARAMETERS_PER_BODY;
@@ -229,6 +215,7 @@ impl JointTorqueRegressor {
                 }
             }
         }
+        Ok(())
     }
 }
 

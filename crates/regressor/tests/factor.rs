@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, FactorBuilder, leave_one_out};
+use phiw_regressor::least_squares::{Group, GroupedFactor};
 use proptest::prelude::*;
 
 /// A row-major matrix of `columns` columns, at least as many rows.
@@ -98,6 +99,24 @@ proptest! {
     }
 
     #[test]
+    fn triangular_solves_undo_the_factor((columns, rows) in matrices()) {
+        let factor = Factor::of_rows(columns, &rows).unwrap();
+        prop_assume!(factor.undetermined_columns().is_empty());
+        let size = factor.parameters();
+        let r = DMatrix::from_fn(size, size, |row, column| factor.entry(row, column));
+        prop_assume!(factor.condition_number().unwrap() < 1e6);
+        let x = DVector::from_fn(size, |row, _| 1.0 + (row as f64).sin());
+        let (mut by_upper, mut by_lower) = ((&r * &x).as_slice().to_vec(), (r.transpose() * &x).as_slice().to_vec());
+        factor.solve_upper(&mut by_upper).unwrap();
+        factor.solve_lower(&mut by_lower).unwrap();
+        for row in 0..size {
+            assert_close(by_upper[row], x[row], 1e-7, "R⁻¹·R·x");
+            assert_close(by_lower[row], x[row], 1e-7, "R⁻ᵀ·Rᵀ·x");
+        }
+        prop_assert!(factor.solve_upper(&mut vec![0.0; size + 1]).is_err());
+    }
+
+    #[test]
     fn selecting_columns_is_the_factor_of_those_columns((columns, rows) in matrices(), seed in any::<u64>()) {
         let kept: Vec<usize> = (0..columns).rev().filter(|column| seed >> column & 1 == 1).collect();
         let chosen: Vec<f64> = rows.chunks(columns).flat_map(|row| kept.iter().map(|&column| row[column])).collect();
@@ -145,4 +164,25 @@ fn rows_that_do_not_fit_are_refused() {
     assert!(matches!(builder.push_rows(&[1.0; 7]), Err(RegressorError::Dimension(_))));
     let error = builder.push_rows(&[1.0, 2.0, 3.0, 1.0, f64::NAN, 3.0]).unwrap_err();
     assert_eq!(error, RegressorError::NotFinite { row: 1 });
+}
+
+/// A column that is not there was reported as a slice of the wrong length: "column index has 9 elements, but this robot needs 8".
+#[test]
+fn an_index_out_of_range_is_named_with_what_it_indexes_and_its_bound() {
+    let check = |result: Result<(), RegressorError>, message: &str| {
+        assert_eq!(result.unwrap_err().to_string(), message);
+    };
+    let factor = Factor::of_rows(3, &[1.0, 2.0, 3.0]).unwrap();
+    let column = "column 3 does not exist: there are 3, counted from 0";
+    check(factor.select(&[0, 3]).map(|_| ()), column);
+    check(FactorBuilder::new(3).push_factor(&factor, &[0, 1, 3], 1.0), column);
+    check(
+        FactorBuilder::new(0).push_factor(&factor, &[0, 1, 2], 1.0),
+        "column 0 does not exist: there are 0, counted from 0",
+    );
+    let parameter = "parameter 2 does not exist: there are 2, counted from 0";
+    let group = |parameters: Vec<usize>| vec![Group { parameters, factor: factor.clone() }];
+    check(GroupedFactor::new(2, group(vec![0, 2])).map(|_| ()), parameter);
+    check(GroupedFactor::new(2, group(vec![0, 1])).unwrap().select(&[2]).map(|_| ()), parameter);
+    assert_eq!(factor.select(&[]).unwrap().rows(), 1);
 }

@@ -152,7 +152,9 @@ proptest! {
         let values = matrix.columns(0, columns).into_owned().singular_values();
         let expected = values.max() / values.min();
         let found = builder.factor().condition_number().unwrap();
-        prop_assert!((found / expected - 1.0).abs() < 1e-6, "{} against {}", found, expected);
+        // Rounding leaves the smallest singular value uncertain by a share of the largest.
+        let tolerance = 1e-6 + 10.0 * f64::EPSILON * expected;
+        prop_assert!((found / expected - 1.0).abs() < tolerance, "{} against {}", found, expected);
     }
 }
 

@@ -4,6 +4,7 @@ pub mod json;
 pub mod number;
 pub mod page;
 pub mod plot;
+pub mod statistics;
 
 pub use json::ReportJson;
 pub use page::IdentificationPage;

@@ -9,6 +9,7 @@ mod errors;
 mod experiment;
 mod joints;
 mod parameters;
+mod parts;
 
 pub use conditioning::Conditioning;
 pub use effects::{CandidateRow, CannotBeTold, EffectParameter, EffectSection, Remaining, Rival};
@@ -16,9 +17,10 @@ pub use errors::{ErrorRow, ErrorTable, PooledError};
 pub use experiment::{ExperimentPage, Section, Table};
 pub use joints::{JointSection, TorqueTrace};
 pub use parameters::{BaseParameter, ParameterRow, Parameters};
+pub use parts::Picture;
 
 use crate::json::Verdict;
-use crate::plot::{self, Svg};
+use crate::plot;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// Everything that the report shows, from top to bottom.
@@ -69,26 +71,6 @@ pub struct InputFile {
     pub name: String,
     /// What is in it: `60.1 s, 12 020 samples, 2 segments`.
     pub content: String,
-}
-
-/// A picture with what is to be said about it.
-#[derive(Debug, Clone)]
-pub struct Picture {
-    /// A sentence or less; may be empty.
-    pub caption: String,
-    /// The picture.
-    pub svg: Svg,
-}
-
-impl Picture {
-    fn markup(&self) -> Markup {
-        html! {
-            figure {
-                (PreEscaped(self.svg.inline()))
-                @if !self.caption.is_empty() { figcaption { (self.caption) } }
-            }
-        }
-    }
 }
 
 impl IdentificationPage {
@@ -196,17 +178,4 @@ fn badge(verdict: Verdict) -> Markup {
 
 fn list(lines: &[String]) -> Markup {
     html! { @if !lines.is_empty() { ul { @for line in lines { li { (line) } } } } }
-}
-
-/// A row of the kind "name, share as a bar, number".
-fn share_bar(share: f64, scale: f64, before: Option<f64>, noise_floor: Option<f64>) -> Markup {
-    let width = |share: f64| format!("{:.1}%", (100.0 * share / scale).clamp(0.0, 100.0));
-    let known = |share: Option<f64>| share.filter(|share| share.is_finite());
-    html! {
-        span.bar {
-            @if let Some(before) = known(before) { i.before style={ "width:" (width(before)) } {} }
-            @if let Some(share) = known(Some(share)) { i.after style={ "width:" (width(share)) } {} }
-            @if let Some(floor) = known(noise_floor) { i.floor style={ "left:" (width(floor)) } {} }
-        }
-    }
 }

@@ -5,9 +5,9 @@
 
 use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
+use phiw_effects::{Catalogue, SignalRanges};
 use phiw_identification::{BlockSource, Data, LogSet, Variants, identify};
 use phiw_residual::trace::{TraceInput, TraceOptions, noise_floor, trace};
-use phiw_residual::{Catalogue, SignalRanges};
 use phiw_telemetry::ConditioningOptions;
 use std::error::Error;
 use std::path::PathBuf;

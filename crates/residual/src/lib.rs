@@ -1,6 +1,3 @@
 #![doc = include_str!("../README.md")]
 
-pub mod catalogue;
 pub mod trace;
-
-pub use catalogue::{Catalogue, EffectKind, SignalRanges};

@@ -1,8 +1,8 @@
 //! Logs of real robots, identified: published parameters and errors on motion held out.
 
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
+use phiw_effects::{Catalogue, SignalRanges};
 use phiw_identification::{BlockSource, Data, Identified, LogSet, Variants, identify};
-use phiw_residual::{Catalogue, SignalRanges};
 use phiw_telemetry::ConditioningOptions;
 use std::path::PathBuf;
 

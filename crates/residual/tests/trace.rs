@@ -3,12 +3,12 @@
 use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Tree, Workspace};
+use phiw_effects::{Catalogue, SignalRanges};
 use phiw_identification::{
     BlockSource, Data, Design, EffectCatalogue, EffectSpec, Fold, Model, Variants, accumulate, identify,
 };
 use phiw_regressor::BaseParameters;
 use phiw_residual::trace::{HeldModel, TraceInput, TraceOptions, Tracing, Verdict, noise_floor, trace};
-use phiw_residual::{Catalogue, SignalRanges};
 use phiw_telemetry::{Conditioning, ConditioningOptions, Recording};
 
 const URDF: &str = r#"<robot name="two_links"><link name="base"/>

@@ -1,13 +1,13 @@
 //! A folder of results: a new one is written beside it and exchanged for it.
 
 use crate::error::unwritable;
-use crate::file_system::unique;
+use crate::file_system::{remove_leftovers, unique};
 use crate::generation::replace_files;
 use crate::{FileSystem, Lock, ResultError, ResultFile};
 use std::ffi::OsString;
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Replaces the results in the folder that is locked by `files`, all at once; other files in it stay.
 ///
@@ -113,16 +113,4 @@ fn other_files(folder: &Path, files: &[ResultFile]) -> io::Result<Option<Vec<OsS
         }
     }
     Ok(Some(others))
-}
-
-/// Removes what killed runs have left; the lock says that none of them is under way.
-pub(crate) fn remove_leftovers(system: &dyn FileSystem, folder: &Path, prefix: &str) {
-    let entries = folder.read_dir().into_iter().flatten().flatten();
-    let leftovers: Vec<PathBuf> = entries
-        .filter(|entry| entry.file_name().to_string_lossy().starts_with(prefix))
-        .map(|entry| entry.path())
-        .collect();
-    for path in leftovers {
-        let _ = system.remove(&path);
-    }
 }

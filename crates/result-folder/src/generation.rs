@@ -1,8 +1,7 @@
 //! Files in a folder that is not theirs alone: a generation in a hidden folder, and one link that is renamed.
 
 use crate::error::unwritable;
-use crate::exchange::remove_leftovers;
-use crate::file_system::unique;
+use crate::file_system::{remove_leftovers, unique};
 use crate::{FileSystem, ResultError, ResultFile};
 use std::path::{Path, PathBuf};
 

@@ -2,7 +2,7 @@
 
 use criterion::{BenchmarkGroup, Criterion, criterion_group, criterion_main, measurement::WallTime};
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, RandomTreeOptions, random_state, random_tree};
-use phiw_dynamics::{DynamicsBackend, World};
+use phiw_dynamics::{DynamicsBackend, SimulationBackend, World};
 use phiw_sim_mujoco::{Integrator, MujocoBackend};
 use std::hint::black_box;
 

@@ -1,28 +1,19 @@
 //! The trait over MuJoCo.
 
-use crate::MujocoError;
 use crate::base::{self, Motion};
+use crate::body_kinematics::body_joints;
 use crate::error::NAME;
 use crate::inertial::PrincipalInertia;
 use crate::mjcf::{feet_of_corners, mjcf};
 use crate::simulation::{Simulation, Sizes};
-use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World, check_size};
+use crate::{Integrator, MujocoError};
+use phiw_dynamics::{BackendError, BodyJoint, DynamicsBackend, SimulationBackend, Tree, World, check_size};
 use std::cell::RefCell;
 
 /// Largest distance of a quaternion's length from 1.
 const QUATERNION_TOLERANCE: f64 = 1e-6;
 /// A coordinate, speed or acceleration beyond this has diverged (MuJoCo's `mjMAXVAL`).
 const DIVERGED: f64 = 1e10;
-
-/// How a step goes on in time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Integrator {
-    /// The classical Runge-Kutta method of order four.
-    #[default]
-    RungeKutta4,
-    /// Implicit in the velocity, of order one: no cheaper for a robot, but steady where velocities make it stiff.
-    Implicit,
-}
 
 /// A robot in MuJoCo.
 ///
@@ -35,10 +26,13 @@ pub enum Integrator {
 ///
 /// [`inverse_dynamics`]: DynamicsBackend::inverse_dynamics
 /// [`forward_dynamics`]: DynamicsBackend::forward_dynamics
-/// [`step`]: DynamicsBackend::step
+/// [`step`]: SimulationBackend::step
 pub struct MujocoBackend {
     joint_names: Vec<String>,
     floating: bool,
+    /// The joint before each body, and gravity in the world.
+    pub(crate) body_joints: Vec<BodyJoint>,
+    pub(crate) gravity: [f64; 3],
     /// Bodies that hang on the world.
     roots: Vec<usize>,
     /// A link whose inertia is not that of a real body.
@@ -51,7 +45,7 @@ pub struct MujocoBackend {
     world: Simulation,
     /// The robot by itself; what is in it between calls is nobody's business. In a cell, since the wrench is computed
     /// in it when it is asked for.
-    alone: RefCell<Simulation>,
+    pub(crate) alone: RefCell<Simulation>,
     reaction: Reaction,
     /// The foot of each shape, and what each foot got in the last step; none before one.
     feet_of_shapes: Vec<usize>,
@@ -88,7 +82,11 @@ impl MujocoBackend {
             bodies: tree.bodies().len(),
         };
         let simulation = |world| Simulation::new(&mjcf(tree, world), sizes, &inertias);
+        let empty = World { rotor_inertia: world.rotor_inertia.clone(), ..World::default() };
+        let mut alone = simulation(&empty)?;
         let mut backend = MujocoBackend {
+            body_joints: body_joints(tree, &mut alone),
+            gravity: tree.gravity,
             joint_names: tree.joint_names().map(str::to_owned).collect(),
             floating: tree.is_floating(),
             roots: (0..sizes.bodies).filter(|&body| tree.bodies()[body].parent.is_none()).collect(),
@@ -100,10 +98,7 @@ impl MujocoBackend {
             q: tree.neutral_configuration(),
             v: vec![0.0; sizes.velocities],
             world: simulation(world)?,
-            alone: RefCell::new(simulation(&World {
-                rotor_inertia: world.rotor_inertia.clone(),
-                ..World::default()
-            })?),
+            alone: RefCell::new(alone),
             reaction: Reaction::Ground([0.0; 6]),
             feet_of_shapes: feet_of_corners(tree, world),
             foot_wrenches: vec![[0.0; 6]; world.feet.len()],
@@ -147,7 +142,18 @@ impl MujocoBackend {
         world.warm_start_mut().fill(0.0);
     }
 
-    fn check_motion(&self, q: &[f64], v: &[f64]) -> Result<(), BackendError> {
+    /// Writes a motion into the robot by itself.
+    pub(crate) fn put_motion(&mut self, q: &[f64], v: &[f64], a: &[f64]) {
+        let alone = self.alone.get_mut();
+        put(self.floating, q, v, alone);
+        alone.acceleration_mut().copy_from_slice(a);
+        if self.floating {
+            let moving = base::acceleration_to(base::rotation(q), v, a);
+            alone.acceleration_mut()[..6].copy_from_slice(&moving);
+        }
+    }
+
+    pub(crate) fn check_motion(&self, q: &[f64], v: &[f64]) -> Result<(), BackendError> {
         check_size("the configuration q", q.len(), self.q.len())?;
         check_size("the velocity v", v.len(), self.v.len())?;
         Ok(())
@@ -222,29 +228,6 @@ impl DynamicsBackend for MujocoBackend {
         self.q.len()
     }
 
-    fn state(&self, q: &mut [f64], v: &mut [f64]) -> Result<(), BackendError> {
-        self.check_motion(q, v)?;
-        q.copy_from_slice(&self.q);
-        v.copy_from_slice(&self.v);
-        Ok(())
-    }
-
-    fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), BackendError> {
-        self.check_motion(q, v)?;
-        check_finite("the configuration q", q)?;
-        check_finite("the velocity v", v)?;
-        if self.floating {
-            let length = q[3..7].iter().map(|x| x * x).sum::<f64>().sqrt();
-            if (length - 1.0).abs() > QUATERNION_TOLERANCE {
-                return Err(BackendError::NotUnitQuaternion { length });
-            }
-        }
-        self.q.copy_from_slice(q);
-        self.v.copy_from_slice(v);
-        self.put_state();
-        Ok(())
-    }
-
     fn inverse_dynamics(
         &mut self,
         q: &[f64],
@@ -255,13 +238,8 @@ impl DynamicsBackend for MujocoBackend {
         self.check_motion(q, v)?;
         check_size("the acceleration a", a.len(), self.v.len())?;
         check_size("the generalised force", force.len(), self.v.len())?;
+        self.put_motion(q, v, a);
         let alone = self.alone.get_mut();
-        put(self.floating, q, v, alone);
-        alone.acceleration_mut().copy_from_slice(a);
-        if self.floating {
-            let moving = base::acceleration_to(base::rotation(q), v, a);
-            alone.acceleration_mut()[..6].copy_from_slice(&moving);
-        }
         alone.inverse();
         force.copy_from_slice(alone.inverse_force());
         if self.floating {
@@ -300,6 +278,45 @@ impl DynamicsBackend for MujocoBackend {
         if solved && acceleration.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(self.singular()) }
     }
 
+    fn base_wrench(&self) -> [f64; 6] {
+        match self.reaction {
+            Reaction::Ground(wrench) => wrench,
+            Reaction::Needed => {
+                let mut alone = self.alone.borrow_mut();
+                alone.position_mut().copy_from_slice(&self.motion.position);
+                alone.velocity_mut().copy_from_slice(&self.motion.velocity);
+                alone.acceleration_mut().copy_from_slice(&self.motion.acceleration);
+                alone.inverse();
+                alone.joint_wrench(self.roots.iter().copied())
+            }
+        }
+    }
+}
+
+impl SimulationBackend for MujocoBackend {
+    fn state(&self, q: &mut [f64], v: &mut [f64]) -> Result<(), BackendError> {
+        self.check_motion(q, v)?;
+        q.copy_from_slice(&self.q);
+        v.copy_from_slice(&self.v);
+        Ok(())
+    }
+
+    fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), BackendError> {
+        self.check_motion(q, v)?;
+        check_finite("the configuration q", q)?;
+        check_finite("the velocity v", v)?;
+        if self.floating {
+            let length = q[3..7].iter().map(|x| x * x).sum::<f64>().sqrt();
+            if (length - 1.0).abs() > QUATERNION_TOLERANCE {
+                return Err(BackendError::NotUnitQuaternion { length });
+            }
+        }
+        self.q.copy_from_slice(q);
+        self.v.copy_from_slice(v);
+        self.put_state();
+        Ok(())
+    }
+
     fn step(&mut self, torque: &[f64], dt: f64) -> Result<(), BackendError> {
         check_size("the joint torque", torque.len(), self.joint_names.len())?;
         check_finite("the joint torque", torque)?;
@@ -327,20 +344,6 @@ impl DynamicsBackend for MujocoBackend {
 
     fn foot_wrench(&self, foot: usize) -> Option<[f64; 6]> {
         self.foot_wrenches.get(foot).copied().filter(|_| self.stepped)
-    }
-
-    fn base_wrench(&self) -> [f64; 6] {
-        match self.reaction {
-            Reaction::Ground(wrench) => wrench,
-            Reaction::Needed => {
-                let mut alone = self.alone.borrow_mut();
-                alone.position_mut().copy_from_slice(&self.motion.position);
-                alone.velocity_mut().copy_from_slice(&self.motion.velocity);
-                alone.acceleration_mut().copy_from_slice(&self.motion.acceleration);
-                alone.inverse();
-                alone.joint_wrench(self.roots.iter().copied())
-            }
-        }
     }
 }
 

@@ -26,6 +26,8 @@ int main(void) {
   PRINT(mjData, qacc_warmstart)
   PRINT(mjData, qfrc_applied)
   PRINT(mjData, qacc)
+  PRINT(mjData, xpos)
+  PRINT(mjData, xmat)
   PRINT(mjData, subtree_com)
   PRINT(mjData, qfrc_inverse)
   PRINT(mjData, cfrc_int)

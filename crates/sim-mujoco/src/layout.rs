@@ -35,6 +35,8 @@ pub(crate) mod data {
     pub const QACC_WARMSTART: usize = 160_720;
     pub const QFRC_APPLIED: usize = 160_744;
     pub const QACC: usize = 160_784;
+    pub const XPOS: usize = 160_840;
+    pub const XMAT: usize = 160_856;
     pub const SUBTREE_COM: usize = 160_960;
     pub const QFRC_INVERSE: usize = 161_440;
     pub const CFRC_INT: usize = 161_456;

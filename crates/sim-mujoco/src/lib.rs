@@ -2,13 +2,16 @@
 
 mod backend;
 mod base;
+mod body_kinematics;
 mod error;
 mod inertial;
+mod integrator;
 mod layout;
 mod library;
 mod mjcf;
 mod simulation;
 
-pub use backend::{Integrator, MujocoBackend};
+pub use backend::MujocoBackend;
 pub use error::MujocoError;
+pub use integrator::Integrator;
 pub use library::{LIBRARY_FILE_NAME, LIBRARY_VARIABLE, VERSION, find_library, library_cache_path};

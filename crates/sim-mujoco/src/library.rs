@@ -65,6 +65,10 @@ pub(crate) struct LogMessage {
     subject: [c_char; 1024],
 }
 
+/// Velocity or acceleration of an object: its type, its number, room for six numbers with the angular half first, and whether they are along
+/// the object's own axes.
+pub(crate) type ObjectMotion = unsafe extern "C" fn(*const Model, *const Data, c_int, c_int, *mut f64, c_int);
+
 type LogHandler = unsafe extern "C" fn(*const LogMessage);
 
 /// Declares the functions, with the signatures of `mujoco.h`, and how they are looked up.
@@ -107,6 +111,9 @@ functions! {
     mj_RungeKutta: fn(*const Model, *mut Data, c_int);
     mj_implicit: fn(*const Model, *mut Data);
     mj_rnePostConstraint: fn(*const Model, *mut Data);
+    mj_objectVelocity: fn(*const Model, *const Data, c_int, c_int, *mut f64, c_int);
+    mj_objectAcceleration: fn(*const Model, *const Data, c_int, c_int, *mut f64, c_int);
+    mj_jacBody: fn(*const Model, *const Data, *mut f64, *mut f64, c_int);
     mj_contactForce: fn(*const Model, *const Data, c_int, *mut f64);
     mju_setLogHandler: fn(Option<LogHandler>) -> Option<LogHandler>;
 }

@@ -3,9 +3,10 @@
 
 use crate::inertial::PrincipalInertia;
 use crate::layout::{contact, data, model};
-use crate::library::{Data, Functions, Model, functions};
+use crate::library::{Data, Functions, Model, ObjectMotion, functions};
 use crate::mjcf::placeholder;
 use crate::{Integrator, MujocoError};
+use phiw_dynamics::{Mat3, Placement, Spatial, Vec3};
 use std::ffi::{CStr, CString, c_char};
 use std::ptr::{NonNull, null};
 
@@ -40,6 +41,9 @@ impl Drop for Simulation {
         }
     }
 }
+
+/// MuJoCo's name for the frames of bodies (`mjOBJ_XBODY`), as against those of their inertias.
+const BODY_FRAME: i32 = 2;
 
 /// A model that nobody owns yet.
 struct Compiled(&'static Functions, NonNull<Model>);
@@ -94,6 +98,8 @@ impl Simulation {
             ("qacc_warmstart", data::QACC_WARMSTART, self.sizes.velocities),
             ("qfrc_applied", data::QFRC_APPLIED, self.sizes.velocities),
             ("qfrc_inverse", data::QFRC_INVERSE, self.sizes.velocities),
+            ("xpos", data::XPOS, 3 * (self.sizes.bodies + 1)),
+            ("xmat", data::XMAT, 9 * (self.sizes.bodies + 1)),
             ("subtree_com", data::SUBTREE_COM, 3 * (self.sizes.bodies + 1)),
             ("cfrc_int", data::CFRC_INT, 6 * (self.sizes.bodies + 1)),
         ];
@@ -220,11 +226,70 @@ impl Simulation {
         unsafe { (self.functions.mj_step)(self.model.as_ptr(), self.data.as_ptr()) };
     }
 
+    /// The accelerations of the bodies, for [`Self::body_acceleration`], in the motion of the last [`Self::inverse`].
+    pub fn accelerate_bodies(&mut self) {
+        // SAFETY: the invariant.
+        unsafe { (self.functions.mj_rnePostConstraint)(self.model.as_ptr(), self.data.as_ptr()) };
+    }
+
+    /// Where the frame of a body is in the world, at the position of the last call.
+    pub fn body_placement(&self, body: usize) -> Placement<f64> {
+        let body = body + 1; // body 0 is the world
+        let origin = &self.numbers(data::XPOS, 3 * (self.sizes.bodies + 1))[3 * body..];
+        let turn = &self.numbers(data::XMAT, 9 * (self.sizes.bodies + 1))[9 * body..];
+        Placement {
+            rotation: Mat3(std::array::from_fn(|row| std::array::from_fn(|column| turn[3 * row + column]))),
+            translation: Vec3(std::array::from_fn(|axis| origin[axis])),
+        }
+    }
+
+    /// The velocity of a body's frame along its own axes.
+    pub fn body_velocity(&self, body: usize) -> Spatial<f64> {
+        self.object_motion(self.functions.mj_objectVelocity, body)
+    }
+
+    /// The acceleration of a body's frame, its origin's less gravity, along its own axes; after [`Self::accelerate_bodies`].
+    pub fn body_acceleration(&self, body: usize) -> Spatial<f64> {
+        self.object_motion(self.functions.mj_objectAcceleration, body)
+    }
+
+    fn object_motion(&self, function: ObjectMotion, body: usize) -> Spatial<f64> {
+        let mut motion = [0.0; 6];
+        let (model, data) = (self.model.as_ptr(), self.data.as_ptr());
+        // SAFETY: the invariant; the body is one of the model's, and there is room for six numbers.
+        unsafe { function(model, data, BODY_FRAME, self.number_of(body), motion.as_mut_ptr(), 1) };
+        let [rx, ry, rz, x, y, z] = motion;
+        Spatial { linear: Vec3([x, y, z]), angular: Vec3([rx, ry, rz]) }
+    }
+
+    /// The motion of a body's frame, along the world's axes, that unit velocity of a coordinate gives it. Allocates.
+    pub fn body_jacobian_column(&self, body: usize, coordinate: usize) -> Spatial<f64> {
+        let size = self.sizes.velocities;
+        let (mut linear, mut angular) = (vec![0.0; 3 * size], vec![0.0; 3 * size]);
+        // SAFETY: the invariant; the body is one of the model's, and both matrices have three rows of `nv` numbers.
+        unsafe {
+            (self.functions.mj_jacBody)(
+                self.model.as_ptr(),
+                self.data.as_ptr(),
+                linear.as_mut_ptr(),
+                angular.as_mut_ptr(),
+                self.number_of(body),
+            );
+        }
+        let column = |matrix: &[f64]| Vec3(std::array::from_fn(|row| matrix[row * size + coordinate]));
+        Spatial { linear: column(&linear), angular: column(&angular) }
+    }
+
+    /// MuJoCo's number of a body, the world being its first.
+    fn number_of(&self, body: usize) -> i32 {
+        assert!(body < self.sizes.bodies, "there is no such body");
+        body as i32 + 1
+    }
+
     /// The wrench that each root body gets through its joint, in the motion of the last call, summed: force and moment
     /// about the world's origin.
     pub fn joint_wrench(&mut self, roots: impl Iterator<Item = usize>) -> [f64; 6] {
-        // SAFETY: the invariant.
-        unsafe { (self.functions.mj_rnePostConstraint)(self.model.as_ptr(), self.data.as_ptr()) };
+        self.accelerate_bodies();
         let centers = self.numbers(data::SUBTREE_COM, 3 * (self.sizes.bodies + 1));
         let wrenches = self.numbers(data::CFRC_INT, 6 * (self.sizes.bodies + 1));
         let mut total = [0.0; 6];

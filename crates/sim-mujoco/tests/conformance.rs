@@ -4,15 +4,20 @@ mod setup;
 
 use phiw_conformance as suite;
 use phiw_conformance::{Failure, Measured};
-use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World};
+use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
 use phiw_sim_mujoco::{Integrator, MujocoBackend};
 
-fn runge_kutta(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+fn runge_kutta(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     Ok(Box::new(MujocoBackend::new(tree, world)?))
 }
 
-fn implicit(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+fn implicit(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     Ok(Box::new(MujocoBackend::new(tree, world)?.with_integrator(Integrator::Implicit)))
+}
+
+/// The backend as the type that it is, which has the motion of bodies too.
+fn own_type(tree: &Tree, world: &World) -> Result<Box<MujocoBackend>, BackendError> {
+    Ok(Box::new(MujocoBackend::new(tree, world)?))
 }
 
 /// Whether MuJoCo is there; says so where it is not.
@@ -47,19 +52,39 @@ fn equation_of_motion_of_all_robots() {
     }
     for robot in robots() {
         println!("{}", robot.name);
-        match suite::equation_of_motion(&runge_kutta, &robot.tree, 1000) {
-            Ok(all) => all.iter().for_each(|measured| println!("  {measured}")),
-            Err(failure) => panic!("{}: {failure}", robot.name),
+        for group in [
+            suite::equation_of_motion(&own_type, &robot.tree, 1000),
+            suite::state_of_a_simulation(&runge_kutta, &robot.tree, 100),
+        ] {
+            match group {
+                Ok(all) => all.iter().for_each(|measured| println!("  {measured}")),
+                Err(failure) => panic!("{}: {failure}", robot.name),
+            }
         }
         check("  rotors", suite::rotor_inertia_is_part_of_the_mass(&runge_kutta, &robot.tree, 50));
         check("  step", suite::base_wrench_of_a_step(&runge_kutta, &robot.tree));
     }
 }
 
+/// The regressor and the ZMP over MuJoCo's own kinematics, and not ours, are those of its dynamics.
+#[test]
+fn regressor_and_zmp_over_the_engines_kinematics() {
+    if !is_there() {
+        return;
+    }
+    for robot in robots() {
+        println!("{}", robot.name);
+        match suite::kinematics_of_bodies(&own_type, &robot.tree, 200) {
+            Ok(all) => all.iter().for_each(|measured| println!("  {measured}")),
+            Err(failure) => panic!("{}: {failure}", robot.name),
+        }
+    }
+}
+
 #[test]
 fn random_robots() {
     if is_there() {
-        check("random robots", suite::regressor_predicts_random_robots(&runge_kutta, false));
+        check("random robots", suite::regressor_predicts_random_robots(&own_type, false));
     }
 }
 

@@ -3,7 +3,7 @@
 mod setup;
 
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
-use phiw_dynamics::{AnalyticBackend, DynamicsBackend, Tree, World};
+use phiw_dynamics::{AnalyticBackend, DynamicsBackend, SimulationBackend, Tree, World};
 use phiw_sim_mujoco::Integrator;
 use setup::{assert_close, mujoco, square_foot, state_of};
 

@@ -3,7 +3,7 @@
 mod setup;
 
 use phiw_dynamics::random_tree::RandomState;
-use phiw_dynamics::{AnalyticBackend, BackendError, DynamicsBackend, World};
+use phiw_dynamics::{AnalyticBackend, BackendError, DynamicsBackend, SimulationBackend, World};
 use phiw_sim_mujoco::Integrator;
 use setup::{assert_close, energy, mujoco, robot, robots, state_of};
 
@@ -16,7 +16,7 @@ fn a_runge_kutta_step_is_the_analytic_one() {
         let torque: Vec<f64> = (0..tree.joint_count()).map(|joint| 0.5 - 0.1 * joint as f64).collect();
         // MuJoCo's method is of lower order for a base that turns.
         let dt = if tree.is_floating() { 1e-4 } else { 1e-3 };
-        for backend in [&mut backend as &mut dyn DynamicsBackend, &mut analytic] {
+        for backend in [&mut backend as &mut dyn SimulationBackend, &mut analytic] {
             backend.set_state(&q, &v).unwrap();
             backend.step(&torque, dt).unwrap();
         }

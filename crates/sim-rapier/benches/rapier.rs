@@ -3,7 +3,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, random_state};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
-use phiw_dynamics::{DynamicsBackend, Tree, World};
+use phiw_dynamics::{DynamicsBackend, SimulationBackend, Tree, World};
 use phiw_sim_rapier::RapierBackend;
 use std::hint::black_box;
 

@@ -34,16 +34,16 @@ pub(crate) struct Articulation {
 
 /// One joint of the tree in the engine; those that follow a leader have coordinates of their own here.
 #[derive(Clone, Copy, Debug)]
-struct Joint {
+pub(crate) struct Joint {
     link: usize,
     /// [`SLIDE`] or [`TURN`].
     axis: usize,
     /// Its index among the engine's velocities.
-    velocity: usize,
+    pub(crate) velocity: usize,
     /// The coordinate of the tree that moves it, floating base left out.
     coordinate: usize,
     /// Position = ratio · coordinate + offset.
-    ratio: f64,
+    pub(crate) ratio: f64,
     offset: f64,
     /// Whether it follows a leader.
     mimic: bool,
@@ -215,21 +215,45 @@ impl Articulation {
     }
 
     /// What follows the `base` elements of a floating base.
-    fn joint_part<'a>(&self, all: &'a [f64], base: usize) -> &'a [f64] {
+    pub(crate) fn joint_part<'a>(&self, all: &'a [f64], base: usize) -> &'a [f64] {
         &all[self.base_center.map_or(0, |_| base)..]
     }
 
     /// Takes the bodies to where the joints put them. A step does so by itself, but for the shapes that they carry.
     pub(crate) fn place_bodies(&mut self) -> Result<(), BackendError> {
+        self.place_links()?;
         let PhysicsWorld { bodies, multibody_joints, .. } = &mut self.world;
         let multibody = multibody_mut(multibody_joints, self.index)?;
-        multibody.forward_kinematics(bodies, true);
         for link in multibody.links() {
             if let Some(body) = bodies.get_mut(link.rigid_body_handle()) {
                 body.set_position(*link.local_to_world(), true);
             }
         }
         Ok(())
+    }
+
+    /// The engine's forward kinematics: the poses of its links, and their Jacobians.
+    pub(crate) fn place_links(&mut self) -> Result<(), BackendError> {
+        let PhysicsWorld { bodies, multibody_joints, .. } = &mut self.world;
+        multibody_mut(multibody_joints, self.index)?.forward_kinematics(bodies, true);
+        Ok(())
+    }
+
+    /// The joint before a body of the tree; none before a floating base.
+    pub(crate) fn joint_of(&self, body: usize) -> Option<&Joint> {
+        match self.base_center {
+            None => self.joints.get(body),
+            Some(_) => body.checked_sub(1).and_then(|joint| self.joints.get(joint)),
+        }
+    }
+
+    /// Pose of a body's link, its centre of mass in the link's frame, and its Jacobian: 6 × the engine's coordinates, column by column,
+    /// the velocity of the centre of mass first. All are those of the last [`Self::place_links`].
+    pub(crate) fn link_state(&self, body: usize) -> Result<(&Pose, Vector, &[f64]), BackendError> {
+        let (multibody, link) = (self.multibody()?, self.links[body]);
+        let pose = multibody.link(link).ok_or_else(lost)?.local_to_world();
+        let center = self.world.bodies[self.bodies[body]].local_center_of_mass();
+        Ok((pose, center, multibody.body_jacobian(link).as_slice()))
     }
 
     /// Copies the state out.

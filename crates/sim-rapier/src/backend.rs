@@ -2,10 +2,14 @@
 
 use crate::articulation::Articulation;
 use crate::asked_wrench::AskedWrench;
+use crate::body_kinematics::LinkMotions;
 use crate::floor::Soles;
 use crate::probe::Probe;
 use crate::{NAME, error};
-use phiw_dynamics::{AnalyticBackend, BackendError, DynamicsBackend, Placement, Tree, World, check_size};
+use phiw_dynamics::{
+    AnalyticBackend, BackendError, BodyJoint, BodyKinematics, BodyMotion, DynamicsBackend, Placement,
+    SimulationBackend, Tree, World, check_size,
+};
 use rapier3d_f64::prelude::PhysicsWorld;
 
 /// Iterations of a step unless [`RapierBackend::with_solver_iterations`] says otherwise.
@@ -18,6 +22,8 @@ pub const DEFAULT_SOLVER_ITERATIONS: usize = 8;
 ///
 /// **Inverse and forward dynamics** are exact up to rounding: they come from the engine's mass matrix and accelerations, in
 /// empty worlds beside the one that is stepped.
+///
+/// **The motion of bodies** ([`BodyKinematics`]) comes from the poses and Jacobians of the engine's links in such a world.
 ///
 /// **A step** is made of as many smaller ones as there are solver iterations, semi-implicit Euler each, so its error is of
 /// first order in `dt` over their number. The crate's README has numbers.
@@ -40,6 +46,7 @@ pub struct RapierBackend {
     articulation: Articulation,
     soles: Soles,
     probe: Probe,
+    link_motions: LinkMotions,
     base_wrench: AskedWrench,
     /// What each foot got in the last step; none before one.
     foot_wrenches: Vec<[f64; 6]>,
@@ -85,11 +92,13 @@ impl RapierBackend {
             q,
             v,
         };
+        let mut probe = Probe::new(tree, &world.rotor_inertia)?;
         Ok(RapierBackend {
+            link_motions: LinkMotions::new(tree, probe.engine())?,
+            probe,
             analytic: AnalyticBackend::new(tree.clone()),
             articulation,
             soles,
-            probe: Probe::new(tree, &world.rotor_inertia)?,
             base_wrench: AskedWrench::new(AnalyticBackend::new(tree.clone())),
             foot_wrenches: vec![[0.0; 6]; world.feet.len()],
             stepped: false,
@@ -154,16 +163,6 @@ impl DynamicsBackend for RapierBackend {
         self.analytic.configuration_size()
     }
 
-    fn state(&self, q: &mut [f64], v: &mut [f64]) -> Result<(), BackendError> {
-        self.analytic.state(q, v)
-    }
-
-    fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), BackendError> {
-        self.analytic.set_state(q, v)?;
-        self.articulation.set_state(q, v)?;
-        self.articulation.place_bodies()
-    }
-
     fn inverse_dynamics(
         &mut self,
         q: &[f64],
@@ -192,6 +191,22 @@ impl DynamicsBackend for RapierBackend {
         check_size("the generalised force", force.len(), self.velocity_size())?;
         check_size("the acceleration", acceleration.len(), self.velocity_size())?;
         self.probe.forward_dynamics(q, v, force, acceleration)
+    }
+
+    fn base_wrench(&self) -> [f64; 6] {
+        self.base_wrench.get()
+    }
+}
+
+impl SimulationBackend for RapierBackend {
+    fn state(&self, q: &mut [f64], v: &mut [f64]) -> Result<(), BackendError> {
+        self.analytic.state(q, v)
+    }
+
+    fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), BackendError> {
+        self.analytic.set_state(q, v)?;
+        self.articulation.set_state(q, v)?;
+        self.articulation.place_bodies()
     }
 
     fn step(&mut self, torque: &[f64], dt: f64) -> Result<(), BackendError> {
@@ -227,8 +242,34 @@ impl DynamicsBackend for RapierBackend {
     fn foot_wrench(&self, foot: usize) -> Option<[f64; 6]> {
         self.foot_wrenches.get(foot).copied().filter(|_| self.stepped)
     }
+}
 
-    fn base_wrench(&self) -> [f64; 6] {
-        self.base_wrench.get()
+impl BodyKinematics for RapierBackend {
+    type Error = BackendError;
+
+    fn body_count(&self) -> usize {
+        self.link_motions.joints().len()
+    }
+
+    fn body_joint(&self, body: usize) -> BodyJoint {
+        self.link_motions.joints()[body]
+    }
+
+    fn gravity(&self) -> [f64; 3] {
+        self.tree().gravity
+    }
+
+    fn body_motions(
+        &mut self,
+        q: &[f64],
+        v: &[f64],
+        a: &[f64],
+        motions: &mut [BodyMotion<f64>],
+    ) -> Result<(), BackendError> {
+        check_size("the configuration q", q.len(), self.configuration_size())?;
+        check_size("the velocity v", v.len(), self.velocity_size())?;
+        check_size("the acceleration a", a.len(), self.velocity_size())?;
+        check_size("the motions of bodies", motions.len(), self.body_count())?;
+        self.link_motions.compute(self.probe.engine(), [q, v, a], motions)
     }
 }

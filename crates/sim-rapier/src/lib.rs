@@ -4,6 +4,7 @@ mod articulation;
 mod asked_wrench;
 mod backend;
 mod base_frame;
+mod body_kinematics;
 mod floor;
 mod mass_properties;
 mod probe;

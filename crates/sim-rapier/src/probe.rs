@@ -57,6 +57,11 @@ impl Probe {
         })
     }
 
+    /// The robot in empty space, to be asked about any state.
+    pub(crate) fn engine(&mut self) -> &mut Articulation {
+        &mut self.inverse
+    }
+
     /// The acceleration under a generalised force. Sizes are the caller's duty.
     pub(crate) fn forward_dynamics(
         &mut self,

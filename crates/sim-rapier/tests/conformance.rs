@@ -3,16 +3,21 @@
 use phiw_conformance as suite;
 use phiw_conformance::{Builder, Failure, Measured};
 use phiw_dynamics::random_tree::{RandomTreeOptions, random_tree};
-use phiw_dynamics::{BackendError, DynamicsBackend, Tree, World};
+use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
 use phiw_sim_rapier::RapierBackend;
 
-fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
+    Ok(Box::new(RapierBackend::new(tree, world)?))
+}
+
+/// The backend as the type that it is, which has the motion of bodies too.
+fn own_type(tree: &Tree, world: &World) -> Result<Box<RapierBackend>, BackendError> {
     Ok(Box::new(RapierBackend::new(tree, world)?))
 }
 
 fn with_iterations(
     iterations: usize,
-) -> impl Fn(&Tree, &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+) -> impl Fn(&Tree, &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     move |tree, world| Ok(Box::new(RapierBackend::new(tree, world)?.with_solver_iterations(iterations)?))
 }
 
@@ -36,18 +41,35 @@ fn check(what: &str, result: Result<Measured, Failure>) {
 fn equation_of_motion_of_all_robots() {
     for robot in robots() {
         println!("{}", robot.name);
-        match suite::equation_of_motion(&rapier, &robot.tree, 1000) {
-            Ok(all) => all.iter().for_each(|measured| println!("  {measured}")),
-            Err(failure) => panic!("{}: {failure}", robot.name),
+        for group in [
+            suite::equation_of_motion(&own_type, &robot.tree, 1000),
+            suite::state_of_a_simulation(&rapier, &robot.tree, 100),
+        ] {
+            match group {
+                Ok(all) => all.iter().for_each(|measured| println!("  {measured}")),
+                Err(failure) => panic!("{}: {failure}", robot.name),
+            }
         }
         check("  rotors", suite::rotor_inertia_is_part_of_the_mass(&rapier, &robot.tree, 50));
         check("  step", suite::base_wrench_of_a_step(&rapier, &robot.tree));
     }
 }
 
+/// The regressor and the ZMP over Rapier's own kinematics, and not ours, are those of its dynamics.
+#[test]
+fn regressor_and_zmp_over_the_engines_kinematics() {
+    for robot in robots() {
+        println!("{}", robot.name);
+        match suite::kinematics_of_bodies(&own_type, &robot.tree, 200) {
+            Ok(all) => all.iter().for_each(|measured| println!("  {measured}")),
+            Err(failure) => panic!("{}: {failure}", robot.name),
+        }
+    }
+}
+
 #[test]
 fn random_robots() {
-    check("random robots", suite::regressor_predicts_random_robots(&rapier, true));
+    check("random robots", suite::regressor_predicts_random_robots(&own_type, true));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Feet that are not on the base.
 
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
-use phiw_dynamics::{DynamicsBackend, Foot, Tree, World};
+use phiw_dynamics::{DynamicsBackend, Foot, SimulationBackend, Tree, World};
 use phiw_sim_rapier::RapierBackend;
 
 /// A trunk on one leg whose foot is behind an ankle; 12 kg, the sole 0.5 m below the trunk's frame.

@@ -1,7 +1,7 @@
 //! What Rapier can not hold is refused by name.
 
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
-use phiw_dynamics::{BackendError, DynamicsBackend, World};
+use phiw_dynamics::{BackendError, DynamicsBackend, SimulationBackend, World};
 use phiw_sim_rapier::RapierBackend;
 
 const ROUND: &str = r#"ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0""#;

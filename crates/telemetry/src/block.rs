@@ -1,6 +1,7 @@
 //! A stretch of conditioned samples that can be worked on by itself.
 
 use crate::parallel_filter::{FilterScratch, ParallelFilter};
+use std::convert::Infallible;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -138,12 +139,37 @@ impl Block {
         &self,
         width: usize,
         scratch: &mut FilterScratch,
-        evaluate: impl FnMut(usize, &mut [f64]),
+        mut evaluate: impl FnMut(usize, &mut [f64]),
         mut emit: impl FnMut(usize, f64, &[f64]),
     ) {
+        let evaluate = |sample: usize, row: &mut [f64]| {
+            evaluate(sample, row);
+            Ok::<(), Infallible>(())
+        };
+        let emit = |output: usize, t: f64, row: &[f64]| {
+            emit(output, t, row);
+            Ok(())
+        };
+        match self.try_filter(width, scratch, evaluate, emit) {
+            Ok(()) => {}
+            Err(never) => match never {},
+        }
+    }
+
+    /// [`filter`](Block::filter) with an `evaluate` and an `emit` that can fail; it stops at the first error.
+    ///
+    /// # Errors
+    /// What either of them returns.
+    pub fn try_filter<E>(
+        &self,
+        width: usize,
+        scratch: &mut FilterScratch,
+        evaluate: impl FnMut(usize, &mut [f64]) -> Result<(), E>,
+        mut emit: impl FnMut(usize, f64, &[f64]) -> Result<(), E>,
+    ) -> Result<(), E> {
         let range = self.warm_up..self.len();
         let emit = |output: usize, row: &[f64]| emit(output, self.t[self.outputs[output]], row);
-        self.filter.run(range, &self.outputs, width, scratch, evaluate, emit);
+        self.filter.run(range, &self.outputs, width, scratch, evaluate, emit)
     }
 
     /// [`filter`](Block::filter) of the signals themselves: `emit` gets each output's place in

@@ -1,7 +1,7 @@
 //! How logs are conditioned: chosen once for a session, applied to each log.
 
 use crate::cutoff::{self, BANDWIDTHS, CutoffSuggestion};
-use crate::{ClockChoice, LogError, LogPlan, Survey};
+use crate::{ClockChoice, LogError, Survey};
 use std::fmt;
 
 /// What the user fixes; what is left `None` is chosen from the data.
@@ -86,17 +86,7 @@ impl Conditioning {
         Ok(conditioning)
     }
 
-    /// What the conditioning comes to for one log: kernels for its sample rate, its clock, its measured
-    /// derivatives.
-    ///
-    /// # Errors
-    /// [`LogError::Cutoff`] for a cut-off that the log's sample rate can't carry.
-    pub fn plan(&self, survey: &Survey) -> Result<LogPlan, LogError> {
-        self.check(survey)?;
-        Ok(LogPlan::new(self, survey))
-    }
-
-    fn check(&self, survey: &Survey) -> Result<(), LogError> {
+    pub(crate) fn check(&self, survey: &Survey) -> Result<(), LogError> {
         let highest_hz = HIGHEST_SHARE_BY_HAND * survey.rate_hz();
         for cutoff_hz in [self.cutoff_hz, self.parallel_cutoff_hz] {
             if !(cutoff_hz > 0.0 && cutoff_hz <= highest_hz) {

@@ -71,16 +71,19 @@ impl ParallelFilter {
     /// ascending. `evaluate` fills the row of a
     /// sample (asked once for each that an output covers, ascending); `emit` gets each output's place in
     /// `outputs` and its row.
-    pub(crate) fn run(
+    ///
+    /// # Errors
+    /// What either of them returns; nothing more is asked then.
+    pub(crate) fn run<E>(
         &self,
         range: std::ops::Range<usize>,
         outputs: &[usize],
         width: usize,
         scratch: &mut FilterScratch,
-        mut evaluate: impl FnMut(usize, &mut [f64]),
-        mut emit: impl FnMut(usize, &[f64]),
-    ) {
-        let (Some(&first), Some(&last)) = (outputs.first(), outputs.last()) else { return };
+        mut evaluate: impl FnMut(usize, &mut [f64]) -> Result<(), E>,
+        mut emit: impl FnMut(usize, &[f64]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let (Some(&first), Some(&last)) = (outputs.first(), outputs.last()) else { return Ok(()) };
         // The widest vector instructions that the processor has: rows can be thousands of numbers wide.
         let arch = pulp::Arch::new();
         let slots = 2 * self.half_length / self.decimation + 2;
@@ -100,7 +103,7 @@ impl ParallelFilter {
             if finished == begun {
                 continue;
             }
-            evaluate(sample, &mut scratch.row);
+            evaluate(sample, &mut scratch.row)?;
             for index in finished..begun {
                 let tap = self.taps[sample + self.half_length - outputs[index]];
                 let slot = index % slots;
@@ -116,10 +119,11 @@ impl ParallelFilter {
                 let sums = &mut scratch.sums[slot * width..(slot + 1) * width];
                 let scale = 1.0 / self.weight(covered(outputs[finished]), outputs[finished]);
                 sums.iter_mut().for_each(|sum| *sum *= scale);
-                emit(finished, sums);
+                emit(finished, sums)?;
                 finished += 1;
             }
         }
+        Ok(())
     }
 
     /// Sum of the taps that fall on `covered`.

@@ -4,7 +4,7 @@ use crate::clock::{Clock, ClockChoice};
 use crate::cutoff::BANDWIDTHS;
 use crate::kernel::{LowPass, SmoothingKernel};
 use crate::parallel_filter::ParallelFilter;
-use crate::{Conditioning, Survey};
+use crate::{Conditioning, LogError, Survey};
 use std::fmt;
 use std::sync::Arc;
 
@@ -45,8 +45,20 @@ const ATTENUATION_DB: f64 = 80.0;
 /// Times the noise of the acceleration may grow where the kernel is cut.
 const NOISE_AT_EDGE: f64 = 2.0;
 
+impl Conditioning {
+    /// What the conditioning comes to for one log: kernels for its sample rate, its clock, its measured
+    /// derivatives.
+    ///
+    /// # Errors
+    /// [`LogError::Cutoff`] for a cut-off that the log's sample rate can't carry.
+    pub fn plan(&self, survey: &Survey) -> Result<LogPlan, LogError> {
+        self.check(survey)?;
+        Ok(LogPlan::new(self, survey))
+    }
+}
+
 impl LogPlan {
-    pub(crate) fn new(conditioning: &Conditioning, survey: &Survey) -> Self {
+    fn new(conditioning: &Conditioning, survey: &Survey) -> Self {
         let options = &conditioning.options;
         let clock = match options.clock {
             ClockChoice::Auto => survey.clock,

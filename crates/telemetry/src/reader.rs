@@ -1,8 +1,7 @@
 //! Rows of a log, one at a time.
 
 use crate::columns::{Columns, Layout, TorqueColumns};
-use crate::segments::GapReason;
-use crate::{LogError, number};
+use crate::{GapReason, LogError, number};
 use phiw_limits::Limits;
 use std::cell::RefCell;
 use std::fs::File;

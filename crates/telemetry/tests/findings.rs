@@ -72,7 +72,7 @@ fn every_class_is_found() {
     );
     check(|_, [t, _, _, tau]| [t, 0.3, 0.0, tau], &[StandsStill]);
     check(|_, [t, q, qd, tau]| [20.0 * t, q, qd / 20.0, tau], &[Sampling]);
-    let late_stamp = |k: usize| if k % 2 == 0 { 0.4 / RATE } else { 0.0 };
+    let late_stamp = |k: usize| if k.is_multiple_of(2) { 0.4 / RATE } else { 0.0 };
     check(move |k, [t, q, qd, tau]| [t + late_stamp(k), q, qd, tau], &[Clock]);
 }
 
@@ -117,7 +117,8 @@ fn rows_in_which_no_torque_changes_are_left_out_and_counted() {
         assert_eq!(survey.used_rows, 4000 - expected, "{pause:?}");
         assert_eq!(gap.map_or(pause.start as u64 + 2, |gap| gap.first_line), pause.start as u64 + 2);
         let conditioning =
-            Conditioning::choose(&[survey.clone()], &ConditioningOptions::default()).expect("a cut-off");
+            Conditioning::choose(std::slice::from_ref(&survey), &ConditioningOptions::default())
+                .expect("a cut-off");
         let mut left = 0;
         let inside = |t: f64| expected > 0 && (901..1199).contains(&((t * RATE).round() as usize));
         let streamed = stream(&survey, &conditioning, &mut |_, _| {}, &mut |block| {

@@ -1,17 +1,6 @@
 //! What the floor must give to a robot at one instant of a motion.
 
-use crate::{ZmpModel, multi_body_zmp, point_mass_zmp};
-
-/// A robot's centre of mass.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CenterOfMass {
-    /// Mass of the whole robot \[kg\].
-    pub mass: f64,
-    /// Where it is, in the world \[m\]; not finite for a robot without mass.
-    pub position: [f64; 3],
-    /// Its acceleration along the world's axes \[m/s²\].
-    pub acceleration: [f64; 3],
-}
+use crate::{CenterOfMass, ZmpModel, multi_body_zmp, point_mass_zmp};
 
 /// The state of a robot's balance at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! Bounds of the ZMP parallel to the axes, as the paper has them.
 
-use crate::{SupportError, SupportPolygon};
+use crate::SupportError;
 
 /// The paper's p⁻ and p⁺ \[m\], equation (9).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,15 +34,6 @@ impl Bounds {
         check_reduction(alpha, about, self.contains(about))?;
         let shrink = |point: [f64; 2]| [0, 1].map(|axis| toward(about[axis], point[axis], alpha));
         Ok(Bounds { lower: shrink(self.lower), upper: shrink(self.upper) })
-    }
-
-    /// The same as a polygon.
-    ///
-    /// # Errors
-    /// The bounds enclose nothing or are not finite.
-    pub fn polygon(&self) -> Result<SupportPolygon, SupportError> {
-        let ([x0, y0], [x1, y1]) = (self.lower, self.upper);
-        SupportPolygon::from_points(&[[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
     }
 }
 

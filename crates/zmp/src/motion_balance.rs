@@ -1,7 +1,7 @@
 //! The worst instant of a motion.
 
 use crate::{Balance, SupportError, SupportPolygon, ZmpModel, ZmpWorkspace};
-use phiw_dynamics::{DimensionError, Tree};
+use phiw_dynamics::BodyKinematics;
 
 /// What a robot stands on.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,17 +102,17 @@ impl MotionBalance {
     /// Of a motion, sample by sample `[q, v, a]` as in [`ZmpWorkspace::evaluate`], for the standing parameters `parameters`.
     ///
     /// # Errors
-    /// A slice or the workspace does not fit the robot.
-    pub fn of_motion<'a>(
-        tree: &Tree,
+    /// A slice or the workspace does not fit the robot, or the robot's motion can not be computed.
+    pub fn of_motion<'a, K: BodyKinematics>(
+        mut robot: K,
         parameters: &[f64],
         stance: &Stance,
         motion: impl IntoIterator<Item = [&'a [f64]; 3]>,
         workspace: &mut ZmpWorkspace,
-    ) -> Result<Self, DimensionError> {
+    ) -> Result<Self, K::Error> {
         let mut balance = MotionBalance::NONE;
         for [q, v, a] in motion {
-            balance.add(&workspace.evaluate(tree, parameters, q, v, a)?, stance);
+            balance.add(&workspace.evaluate(&mut robot, parameters, q, v, a)?, stance);
         }
         Ok(balance)
     }

@@ -1,9 +1,9 @@
 //! The balance as a linear map of the parameters: what they are uncertain by, the ZMP is uncertain by.
 
-use crate::workspace::{base_motion, check_motion, parameter_count};
+use crate::workspace::{base_motion, parameter_count};
 use crate::{Balance, ZmpModel, ZmpWorkspace};
 use phiw_dynamics::{
-    BodyMotion, DimensionError, PARAMETERS_PER_BODY, Placement, Spatial, Tree, Vec3, check_size,
+    BodyKinematics, BodyMotion, DimensionError, PARAMETERS_PER_BODY, Placement, Spatial, Vec3, check_size,
 };
 
 /// Rows of first moment, force and moment.
@@ -21,10 +21,10 @@ pub struct BalanceRows {
 }
 
 impl BalanceRows {
-    /// Room for the rows of one sample of `tree`.
-    pub fn new(tree: &Tree) -> Self {
-        let parameters = parameter_count(tree);
-        BalanceRows { parameters, rows: vec![0.0; ROWS * parameters], gravity: tree.gravity }
+    /// Room for the rows of one sample of a robot: `&tree`, or whatever else knows how the robot's bodies hang together.
+    pub fn new(robot: impl BodyKinematics) -> Self {
+        let parameters = parameter_count(&robot);
+        BalanceRows { parameters, rows: vec![0.0; ROWS * parameters], gravity: robot.gravity() }
     }
 
     /// Number of standing parameters: ten for each body, and ten for the base link unless the base floats.
@@ -45,23 +45,22 @@ impl BalanceRows {
     /// Fills in the rows of the motion `(q, v, a)`, as in [`ZmpWorkspace::evaluate`]; allocates nothing.
     ///
     /// # Errors
-    /// A slice, the workspace or these rows do not fit the robot.
-    pub fn compute(
+    /// A slice, the workspace or these rows do not fit the robot, or the robot's motion can not be computed.
+    pub fn compute<K: BodyKinematics>(
         &mut self,
-        tree: &Tree,
+        mut robot: K,
         q: &[f64],
         v: &[f64],
         a: &[f64],
         workspace: &mut ZmpWorkspace,
-    ) -> Result<(), DimensionError> {
-        check_motion(tree, q, v, a)?;
-        workspace.check(tree)?;
-        check_size("the balance rows", self.parameters, parameter_count(tree))?;
-        workspace.place(tree, q, v, a);
-        self.gravity = tree.gravity;
+    ) -> Result<(), K::Error> {
+        workspace.check(&robot)?;
+        check_size("the balance rows", self.parameters, parameter_count(&robot))?;
+        workspace.place(&mut robot, q, v, a)?;
+        self.gravity = robot.gravity();
         let mut start = 0;
-        if !tree.is_floating() {
-            self.body(start, Placement::identity(), &base_motion(tree));
+        if !robot.has_floating_base() {
+            self.body(start, Placement::identity(), &base_motion(self.gravity));
             start += PARAMETERS_PER_BODY;
         }
         for (placement, motion) in workspace.placements.iter().zip(&workspace.motions) {

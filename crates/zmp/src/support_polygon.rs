@@ -1,48 +1,13 @@
 //! The support polygon: the convex hull of the contacts with the floor.
 
-use crate::Bounds;
 use crate::bounds::{check_reduction, toward};
+use crate::{Bounds, SupportError};
 use parry2d_f64::math::Vector;
 use parry2d_f64::transformation::convex_hull;
 use phiw_dynamics::{Foot, Placement, Vec3};
 
 /// Smallest area of a support polygon \[m²\]: less is a line.
 const SMALLEST_AREA: f64 = 1e-8;
-
-/// Why there is no support polygon.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SupportError {
-    /// A contact is NaN or infinite.
-    #[error("contact {0} has a coordinate that is not a finite number")]
-    NotFinite(usize),
-    /// No area.
-    #[error(
-        "the {contacts} contacts enclose {area} m²: a robot stands on at least three that are not in a line"
-    )]
-    NoArea {
-        /// How many there are.
-        contacts: usize,
-        /// What they enclose \[m²\].
-        area: f64,
-    },
-    /// A foot names a body that is not there.
-    #[error("a foot is fixed to body {body}, but there are placements of {bodies} bodies")]
-    NoSuchBody {
-        /// The index.
-        body: usize,
-        /// How many there are.
-        bodies: usize,
-    },
-    /// The reduction coefficient is none.
-    #[error("the reduction coefficient alpha is {0}: it must be from 0 (the whole polygon) to 1 (a point)")]
-    Alpha(f64),
-    /// The polygon cannot shrink to a point outside it.
-    #[error(
-        "the polygon cannot shrink to {0:?} m, which is outside it: name a point inside, its centroid for one"
-    )]
-    ShrinksToOutside([f64; 2]),
-}
 
 /// A convex polygon on the floor.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,6 +25,17 @@ pub struct NearestEdge {
     pub margin: f64,
     /// Its gradient with respect to the point: the unit vector away from the nearest point of the border inside, towards it outside.
     pub gradient: [f64; 2],
+}
+
+impl Bounds {
+    /// The same as a polygon.
+    ///
+    /// # Errors
+    /// The bounds enclose nothing or are not finite.
+    pub fn polygon(&self) -> Result<SupportPolygon, SupportError> {
+        let ([x0, y0], [x1, y1]) = (self.lower, self.upper);
+        SupportPolygon::from_points(&[[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+    }
 }
 
 impl SupportPolygon {

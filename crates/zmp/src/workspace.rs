@@ -2,13 +2,13 @@
 
 use crate::Balance;
 use phiw_dynamics::{
-    BodyMotion, DimensionError, Inertia, InertialParameters, JointType, PARAMETERS_PER_BODY, Placement,
-    Spatial, Tree, Vec3, check_size,
+    BodyKinematics, BodyMotion, DimensionError, Inertia, InertialParameters, PARAMETERS_PER_BODY, Placement,
+    Spatial, Vec3, check_size,
 };
 
 /// The parameters of everything that stands, in one vector: those of the base link, then those of the moving bodies.
 ///
-/// Joint torques of a robot on a fixed base do not feel its base link, so a [`Tree`] on a fixed base does not hold it; the ZMP does
+/// Joint torques of a robot on a fixed base do not feel its base link, so a [`Tree`](phiw_dynamics::Tree) on a fixed base does not hold it; the ZMP does
 /// feel it. `base_link` are its ten standard parameters in the world frame, which is the base's frame; whoever has the URDF
 /// finds them as body 0 of the tree that is read with `floating_base`. For a tree that floats, the base is a body like any other: give the
 /// parameters of its bodies as they are, this function is not needed.
@@ -58,27 +58,21 @@ impl Load {
 }
 
 /// How many parameters the balance of a robot takes: ten for each body, and ten for the base link unless the base floats.
-pub(crate) fn parameter_count(tree: &Tree) -> usize {
-    PARAMETERS_PER_BODY * (tree.bodies().len() + usize::from(!tree.is_floating()))
+pub(crate) fn parameter_count(robot: &impl BodyKinematics) -> usize {
+    PARAMETERS_PER_BODY * (robot.body_count() + usize::from(!robot.has_floating_base()))
 }
 
 /// The base link at rest, as a motion.
-pub(crate) fn base_motion(tree: &Tree) -> BodyMotion<f64> {
+pub(crate) fn base_motion(gravity: [f64; 3]) -> BodyMotion<f64> {
     let mut motion = BodyMotion::rest();
-    motion.proper_acceleration = -Vec3(tree.gravity);
+    motion.proper_acceleration = -Vec3(gravity);
     motion
 }
 
-pub(crate) fn check_motion(tree: &Tree, q: &[f64], v: &[f64], a: &[f64]) -> Result<(), DimensionError> {
-    check_size("the configuration q", q.len(), tree.configuration_size())?;
-    check_size("the velocity v", v.len(), tree.velocity_size())?;
-    check_size("the acceleration a", a.len(), tree.velocity_size())
-}
-
 impl ZmpWorkspace {
-    /// Scratch for `tree`.
-    pub fn new(tree: &Tree) -> Self {
-        let bodies = tree.bodies().len();
+    /// Scratch for a robot: `&tree`, or whatever else knows how the robot's bodies hang together.
+    pub fn new(robot: impl BodyKinematics) -> Self {
+        let bodies = robot.body_count();
         ZmpWorkspace {
             motions: vec![BodyMotion::rest(); bodies],
             placements: vec![Placement::identity(); bodies],
@@ -88,60 +82,68 @@ impl ZmpWorkspace {
 
     /// The balance of the motion `(q, v, a)` \[rad, m, s\] for the standard parameters `parameters`.
     ///
-    /// `q`, `v`, `a` are those of [`Tree::inverse_dynamics`]. `parameters` are in the order and frames of [`Tree::inertial_parameters`],
-    /// with the base link's ten before them on a fixed base ([`standing_parameters`]); those of `tree` itself are
-    /// not looked at. One inverse dynamics that carries mass and first moment along; allocates nothing.
+    /// `robot` is the one that this scratch is for: `&tree`, or `&mut backend` of another library, whose own kinematics are then used.
+    /// `q`, `v`, `a` are its coordinates (see [`BodyKinematics`]). `parameters` are ten for each body, in the order and frames of the
+    /// robot's bodies (for a tree: of [`Tree::inertial_parameters`](phiw_dynamics::Tree::inertial_parameters)), with the base link's ten
+    /// before them on a fixed base ([`standing_parameters`]); those that the robot itself may hold are not looked at. One inverse
+    /// dynamics that carries mass and first moment along; allocates nothing.
     ///
     /// # Errors
-    /// A slice or this workspace does not fit the robot.
-    pub fn evaluate(
+    /// A slice or this workspace does not fit the robot, or the robot's motion can not be computed.
+    pub fn evaluate<K: BodyKinematics>(
         &mut self,
-        tree: &Tree,
+        mut robot: K,
         parameters: &[f64],
         q: &[f64],
         v: &[f64],
         a: &[f64],
-    ) -> Result<Balance, DimensionError> {
-        check_motion(tree, q, v, a)?;
-        check_size("the standing parameters", parameters.len(), parameter_count(tree))?;
-        self.check(tree)?;
-        tree.body_motions(q, v, a, &mut self.motions);
-        let (mut total, bodies) = if tree.is_floating() {
+    ) -> Result<Balance, K::Error> {
+        self.check(&robot)?;
+        check_size("the standing parameters", parameters.len(), parameter_count(&robot))?;
+        robot.body_motions(q, v, a, &mut self.motions)?;
+        let gravity = robot.gravity();
+        let (mut total, bodies) = if robot.has_floating_base() {
             (Load::NONE, parameters)
         } else {
             let (base, bodies) = parameters.split_at(PARAMETERS_PER_BODY);
-            (Load::of_body(base, &base_motion(tree)), bodies)
+            (Load::of_body(base, &base_motion(gravity)), bodies)
         };
         let parts = bodies.chunks_exact(PARAMETERS_PER_BODY).zip(&self.motions);
         for (load, (parameters, motion)) in self.loads.iter_mut().zip(parts) {
             *load = Load::of_body(parameters, motion);
         }
-        for (index, body) in tree.bodies().iter().enumerate().rev() {
+        for index in (0..self.loads.len()).rev() {
             let carried = self.loads[index];
-            let outer = match body.parent {
+            let outer = match robot.body_joint(index).parent {
                 Some(parent) => &mut self.loads[parent],
                 None => &mut total,
             };
             outer.add(self.motions[index].placement, carried);
         }
         let ([fx, fy, fz], [mx, my, mz]) = (total.wrench.linear.0, total.wrench.angular.0);
-        Ok(Balance::of_sums(total.mass, total.moment.0, [fx, fy, fz, mx, my, mz], tree.gravity))
+        Ok(Balance::of_sums(total.mass, total.moment.0, [fx, fy, fz, mx, my, mz], gravity))
     }
 
-    pub(crate) fn check(&self, tree: &Tree) -> Result<(), DimensionError> {
-        check_size("the ZMP workspace", self.motions.len(), tree.bodies().len())
+    pub(crate) fn check(&self, robot: &impl BodyKinematics) -> Result<(), DimensionError> {
+        check_size("the ZMP workspace", self.motions.len(), robot.body_count())
     }
 
     /// Motions and world placements of all bodies.
-    pub(crate) fn place(&mut self, tree: &Tree, q: &[f64], v: &[f64], a: &[f64]) {
-        tree.body_motions(q, v, a, &mut self.motions);
-        for (index, body) in tree.bodies().iter().enumerate() {
+    pub(crate) fn place<K: BodyKinematics>(
+        &mut self,
+        robot: &mut K,
+        q: &[f64],
+        v: &[f64],
+        a: &[f64],
+    ) -> Result<(), K::Error> {
+        robot.body_motions(q, v, a, &mut self.motions)?;
+        for index in 0..self.motions.len() {
             let local = self.motions[index].placement;
-            debug_assert!(body.joint_type != JointType::Floating || body.parent.is_none());
-            self.placements[index] = match body.parent {
+            self.placements[index] = match robot.body_joint(index).parent {
                 Some(parent) => self.placements[parent].compose(local),
                 None => local,
             };
         }
+        Ok(())
     }
 }

@@ -2,8 +2,10 @@
 
 mod robots;
 
-use phiw_dynamics::{BackendError, DynamicsBackend, Placement, Tree, Vec3, World};
-use phiw_plant::{ComputedTorque, Gains, Plant, PlantSetup, RigidBodyModel, Run, Timing, feet_from_toml};
+use phiw_dynamics::{BackendError, Placement, SimulationBackend, Tree, Vec3, World};
+use phiw_plant::{
+    ComputedTorque, Gains, Plant, PlantRun, PlantSetup, RigidBodyModel, Timing, feet_from_toml,
+};
 use phiw_sim_rapier::RapierBackend;
 use phiw_zmp::{MotionBalance, Stance, SupportPolygon, ZmpModel, ZmpWorkspace};
 use robots::{model, upper_body};
@@ -145,12 +147,12 @@ fn a_humanoid_stands_between_its_feet() {
     assert!(zmp[1].abs() < 0.01, "between the feet: {zmp:?}");
 }
 
-fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     Ok(Box::new(RapierBackend::new(tree, world)?.with_solver_iterations(4)?))
 }
 
 /// The upper body on its sole in a physics engine, while its arms swing.
-fn simulated_swing(amplitude: f64, frequency: f64, duration_s: f64) -> Run {
+fn simulated_swing(amplitude: f64, frequency: f64, duration_s: f64) -> PlantRun {
     let tree = model("upper_body18", true);
     let of_effort = |share: f64| -> Vec<f64> {
         (0..tree.joint_count()).map(|joint| share * tree.joint(joint).limits.effort).collect()

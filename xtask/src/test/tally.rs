@@ -47,9 +47,9 @@ impl Tally {
         self.failed += failures;
     }
 
-    /// Whether a test has failed.
-    pub fn has_failures(&self) -> bool {
-        self.failed > 0
+    /// How many tests and checks have failed.
+    pub fn failures(&self) -> u64 {
+        self.failed
     }
 }
 

@@ -6,6 +6,7 @@
 
 mod task;
 
+use task::normal;
 pub use task::{TASKS, Task};
 
 use crate::c3d::{C3dFormat, write_c3d};
@@ -13,7 +14,6 @@ use crate::human::{HumanBody, MapError, MarkerMap, SEGMENT_PARAMETERS};
 use crate::recording::MarkerRecording;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 use std::collections::BTreeMap;
 
 /// Frames per second \[Hz\].
@@ -174,8 +174,4 @@ fn occlude(recording: &mut MarkerRecording, random: &mut ChaCha8Rng) {
 fn smooth(share: f64) -> f64 {
     let s = share.clamp(0.0, 1.0);
     s.powi(4) * (35.0 - 84.0 * s + 70.0 * s * s - 20.0 * s.powi(3))
-}
-
-fn normal(random: &mut ChaCha8Rng) -> f64 {
-    StandardNormal.sample(random)
 }

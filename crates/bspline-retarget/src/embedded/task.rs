@@ -1,8 +1,8 @@
 //! The tasks of Table 1 (Krebs et al. 2021) and the patterns that stand for them.
 
-use super::normal;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
 /// A task of Table 1.
@@ -277,4 +277,9 @@ pub(super) fn standing(joint: &str) -> f64 {
         "left_upper_arm_flexion" | "right_upper_arm_flexion" => 0.05,
         _ => 0.0,
     }
+}
+
+/// A number of the standard normal distribution.
+pub(super) fn normal(random: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(random)
 }

@@ -92,21 +92,35 @@ impl HumanBody {
                 range: ANYWHERE,
             });
         }
+        body.add_segments(&mode, first_parameter);
+        body.add_markers(map, recording, calibrated, still, first_parameter)?;
+        // Correspondences pull at segments without markers, too.
+        for node in body.segment_nodes {
+            body.kinematics.carry(node);
+        }
+        if body.markers.len() < 4 {
+            return Err(MapError::TooFew(body.markers.len()));
+        }
+        Ok(body)
+    }
+
+    /// The joints of all segments, each as its `mode` says.
+    fn add_segments(&mut self, mode: &dyn Fn(Segment) -> JointMode, first_parameter: usize) {
         for segment in Segment::ALL {
-            let parent = segment.parent().map(|parent| body.segment_nodes[parent.index()]);
-            let mut last = body.slide_along(parent, &length_to(segment), first_parameter);
+            let parent = segment.parent().map(|parent| self.segment_nodes[parent.index()]);
+            let mut last = self.slide_along(parent, &length_to(segment), first_parameter);
             for joint in joints(segment) {
                 let name = format!("{}_{}", segment.name(), joint.name);
                 let Joint { rest, spread, range, .. } = joint;
                 let coordinate = Coordinate { name, mean: rest, spread, range };
                 let source = match mode(segment) {
                     JointMode::Free => {
-                        body.trajectories.push(coordinate);
-                        Source::Column(body.trajectories.len() - 1)
+                        self.trajectories.push(coordinate);
+                        Source::Column(self.trajectories.len() - 1)
                     }
                     JointMode::Still => {
-                        body.parameters.push(coordinate);
-                        Source::Column(first_parameter + body.parameters.len() - 1)
+                        self.parameters.push(coordinate);
+                        Source::Column(first_parameter + self.parameters.len() - 1)
                     }
                     JointMode::Held => Source::Held(joint.rest),
                 };
@@ -114,18 +128,29 @@ impl HumanBody {
                     Motion::Turn(axis, sign) => NodeMotion { kind: MotionKind::Turn, axis, sign },
                     Motion::Slide(axis) => NodeMotion { kind: MotionKind::Slide, axis, sign: 1.0 },
                 };
-                last = Some(body.kinematics.push(last, motion, source));
+                last = Some(self.kinematics.push(last, motion, source));
             }
-            body.segment_nodes[segment.index()] = last.unwrap_or(0);
+            self.segment_nodes[segment.index()] = last.unwrap_or(0);
         }
-        body.still.end = body.parameters.len();
+        self.still.end = self.parameters.len();
+    }
+
+    /// The markers that the map places and the recording has.
+    fn add_markers(
+        &mut self,
+        map: &MarkerMap,
+        recording: &MarkerRecording,
+        calibrated: &BTreeMap<String, Placed>,
+        still: bool,
+        first_parameter: usize,
+    ) -> Result<(), MapError> {
         for (name, markers) in &map.segments {
             let Some(segment) = Segment::from_name(name) else { continue };
             for name in &markers.cluster {
                 // Whether it is placed is asked after it has been found: an absent marker should be called that.
                 let index = map.find(name, recording)?;
                 match calibrated.get(name) {
-                    Some(&placed) => body.place(name, index, placed, map, first_parameter),
+                    Some(&placed) => self.place(name, index, placed, map, first_parameter),
                     None if still => {}
                     None => return Err(MapError::Uncalibrated { name: name.clone() }),
                 }
@@ -137,20 +162,13 @@ impl HumanBody {
                 let placed = calibrated.get(name).copied().unwrap_or(nominal);
                 // Anatomical markers may be there in the static trial alone.
                 match map.find(name, recording) {
-                    Ok(index) => body.place(name, index, placed, map, first_parameter),
+                    Ok(index) => self.place(name, index, placed, map, first_parameter),
                     Err(_) if !still && calibrated.contains_key(name) => {}
                     Err(error) => return Err(error),
                 }
             }
         }
-        // Correspondences pull at segments without markers, too.
-        for node in body.segment_nodes {
-            body.kinematics.carry(node);
-        }
-        if body.markers.len() < 4 {
-            return Err(MapError::TooFew(body.markers.len()));
-        }
-        Ok(body)
+        Ok(())
     }
 
     /// Number of coordinates that move over time.

@@ -74,7 +74,7 @@ pub(crate) struct HumanScratch<S> {
     pub(super) twists: Vec<Spatial<S>>,
     /// What pulls at a node and all below it: force, and moment about the world's origin.
     pub(crate) wrenches: Vec<Spatial<S>>,
-    pub(crate) masses: Vec<super::composite::Masses<S>>,
+    pub(crate) masses: Vec<super::masses::Masses<S>>,
 }
 
 impl Kinematics {
@@ -122,7 +122,7 @@ impl Kinematics {
             origins: vec![Vec3::zero(); count],
             twists: vec![Spatial::zero(); count],
             wrenches: vec![Spatial::zero(); count],
-            masses: vec![super::composite::Masses::zero(); count],
+            masses: vec![super::masses::Masses::zero(); count],
         }
     }
 

@@ -4,6 +4,7 @@ mod body;
 mod composite;
 mod kinematics;
 mod marker_map;
+mod masses;
 mod outside;
 mod skeleton;
 

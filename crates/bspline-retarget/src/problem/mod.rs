@@ -1,4 +1,6 @@
 //! Problem (15): its variables, its cost, gradient and normal equations.
+//!
+//! `pass.rs` and `correspondence.rs` are methods of [`Problem`] and name it; it names their scratch and their lines: one type in three files.
 
 mod correspondence;
 mod pass;

@@ -12,6 +12,7 @@ use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::{matmul::matmul, triangular_solve};
 use faer::{Accum, MatMut, MatRef, Par, Spec};
 use phiw_dynamics::Lanes;
+use phiw_dynamics::dense::dot;
 
 /// A symmetric matrix \[H, B'; B, C\]; only what lies on or below the diagonal is used.
 #[derive(Clone)]
@@ -260,21 +261,8 @@ fn add_all<const K: usize>(target: &mut [f64], Lanes(factors): Lanes<K>, values:
     }
 }
 
-/// Σ a·b as far as both go.
-#[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let length = a.len().min(b.len());
-    let ((a, a_rest), (b, b_rest)) = (a[..length].as_chunks::<8>(), b[..length].as_chunks::<8>());
-    // Eight sums: one alone would have to wait for itself.
-    let mut sums = [0.0; 8];
-    for (a, b) in a.iter().zip(b) {
-        for k in 0..8 {
-            sums[k] += a[k] * b[k];
-        }
-    }
-    a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>() + sums.iter().sum::<f64>()
-}
-
+/// faer's, in place: the blocks are parts of panels whose columns lie further apart than they are long, and a step of the solver factors hundreds of them
+/// with one allocation. (`phiw_dynamics::dense::Cholesky` owns its triangle.)
 fn cholesky(matrix: MatMut<'_, f64>, stack: &mut MemStack) -> bool {
     cholesky_in_place(matrix, LltRegularization::default(), Par::Seq, stack, Spec::default()).is_ok()
 }

@@ -1,6 +1,7 @@
 //! A damped Gauss-Newton step that stays inside bounds.
 
 use super::Arrow;
+use phiw_dynamics::dense::dot;
 
 /// How often the variables at their bounds are revised for a step.
 const REVISIONS: usize = 3;
@@ -132,8 +133,4 @@ impl BoundedStep {
         }
         total
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

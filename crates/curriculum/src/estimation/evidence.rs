@@ -4,15 +4,11 @@ use super::foresight;
 use super::stored::StoredFactor;
 use crate::candidates::grouped_factor;
 use crate::{CurriculumError, Measured};
-use phiw_identification::Design;
-use phiw_regressor::RegressorError;
+use phiw_identification::{Design, IdentificationError};
 use phiw_regressor::factor::Factor;
 use phiw_regressor::least_squares::{Group, GroupedFactor};
 use phiw_telemetry::Block;
 use serde::{Deserialize, Serialize};
-
-/// Time between two instants at which the motion's sensitivity is looked at \[s\].
-const INSTANT_EVERY_S: f64 = 0.4;
 
 /// Which instants of a log become rows of Φ.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,6 +21,29 @@ pub enum RowsAt {
     /// linear in the motion are taken as they were when the period began, so that its noise is not in them.
     #[default]
     Periods,
+}
+
+/// How logs are reduced.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct EvidenceSettings {
+    /// Which instants become rows.
+    pub rows_at: RowsAt,
+    /// Time between two instants at which the motion's sensitivity to noise is looked at \[s\]. Shorter costs time in each estimate. Default: 0.4, in which the inertia of a robot
+    /// moved by a person changes little.
+    pub instant_every_s: f64,
+}
+
+impl Default for EvidenceSettings {
+    fn default() -> Self {
+        EvidenceSettings { rows_at: RowsAt::default(), instant_every_s: 0.4 }
+    }
+}
+
+impl From<RowsAt> for EvidenceSettings {
+    fn from(rows_at: RowsAt) -> Self {
+        EvidenceSettings { rows_at, ..EvidenceSettings::default() }
+    }
 }
 
 /// One instant of a motion that stands for many.
@@ -42,35 +61,40 @@ pub struct Instant {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(into = "StoredEvidence", try_from = "StoredEvidence")]
 pub struct Evidence {
-    rows_at: RowsAt,
-    factor: GroupedFactor,
-    instants: Vec<Instant>,
+    pub(super) settings: EvidenceSettings,
+    pub(super) factor: GroupedFactor,
+    pub(super) instants: Vec<Instant>,
     /// Of which parameters the columns are those of the periods' beginnings; none of them if it is empty.
-    foreseen: Vec<bool>,
+    pub(super) foreseen: Vec<bool>,
+    /// Rows a second of each torque \[Hz\]; none where they are as dense as those of the motions.
+    pub(super) rate_hz: Option<f64>,
 }
 
 #[derive(Serialize, Deserialize)]
 struct StoredEvidence {
-    rows_at: RowsAt,
+    #[serde(flatten)]
+    settings: EvidenceSettings,
     factor: StoredFactor,
     instants: Vec<Instant>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     foreseen: Vec<bool>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    rate_hz: Option<f64>,
 }
 
 impl From<Evidence> for StoredEvidence {
     fn from(evidence: Evidence) -> Self {
-        let Evidence { rows_at, factor, instants, foreseen } = evidence;
-        StoredEvidence { rows_at, factor: StoredFactor::from(&factor), instants, foreseen }
+        let Evidence { settings, factor, instants, foreseen, rate_hz } = evidence;
+        StoredEvidence { settings, factor: StoredFactor::from(&factor), instants, foreseen, rate_hz }
     }
 }
 
 impl TryFrom<StoredEvidence> for Evidence {
-    type Error = RegressorError;
+    type Error = IdentificationError;
 
-    fn try_from(stored: StoredEvidence) -> Result<Self, RegressorError> {
-        let StoredEvidence { rows_at, factor, instants, foreseen } = stored;
-        Ok(Evidence { rows_at, factor: factor.try_into()?, instants, foreseen })
+    fn try_from(stored: StoredEvidence) -> Result<Self, IdentificationError> {
+        let StoredEvidence { settings, factor, instants, foreseen, rate_hz } = stored;
+        Ok(Evidence { settings, factor: factor.try_into()?, instants, foreseen, rate_hz })
     }
 }
 
@@ -79,21 +103,22 @@ impl Evidence {
     ///
     /// # Errors
     /// None that a design can cause.
-    pub fn none(design: &Design, rows_at: RowsAt) -> Result<Self, CurriculumError> {
+    pub fn none(design: &Design, settings: impl Into<EvidenceSettings>) -> Result<Self, CurriculumError> {
+        let settings = settings.into();
         let group = |row: &phiw_identification::RowLayout| Group {
             parameters: row.parameters.clone(),
             factor: Factor::empty(row.parameters.len() + 1),
         };
         let groups = design.rows().iter().map(group).collect();
         let factor = GroupedFactor::new(design.parameter_count(), groups)?;
-        let mut foreseen = match rows_at {
+        let mut foreseen = match settings.rows_at {
             RowsAt::Stamps => Vec::new(),
-            RowsAt::Periods => foresight::foreseen(design)?,
+            RowsAt::Periods => foresight::foreseen(design),
         };
         if !foreseen.contains(&true) {
             foreseen.clear();
         }
-        Ok(Evidence { rows_at, factor, instants: Vec::new(), foreseen })
+        Ok(Evidence { settings, factor, instants: Vec::new(), foreseen, rate_hz: None })
     }
 
     /// The same for a robot that moves without noise: all columns are those of a period's mean motion.
@@ -106,11 +131,11 @@ impl Evidence {
     /// # Errors
     /// It is not of this robot, or has no derivatives where [`RowsAt`] asks for them.
     pub fn add(&mut self, design: &Design, measured: &Measured) -> Result<(), CurriculumError> {
-        let block = match self.rows_at {
+        let block = match self.settings.rows_at {
             RowsAt::Stamps => measured.at_stamps()?,
             RowsAt::Periods => measured.over_periods(),
         };
-        self.instants.extend(instants(&block, measured.period_s));
+        self.instants.extend(instants(&block, measured.period_s, self.settings.instant_every_s));
         let factor = match self.foreseen.as_slice() {
             [] => grouped_factor(design, block)?,
             foreseen => foresight::factor(design, foreseen, measured)?,
@@ -122,6 +147,11 @@ impl Evidence {
     /// R of \[Φ f\], one for each torque.
     pub fn factor(&self) -> &GroupedFactor {
         &self.factor
+    }
+
+    /// Rows a second of each torque \[Hz\]; none where they are as dense in time as those of the motions to choose from.
+    pub fn rate_hz(&self) -> Option<f64> {
+        self.rate_hz
     }
 
     /// Instants that stand for the motion.
@@ -141,8 +171,8 @@ impl Evidence {
 }
 
 /// Evenly spaced samples, each in the middle of those that it stands for.
-fn instants(block: &Block, period_s: f64) -> Vec<Instant> {
-    let stride = ((INSTANT_EVERY_S / period_s).round() as usize).max(1);
+fn instants(block: &Block, period_s: f64, every_s: f64) -> Vec<Instant> {
+    let stride = ((every_s / period_s).round() as usize).max(1);
     let stretches = block.len().div_ceil(stride);
     let stretch = |index: usize| {
         let end = ((index + 1) * stride).min(block.len());

@@ -59,13 +59,16 @@ impl Estimator for WeightedLeastSquares {
 }
 
 /// The columns that the rows determine, the others taken to the right-hand side with their present values.
-struct Determined {
-    kept: Vec<usize>,
-    factor: GroupedFactor,
+pub(super) struct Determined {
+    /// The parameters that are left.
+    pub kept: Vec<usize>,
+    /// The rows over them.
+    pub factor: GroupedFactor,
 }
 
 impl Determined {
-    fn of(factor: &GroupedFactor, present: &[f64]) -> Result<Self, RegressorError> {
+    /// `present` are the values of all parameters.
+    pub fn of(factor: &GroupedFactor, present: &[f64]) -> Result<Self, RegressorError> {
         let equal = vec![1.0; factor.groups().len()];
         let undetermined = factor.combine(&equal)?.undetermined_columns();
         let kept: Vec<usize> =

@@ -3,6 +3,7 @@
 use super::prior::{Prior, with_prior};
 use super::response::{Response, log_determinant};
 use super::sensitivity::Sensitivity;
+use super::settings::{NewtonSettings, ScoreSettings};
 use super::{Estimate, Estimator, Evidence};
 use crate::robot::spheres;
 use crate::{CurriculumError, RobotModel};
@@ -43,16 +44,22 @@ pub struct MotionLikelihood {
     /// What was believed before anything was measured; −log L then has its square too. None in the paper: right where all parameters are well
     /// excited.
     pub prior: Option<Prior>,
-    /// Newton steps at most.
-    pub most_steps: usize,
-    /// The last step's length in standard deviations of the parameters (all together) at which the minimum counts as found.
-    pub settled: f64,
+    /// How the minimum is found.
+    pub newton: NewtonSettings,
+    /// What effects beside the model are asked.
+    pub score: ScoreSettings,
 }
 
 impl MotionLikelihood {
     /// For torques with this noise \[N·m, N\].
     pub fn new(torque_noise: Vec<f64>) -> Self {
-        MotionLikelihood { torque_noise, standing_on: Vec::new(), prior: None, most_steps: 40, settled: 0.05 }
+        MotionLikelihood {
+            torque_noise,
+            standing_on: Vec::new(),
+            prior: None,
+            newton: NewtonSettings::default(),
+            score: ScoreSettings::default(),
+        }
     }
 
     /// The same for a robot on which these bodies do not move.
@@ -88,7 +95,7 @@ impl MotionLikelihood {
             }
             None => evidence.factor().clone(),
         };
-        Ok(Problem::new(factor, sensitivities, precision))
+        Ok(Problem::new(factor, sensitivities, precision, self.newton))
     }
 }
 
@@ -108,16 +115,17 @@ impl Estimator for MotionLikelihood {
         let mut w = column(present_parameters);
         if problem.log_determinants(&w).is_none() {
             // Random parameters are no bodies; spheres of the same mass at the same place are.
-            let mut start = design.base().from_standard(&spheres(&present.standard))?;
+            let mut start = design.base().from_standard(&spheres(&present.standard, &self.newton))?;
             start.extend(present_parameters[start.len()..].iter().map(|value| value.abs()));
             w = column(&start);
         }
         let mut curvature = Mat::zeros(0, 0);
         let mut freshness = 0;
-        for step in 0..self.most_steps {
+        let settings = &self.newton;
+        for step in 0..settings.most_steps {
             let (gradient, responses) = problem.gradient(&w);
             // The curvature of log det changes slowly: it is the dearest part.
-            if step < 2 || step % 4 == 0 {
+            if step < settings.fresh_steps || step % settings.curvature_every.max(1) == 0 {
                 curvature = problem.log_determinant_curvature(&responses);
                 freshness = step;
             }
@@ -126,7 +134,8 @@ impl Estimator for MotionLikelihood {
             let direction = factor.solve(&gradient);
             let decrement = (0..w.nrows()).map(|k| direction[(k, 0)] * gradient[(k, 0)]).sum::<f64>();
             let moved = problem.line_search(&mut w, &direction, decrement);
-            if !moved || (decrement.max(0.0).sqrt() < self.settled && step > freshness) || decrement < 1e-8 {
+            let settled = decrement.max(0.0).sqrt() < settings.settled && step > freshness;
+            if !moved || settled || decrement < settings.least_decrement {
                 break;
             }
         }
@@ -142,6 +151,10 @@ impl Estimator for MotionLikelihood {
             standard_deviations: (0..w.nrows()).map(deviation).collect(),
             covariance,
         })
+    }
+
+    fn torque_noise(&self) -> Option<&[f64]> {
+        Some(&self.torque_noise)
     }
 
     fn misfit(
@@ -166,16 +179,28 @@ pub(super) struct Problem {
     sensitivities: Vec<Sensitivity>,
     /// 1/σ² of each torque.
     precision: Vec<f64>,
+    settings: NewtonSettings,
 }
 
 impl Problem {
-    pub(super) fn new(factor: GroupedFactor, sensitivities: Vec<Sensitivity>, precision: Vec<f64>) -> Self {
+    pub(super) fn new(
+        factor: GroupedFactor,
+        sensitivities: Vec<Sensitivity>,
+        precision: Vec<f64>,
+        settings: NewtonSettings,
+    ) -> Self {
         let gram = |group: &phiw_regressor::least_squares::Group| {
             let size = group.factor.parameters();
             let r = group.factor.as_mat().get(..size, ..size);
             r.transpose() * r
         };
-        Problem { grams: factor.groups().iter().map(gram).collect(), factor, sensitivities, precision }
+        Problem {
+            grams: factor.groups().iter().map(gram).collect(),
+            factor,
+            sensitivities,
+            precision,
+            settings,
+        }
     }
 
     /// R_j·w − z_j of a torque.
@@ -230,9 +255,9 @@ impl Problem {
         let parameters = self.factor.parameter_count();
         let mut curvature = Mat::zeros(parameters, parameters);
         // A part of the instants is enough for a step's length; all of them count in the gradient.
-        const EVERY: usize = 4;
+        let every = self.settings.instants_every.max(1);
         let all: f64 = self.sensitivities.iter().map(|sensitivity| sensitivity.weight).sum();
-        let chosen = || self.sensitivities.iter().zip(responses).skip(EVERY / 2).step_by(EVERY);
+        let chosen = || self.sensitivities.iter().zip(responses).skip(every / 2).step_by(every);
         let part: f64 = chosen().map(|(sensitivity, _)| sensitivity.weight).sum();
         for (sensitivity, response) in chosen() {
             let Some(response) = response else { continue };
@@ -260,8 +285,9 @@ impl Problem {
             }
         }
         // Directions that nothing determines stay where they are.
+        let [share, all] = self.settings.damping;
         for k in 0..hessian.nrows() {
-            hessian[(k, k)] = hessian[(k, k)] * (1.0 + 1e-10) + 1e-12;
+            hessian[(k, k)] = hessian[(k, k)] * (1.0 + share) + all;
         }
         hessian
     }
@@ -270,10 +296,10 @@ impl Problem {
     fn line_search(&self, w: &mut Mat<f64>, direction: &Mat<f64>, decrement: f64) -> bool {
         let before = self.cost(w);
         let mut length = 1.0;
-        while length > 1e-6 {
+        while length > self.settings.shortest_step {
             let trial = &*w - direction * faer::Scale(length);
             let cost = self.cost(&trial);
-            if cost <= before - 0.1 * length * decrement {
+            if cost <= before - self.settings.sufficient_decrease * length * decrement {
                 *w = trial;
                 return true;
             }

@@ -1,5 +1,6 @@
 //! From what was measured to parameters: equation (4), and estimators that know where the noise comes from.
 
+mod bayesian;
 mod evidence;
 mod foresight;
 mod least_squares;
@@ -8,13 +9,16 @@ mod prior;
 mod response;
 mod score;
 mod sensitivity;
+mod settings;
 mod stored;
 
-pub use evidence::{Evidence, Instant, RowsAt};
+pub use bayesian::{BayesianLeastSquares, LogNoise};
+pub use evidence::{Evidence, EvidenceSettings, Instant, RowsAt};
 pub use least_squares::{LeastSquares, WeightedLeastSquares};
 pub use likelihood::MotionLikelihood;
 pub use prior::Prior;
 pub use score::Gain;
+pub use settings::{NewtonSettings, ScoreSettings};
 
 use crate::triangle::Triangle;
 use crate::{CurriculumError, RobotModel};
@@ -66,6 +70,11 @@ pub trait Estimator: Send + Sync {
         present: &RobotModel,
         present_parameters: &[f64],
     ) -> Result<Estimate, CurriculumError>;
+
+    /// Standard deviation of each torque's noise that it counts on \[N·m, N\]; none from an estimator that is not told.
+    fn torque_noise(&self) -> Option<&[f64]> {
+        None
+    }
 
     /// −log L of parameters, but for a constant that is the same for all models of the same logs; none from an estimator that knows no
     /// likelihood. The smaller, the better the model: effects that were found are confirmed by it.

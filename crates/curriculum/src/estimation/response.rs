@@ -5,8 +5,9 @@
 //! slope: log det A + Σ p(x) over the eigenvalues x of X, p′(x) = (1 − φ₁(x))/x. A forearm behind a large gear has an x of a half. Half a period of friction alone, log(1 + x/2), is then
 //! so far off that a thousand rows take the difference for friction.
 
-use super::sensitivity::{Sensitivity, cholesky, packed, place};
+use super::sensitivity::{Sensitivity, element, packed, place};
 use faer::{Mat, Side};
+use phiw_dynamics::dense::Cholesky;
 
 /// Up to here p is summed as a series; beyond, e^−x is nothing beside 1.
 const LARGE: f64 = 8.0;
@@ -40,12 +41,12 @@ pub(super) struct Response {
     /// Its derivatives by A and by T·F, packed like their columns.
     pub slopes: [Mat<f64>; 2],
     /// Cholesky's factor of A + ½T·F, near enough for a curvature.
-    pub lower: Vec<f64>,
+    pub factor: Cholesky,
 }
 
 /// Inertia and damping of an instant as their eigenvectors see them: Cholesky's factor of A, x and the vectors in its frame.
 struct Modes {
-    lower: Vec<f64>,
+    factor: Cholesky,
     values: Vec<f64>,
     vectors: Mat<f64>,
 }
@@ -54,20 +55,17 @@ impl Modes {
     fn of(sensitivity: &Sensitivity, w: &Mat<f64>) -> Option<Self> {
         let n = sensitivity.directions;
         let (inertia, mut damping) = (&sensitivity.inertia * w, &sensitivity.damping * w);
-        let lower = cholesky(n, inertia.col_as_slice(0))?;
-        reduce(n, &lower, damping.col_as_slice_mut(0));
-        let entry = |row: usize, column: usize| {
-            let scale = if row == column { 1.0 } else { std::f64::consts::FRAC_1_SQRT_2 };
-            scale * damping[(place(row.max(column), row.min(column)), 0)]
-        };
+        let factor = factor(n, inertia.col_as_slice(0))?;
+        reduce(&factor, damping.col_as_slice_mut(0));
+        let reduced = damping.col_as_slice(0);
+        let entry = |row: usize, column: usize| element(reduced, row.max(column), row.min(column));
         let eigen = Mat::from_fn(n, n, entry).self_adjoint_eigen(Side::Lower).ok()?;
         let values = (0..n).map(|mode| eigen.S()[mode]).collect();
-        Some(Modes { lower, values, vectors: eigen.U().to_owned() })
+        Some(Modes { factor, values, vectors: eigen.U().to_owned() })
     }
 
     fn log_determinant(&self) -> f64 {
-        let inertia: f64 = (0..self.values.len()).map(|row| 2.0 * self.lower[place(row, row)].ln()).sum();
-        inertia + self.values.iter().map(|&x| damped(x)).sum::<f64>()
+        self.factor.log_determinant() + self.values.iter().map(|&x| damped(x)).sum::<f64>()
     }
 }
 
@@ -84,13 +82,7 @@ impl Response {
         // Columns of L⁻ᵀU.
         let mut vectors = modes.vectors.clone();
         for mode in 0..n {
-            let vector = vectors.col_as_slice_mut(mode);
-            for row in (0..n).rev() {
-                for below in row + 1..n {
-                    vector[row] -= modes.lower[place(below, row)] * vector[below];
-                }
-                vector[row] /= modes.lower[place(row, row)];
-            }
+            modes.factor.solve_upper(vectors.col_as_slice_mut(mode));
         }
         let sum = |share: &dyn Fn(f64) -> f64| {
             let mut slope = Mat::zeros(packed(n), 1);
@@ -108,7 +100,7 @@ impl Response {
         let both = &sensitivity.inertia * w + &sensitivity.damping * w * faer::Scale(0.5);
         Some(Response {
             slopes: [sum(&|x| 1.0 - x * damped_slope(x)), sum(&damped_slope)],
-            lower: cholesky(n, both.col_as_slice(0))?,
+            factor: factor(n, both.col_as_slice(0))?,
         })
     }
 
@@ -123,36 +115,34 @@ impl Response {
     pub fn reduced(&self, sensitivity: &Sensitivity) -> Mat<f64> {
         let mut columns = &sensitivity.inertia + &sensitivity.damping * faer::Scale(0.5);
         for parameter in 0..columns.ncols() {
-            reduce(sensitivity.directions, &self.lower, columns.col_as_slice_mut(parameter));
+            reduce(&self.factor, columns.col_as_slice_mut(parameter));
         }
         columns
     }
 }
 
-fn solve_lower(n: usize, lower: &[f64], x: &mut [f64]) {
-    for row in 0..n {
-        let known: f64 = (0..row).map(|k| lower[place(row, k)] * x[k]).sum();
-        x[row] = (x[row] - known) / lower[place(row, row)];
-    }
+/// Cholesky's factor of a packed column; none if it is not positive definite.
+fn factor(n: usize, column: &[f64]) -> Option<Cholesky> {
+    Cholesky::of(n, |row, col| element(column, row, col))
 }
 
 /// S → L⁻¹ S L⁻ᵀ, packed, in place.
-fn reduce(n: usize, lower: &[f64], column: &mut [f64]) {
+fn reduce(factor: &Cholesky, column: &mut [f64]) {
+    let n = factor.size();
     if column.iter().all(|value| *value == 0.0) {
         return;
     }
     let mut full = vec![0.0; n * n];
     for row in 0..n {
         for col in 0..=row {
-            let scale = if row == col { 1.0 } else { std::f64::consts::FRAC_1_SQRT_2 };
-            let value = scale * column[place(row, col)];
+            let value = element(column, row, col);
             full[row * n + col] = value;
             full[col * n + row] = value;
         }
     }
     // Rows are columns of a symmetric matrix: solve each, transpose, solve each again.
     for _ in 0..2 {
-        full.chunks_exact_mut(n).for_each(|row| solve_lower(n, lower, row));
+        full.chunks_exact_mut(n).for_each(|row| factor.solve_lower(row));
         for row in 0..n {
             for col in 0..row {
                 full.swap(row * n + col, col * n + row);

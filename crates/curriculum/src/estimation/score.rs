@@ -13,6 +13,7 @@ use crate::{CurriculumError, Measured, Robot, RobotModel};
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, Mat, Par, Side};
+use phiw_dynamics::dense::{Cholesky, dot};
 use phiw_identification::{Design, EffectSpec, RowLayout};
 use std::ops::Range;
 
@@ -30,13 +31,6 @@ pub struct Gain {
     pub merit: f64,
 }
 
-/// Price of a parameter: half the logarithm of the rows of one torque in a minute (BIC, Schwarz 1978).
-const PRICE: f64 = 4.0;
-
-/// Share of a column's square that the model must leave of it; of less, nothing can be said.
-const LEFT: f64 = 1e-3;
-/// Of so many instants one counts in a curvature.
-const EVERY: usize = 4;
 /// Rows that are multiplied at a time.
 const CHUNK: usize = 256;
 
@@ -71,7 +65,7 @@ impl MotionLikelihood {
 
         let design = robot.design_beside(model, candidates)?;
         let mut score = Score::new(&design, present.effects().len(), w, precision);
-        let foreseen = foresight::foreseen(&design)?;
+        let foreseen = foresight::foreseen(&design);
         for log in logs {
             foresight::rows(&design, &foreseen, log, |row| {
                 score.add(row);
@@ -80,7 +74,7 @@ impl MotionLikelihood {
             score.flush();
         }
         self.add_determinants(robot, model, candidates, &foreseen, &evidence, &responses, &mut score)?;
-        let ahead = foresight::looking_ahead(&design)?;
+        let ahead = foresight::looking_ahead(&design);
 
         let (mut own_score, mut cross) = (gradient, std::mem::replace(&mut score.cross, Mat::zeros(0, 0)));
         solve_lower_triangular_in_place(own.L(), own_score.as_mut(), Par::Seq);
@@ -99,13 +93,13 @@ impl MotionLikelihood {
             let squares = range.clone().map(|a| score.own[index][(a - range.start, a - range.start)]);
             let s = Mat::from_fn(range.len(), range.len(), |a, b| left(range.start + a, range.start + b));
             let g: Vec<f64> = range.clone().map(slope).collect();
-            let (gain, parameters) = newton(&s, &g, &squares.collect::<Vec<_>>())?;
+            let (gain, parameters) = newton(&s, &g, &squares.collect::<Vec<_>>(), self.score.least_left)?;
             let bounds = design.effects()[score.effects + index].parameters();
             let within = bounds.iter().zip(&parameters).all(|(parameter, value)| {
                 let (lower, upper) = parameter.bounds;
                 (lower..=upper).contains(value)
             });
-            let merit = gain - PRICE * parameters.len() as f64;
+            let merit = gain - self.score.parameter_price * parameters.len() as f64;
             within.then(|| Gain { effect: effect.clone(), gain, parameters, merit })
         };
         Ok(candidates.iter().enumerate().map(gain).collect())
@@ -137,10 +131,11 @@ impl MotionLikelihood {
         };
         let present = score.present;
         let mut curvature = Mat::zeros(design.parameter_count(), places.len());
+        let every = self.score.instants_every.max(1);
         let instants = || evidence.instants().iter().zip(responses).enumerate();
         let all: f64 = instants().map(|(_, (instant, _))| instant.weight).sum();
         let part: f64 =
-            instants().skip(EVERY / 2).step_by(EVERY).map(|(_, (instant, _))| instant.weight).sum();
+            instants().skip(every / 2).step_by(every).map(|(_, (instant, _))| instant.weight).sum();
         for (index, (instant, response)) in instants() {
             let Some(response) = response else { continue };
             let sensitivity = Sensitivity::of(&design, instant, &self.standing_on, still)?;
@@ -149,7 +144,7 @@ impl MotionLikelihood {
                 score.gradient[parameter] -= sensitivity.weight * slopes[(place, 0)];
             }
             // A part of the instants is enough for a curvature, which is the dearest part.
-            if index % EVERY == EVERY / 2 {
+            if index % every == every / 2 {
                 let (reduced, weight) = (response.reduced(&sensitivity), sensitivity.weight * all / part);
                 let added = reduced.get(.., present..);
                 matmul(&mut curvature, Accum::Add, reduced.transpose(), added, weight, Par::Seq);
@@ -292,30 +287,16 @@ impl<'a> Score<'a> {
     }
 }
 
-/// ½gᵀS⁻¹g and −S⁻¹g; none where the model leaves too little of a column (`squares` are those of the whole columns).
-fn newton(s: &Mat<f64>, g: &[f64], squares: &[f64]) -> Option<(f64, Vec<f64>)> {
-    let size = g.len();
-    let mut lower = Mat::<f64>::zeros(size, size);
-    let mut reduced = vec![0.0; size];
-    for row in 0..size {
-        for column in 0..=row {
-            let known: f64 = (0..column).map(|k| lower[(row, k)] * lower[(column, k)]).sum();
-            let rest = s[(row, column)] - known;
-            if row != column {
-                lower[(row, column)] = rest / lower[(column, column)];
-            } else if rest > LEFT * squares[row] {
-                lower[(row, row)] = rest.sqrt();
-            } else {
-                return None;
-            }
-        }
-        let known: f64 = (0..row).map(|k| lower[(row, k)] * reduced[k]).sum();
-        reduced[row] = (g[row] - known) / lower[(row, row)];
+/// ½gᵀS⁻¹g and −S⁻¹g; none where the model leaves less than `least_left` of a column (`squares` are those of the whole columns).
+fn newton(s: &Mat<f64>, g: &[f64], squares: &[f64], least_left: f64) -> Option<(f64, Vec<f64>)> {
+    let factor = Cholesky::of(g.len(), |row, column| s[(row, column)])?;
+    let leaves_enough = |(row, square): (usize, &f64)| factor.entry(row, row).powi(2) > least_left * square;
+    if !squares.iter().enumerate().all(leaves_enough) {
+        return None;
     }
-    let gain = 0.5 * reduced.iter().map(|value| value * value).sum::<f64>();
-    for row in (0..size).rev() {
-        let known: f64 = (row + 1..size).map(|k| lower[(k, row)] * reduced[k]).sum();
-        reduced[row] = (reduced[row] - known) / lower[(row, row)];
-    }
-    Some((gain, reduced.into_iter().map(|value| -value).collect()))
+    let mut step = g.to_vec();
+    factor.solve_lower(&mut step);
+    let gain = 0.5 * dot(&step, &step);
+    factor.solve_upper(&mut step);
+    Some((gain, step.into_iter().map(|value| -value).collect()))
 }

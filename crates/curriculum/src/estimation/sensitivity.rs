@@ -37,6 +37,12 @@ pub(super) fn place(row: usize, column: usize) -> usize {
     row * (row + 1) / 2 + column
 }
 
+/// The element of a symmetric matrix in a packed column, in which the elements beside the diagonal are times √2; `row` ≥ `column`.
+pub(super) fn element(packed: &[f64], row: usize, column: usize) -> f64 {
+    let scale = if row == column { 1.0 } else { std::f64::consts::FRAC_1_SQRT_2 };
+    scale * packed[place(row, column)]
+}
+
 impl Sensitivity {
     /// By evaluating the design's columns around the instant: exact in the acceleration, in which they are linear. `standing` bodies do not move.
     /// Columns that `foreseen` has are of the period's beginning, and do not move with its noise.
@@ -110,27 +116,4 @@ fn around(directions: &Mat<f64>, instant: &Instant) -> Vec<[Vec<f64>; 3]> {
     });
     let changed = changed.map(|(signal, direction, change)| with(signal, direction, change));
     std::iter::once(instant.state.clone()).chain(changed).collect()
-}
-
-/// Cholesky's factor of a symmetric matrix in a packed column, elements beside the diagonal times √2: lower, row by row. None if it is not
-/// positive definite.
-pub(super) fn cholesky(n: usize, column: &[f64]) -> Option<Vec<f64>> {
-    let mut lower = vec![0.0; packed(n)];
-    for row in 0..n {
-        for col in 0..=row {
-            let scale = if row == col { 1.0 } else { std::f64::consts::FRAC_1_SQRT_2 };
-            let mut sum = scale * column[place(row, col)];
-            for k in 0..col {
-                sum -= lower[place(row, k)] * lower[place(col, k)];
-            }
-            lower[place(row, col)] = if row != col {
-                sum / lower[place(col, col)]
-            } else if sum > 0.0 {
-                sum.sqrt()
-            } else {
-                return None;
-            };
-        }
-    }
-    Some(lower)
 }

@@ -55,13 +55,43 @@ impl Question<'_> {
     }
 }
 
-/// The allowed motion with the smallest `cost`, the first of equals; costs that are not a number come last.
+/// A motion and the number by which it is compared with others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scored {
+    /// Index of the motion.
+    pub motion: usize,
+    /// The number; not finite where it can not be computed.
+    pub score: f64,
+}
+
+/// Which end of the scores is the best.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Best {
+    /// The smallest score.
+    Smallest,
+    /// The largest score.
+    Largest,
+}
+
+/// The motion with the best score, and the next best. Of equals the one with the lower index comes first; scores that are not a number come last. None of no motions.
+pub fn decide(motions: &[Scored], best: Best) -> Option<Choice> {
+    let mut order = motions.to_vec();
+    order.sort_by(|a, b| {
+        let by_score = match best {
+            Best::Smallest => a.score.total_cmp(&b.score),
+            Best::Largest => b.score.total_cmp(&a.score),
+        };
+        a.score.is_nan().cmp(&b.score.is_nan()).then(by_score).then(a.motion.cmp(&b.motion))
+    });
+    Some(Choice {
+        motion: order.first()?.motion,
+        merit: order.first().map(|best| best.score),
+        runner_up: order.get(1).map(|next| (next.motion, next.score)),
+    })
+}
+
+/// The allowed motion with the smallest `cost`.
 fn smallest(allowed: &[usize], cost: impl Fn(usize) -> f64) -> Choice {
-    let mut costs: Vec<(f64, usize)> = allowed.iter().map(|&motion| (cost(motion), motion)).collect();
-    costs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    Choice {
-        motion: costs.first().map_or(0, |best| best.1),
-        merit: costs.first().map(|best| best.0),
-        runner_up: costs.get(1).map(|next| (next.1, next.0)),
-    }
+    let scored: Vec<Scored> = allowed.iter().map(|&motion| Scored { motion, score: cost(motion) }).collect();
+    decide(&scored, Best::Smallest).unwrap_or(Choice { motion: 0, merit: None, runner_up: None })
 }

@@ -1,8 +1,9 @@
 //! Equation (11): the motion that makes cond of the stack smallest.
 
 use super::{Choice, Question, Selection, smallest};
-use crate::triangle::{Triangle, dot};
+use crate::triangle::Triangle;
 use faer::{Mat, Side};
+use phiw_dynamics::dense::dot;
 use rand_chacha::ChaCha8Rng;
 
 /// Right singular vectors of what has been measured that bound a candidate's cond from below.

@@ -3,6 +3,7 @@
 use super::Feet;
 use crate::{Controller, CurriculumError, Robot, RobotModel};
 use phiw_dynamics::{DimensionError, Tree, Workspace, check_size};
+use phiw_effects::JointProperty;
 use phiw_plant::{ComputedTorque, Gains, TorqueModel};
 
 /// The joints of a virtual base come first.
@@ -28,8 +29,9 @@ impl Controller for StandingFeedForward {
         let mut viscous = vec![0.0; size];
         for effect in &model.effects {
             let joint = effect.spec.joints.first().and_then(|joint| tree.joint_index(joint));
-            if let ("viscous_friction", Some(joint), [value]) =
-                (effect.spec.kind.as_str(), joint, effect.parameters.as_slice())
+            let property = robot.catalogue().joint_property(&effect.spec);
+            if let (Some(JointProperty::Damping), Some(joint), [value]) =
+                (property, joint, effect.parameters.as_slice())
             {
                 viscous[joint] += value;
             }

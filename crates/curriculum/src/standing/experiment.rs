@@ -2,7 +2,7 @@
 
 use super::{Feet, VIRTUAL_JOINTS, base_coordinates};
 use crate::{CurriculumError, Experiment, Measured, Motion, Robot, RobotModel, SimulatedRobot, Trial};
-use phiw_plant::History;
+use phiw_plant::{History, Sensors};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -18,9 +18,16 @@ pub struct WrenchNoise {
     pub moment_nm: f64,
 }
 
-/// Speeds up to which a foot counts as still: of its sole \[m/s\], and turning \[rad/s\]. A foot of a kilogram that goes through them within a
-/// millisecond takes 5 N.
-const STILL: [f64; 2] = [5e-3, 5e-2];
+impl WrenchNoise {
+    /// Standard deviation of the noise in the rows of the virtual joints \[N, N·m\], for so many feet with `lever_m` \[m\] between their soles and
+    /// the base: by this lever the forces' noise is noise of the moments at the base.
+    pub fn at_base(&self, feet: usize, lever_m: f64) -> [f64; BASE] {
+        let feet = (feet as f64).sqrt();
+        let force = feet * self.force_n;
+        let moment = feet * self.moment_nm.hypot(lever_m * self.force_n);
+        [force, force, force, moment, moment, moment]
+    }
+}
 
 /// A robot that stands on its feet, over any backend with contacts.
 ///
@@ -46,6 +53,10 @@ impl Experiment for StandingRobot {
         motion: &Motion,
         random: &mut ChaCha8Rng,
     ) -> Result<Trial, CurriculumError> {
+        if self.plant.sensors != Sensors::exact(self.plant.timing.control_period_s) {
+            let problem = "motors and base of a robot on its feet are measured exactly: leave its sensors at Sensors::exact, and set wrench_noise".to_owned();
+            return Err(CurriculumError::Motion { name: "as measured".to_owned(), problem });
+        }
         let run = self.plant.run(robot, model, &of_motors(motion)?, random)?;
         let mut noise = ChaCha8Rng::seed_from_u64(random.random());
         Ok(Trial {
@@ -125,7 +136,12 @@ impl StandingRobot {
         for index in 0..boundaries.len() {
             let own = index * joints..(index + 1) * joints;
             let speeds = self.feet.speeds(&measured.q[own.clone()], &measured.qd[own])?;
-            rest.push(speeds.iter().zip(STILL).all(|(speed, still)| *speed <= still));
+            rest.push(
+                speeds
+                    .iter()
+                    .zip([self.plant.stillness.foot_speed, self.plant.stillness.foot_turning])
+                    .all(|(speed, still)| *speed <= still),
+            );
         }
         measured.still =
             (0..rest.len()).map(|row| rest[row] && rest.get(row + 1).copied().unwrap_or(true)).collect();

@@ -3,7 +3,7 @@
 use crate::CurriculumError;
 use faer::Mat;
 use faer::prelude::Solve;
-use phiw_dynamics::{BodyMotion, DimensionError, Foot, Mat3, Placement, Tree, Vec3, check_size};
+use phiw_dynamics::{BodyMotion, DimensionError, Foot, Mat3, Placement, Tree, Vec3, check_index, check_size};
 
 /// Newton steps at most, and the gap between sole and floor at which the loop counts as closed \[m, rad\].
 const MOST_STEPS: usize = 30;
@@ -37,10 +37,11 @@ impl Feet {
     /// `feet` (their bodies counted in `tree`, which has virtual joints) where the configuration `q` puts them.
     ///
     /// # Errors
-    /// The configuration does not fit the tree.
+    /// The configuration does not fit the tree, or a foot's body is none of it.
     pub fn new(tree: &Tree, feet: &[Foot], q: &[f64]) -> Result<Self, DimensionError> {
         let mut placements = vec![Placement::identity(); tree.bodies().len()];
         tree.forward_kinematics(q, &mut placements)?;
+        feet.iter().try_for_each(|foot| check_index("body", foot.body, placements.len()))?;
         let standing = |foot: &Foot| {
             let sum = foot.sole.iter().fold(Vec3::zero(), |sum, &corner| sum + Vec3(corner));
             let sole = sum.scale(1.0 / foot.sole.len().max(1) as f64);

@@ -3,10 +3,12 @@
 mod controller;
 mod experiment;
 mod feet;
+mod legs;
 mod virtual_base;
 
 pub use controller::StandingFeedForward;
 pub use experiment::{StandingRobot, WrenchNoise};
 pub(crate) use feet::free_directions;
 pub use feet::{Feet, StandingFoot};
+pub use legs::{Legs, StandingStates};
 pub use virtual_base::{VIRTUAL_JOINTS, base_coordinates, with_virtual_base};

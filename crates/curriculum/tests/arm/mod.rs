@@ -6,7 +6,7 @@ use phiw_curriculum::selection::SmallestCondition;
 use phiw_curriculum::*;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{AnalyticBackend, Tree, World};
-use phiw_plant::{Effect, Friction, Gains, MultiSine, Reference, Timing};
+use phiw_plant::{Effect, Friction, Gains, MultiSine, Reference, Sensors, Timing};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -69,8 +69,10 @@ impl Arm {
             effects: self.viscous.iter().enumerate().map(friction).collect(),
             controller: Box::new(FeedForward { gains }),
             actuator_noise: self.noise,
+            sensors: Sensors::exact(0.01),
             timing: Timing { longest_step_s: 1e-3, settle_s: 0.2, ..Timing::default() },
             fall_tilt_rad: 0.3,
+            stillness: Default::default(),
             build: Box::new(|tree, world| Ok(Box::new(AnalyticBackend::in_world(tree.clone(), world)?))),
         }
     }
@@ -101,6 +103,7 @@ impl Arm {
             growth: None,
             end,
             rows_at: RowsAt::Periods,
+            settings: CurriculumSettings::default(),
         }
     }
 }

@@ -1,12 +1,11 @@
 //! The tree from links and joints: depth first, what is fixed merged into what moves.
 
 use super::movement::Movement;
-use super::source::Declared;
+use super::robot::{Inertial, Joint, JointKind, Link, Robot};
 use super::topology::Topology;
 use super::{Finding, UrdfError, UrdfReading};
 use super::{inertial, joint};
 use crate::{Body, Inertia, JointType, Limits, PARAMETERS_PER_BODY, Placement, Tree, Vec3};
-use urdf_rs::{Joint, Robot};
 
 /// Gravity of a robot whose URDF's z axis points up \[m/s²\].
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
@@ -32,7 +31,6 @@ struct Follower {
 struct Assembly<'a> {
     robot: &'a Robot,
     topology: &'a Topology,
-    declared: Declared,
     bodies: Vec<Body>,
     inertias: Vec<Inertia<f64>>,
     velocity_size: usize,
@@ -46,7 +44,6 @@ struct Assembly<'a> {
 
 pub(super) fn assemble(
     robot: &Robot,
-    mut declared: Declared,
     topology: &Topology,
     movements: &[Movement],
     floating_base: bool,
@@ -56,8 +53,7 @@ pub(super) fn assemble(
     let mut assembly = Assembly {
         robot,
         topology,
-        findings: std::mem::take(&mut declared.findings),
-        declared,
+        findings: incomplete_inertials(robot),
         bodies: Vec::new(),
         inertias: Vec::new(),
         velocity_size: 0,
@@ -77,6 +73,16 @@ pub(super) fn assemble(
     assembly.finish()
 }
 
+fn incomplete_inertials(robot: &Robot) -> Vec<Finding> {
+    let incomplete = |link: &Link| match &link.inertial {
+        Some(inertial) if !inertial.missing.is_empty() => {
+            Some(Finding::IncompleteInertial { link: link.name.clone(), missing: inertial.missing.clone() })
+        }
+        _ => None,
+    };
+    robot.links.iter().filter_map(incomplete).collect()
+}
+
 /// The floating joint, which must be alone behind the root link.
 fn floating_joint(
     robot: &Robot,
@@ -84,12 +90,13 @@ fn floating_joint(
     movements: &[Movement],
 ) -> Result<Option<usize>, UrdfError> {
     let is_floating = |&joint: &usize| {
-        robot.joints[joint].joint_type == urdf_rs::JointType::Floating && movements[joint] == Movement::Free
+        robot.joints[joint].kind == JointKind::Floating && movements[joint] == Movement::Free
     };
     match (0..robot.joints.len()).find(is_floating) {
-        Some(joint) if topology.joints_of[topology.root] != [joint] => {
-            Err(UrdfError::FloatingNotAtRoot { joint: robot.joints[joint].name.clone() })
-        }
+        Some(joint) if topology.joints_of[topology.root] != [joint] => Err(UrdfError::FloatingNotAtRoot {
+            line: robot.joints[joint].line,
+            joint: robot.joints[joint].name.clone(),
+        }),
         found => Ok(found),
     }
 }
@@ -97,10 +104,13 @@ fn floating_joint(
 impl Assembly<'_> {
     fn inertia(&mut self, link: usize) -> Inertia<f64> {
         let link = &self.robot.links[link];
-        if self.declared.inertials.contains(&link.name) {
-            self.findings.extend(inertial::inspect(link));
+        match &link.inertial {
+            Some(declared) => {
+                self.findings.extend(inertial::inspect(&link.name, declared));
+                inertial::inertia(declared)
+            }
+            None => inertial::inertia(&Inertial::default()),
         }
-        inertial::inertia(link)
     }
 
     fn push_children(&mut self, link: usize, body: Option<usize>, placement: Placement<f64>) {
@@ -150,7 +160,9 @@ impl Assembly<'_> {
                 self.push_children(child, next.body, placement);
             }
             (movement, Some(body)) => self.add_body(next.joint, child, movement, body),
-            (_, None) => return Err(UrdfError::FloatingNotAtRoot { joint: joint.name.clone() }),
+            (_, None) => {
+                return Err(UrdfError::FloatingNotAtRoot { line: joint.line, joint: joint.name.clone() });
+            }
         }
         Ok(())
     }
@@ -159,11 +171,8 @@ impl Assembly<'_> {
         let joint = &self.robot.joints[joint_index];
         let index = self.bodies.len();
         body.link = self.robot.links[child].name.clone();
-        let given = self.declared.limits.get(&joint.name).map_or(&[][..], Vec::as_slice);
-        body.limits = joint::limits(joint, given, &mut self.findings);
-        if let Some(dynamics) = &joint.dynamics {
-            (body.damping, body.friction) = (dynamics.damping, dynamics.friction);
-        }
+        body.limits = joint::limits(joint, &mut self.findings);
+        (body.damping, body.friction) = (joint.damping, joint.friction);
         if let Movement::Follows { leader, ratio, offset } = movement {
             (body.mimic, body.ratio, body.offset) = (true, ratio, offset);
             self.followers.push(Follower { body: index, leader });
@@ -231,11 +240,11 @@ impl Assembly<'_> {
 
 /// The type of a joint with a single position.
 fn joint_type(joint: &Joint) -> Option<JointType> {
-    match joint.joint_type {
-        urdf_rs::JointType::Revolute => Some(JointType::Revolute),
-        urdf_rs::JointType::Continuous => Some(JointType::Continuous),
-        urdf_rs::JointType::Prismatic => Some(JointType::Prismatic),
-        _ => None,
+    match joint.kind {
+        JointKind::Revolute => Some(JointType::Revolute),
+        JointKind::Continuous => Some(JointType::Continuous),
+        JointKind::Prismatic => Some(JointType::Prismatic),
+        JointKind::Fixed | JointKind::Floating | JointKind::Planar | JointKind::Spherical => None,
     }
 }
 

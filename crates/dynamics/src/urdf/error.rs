@@ -46,11 +46,8 @@ pub enum UrdfError {
         "this is a xacro template, not yet a URDF: expand it first (`xacro robot.urdf.xacro > robot.urdf`)"
     )]
     Xacro,
-    /// The XML is a `<robot>`, but something required is missing or is not a number.
-    #[error("not a valid URDF: {0}")]
-    Malformed(#[from] urdf_rs::UrdfError),
     /// An element lacks a part without which it means nothing.
-    #[error("line {line}: {element} lacks {lacks}")]
+    #[error("line {line}: {element} lacks {lacks}: add it")]
     Incomplete {
         /// Where it starts.
         line: u32,
@@ -59,8 +56,26 @@ pub enum UrdfError {
         /// What it lacks.
         lacks: &'static str,
     },
-    /// An attribute that should hold one number, or three, does not.
-    #[error("line {line}, {element}: {attribute}=\"{value}\" is not {expected}")]
+    /// An element has a part twice that it can have once.
+    #[error("line {line}: {element} has a second <{tag}>: remove one of them")]
+    Repeated {
+        /// Where the second one starts.
+        line: u32,
+        /// The link or joint, with its name.
+        element: String,
+        /// The part.
+        tag: &'static str,
+    },
+    /// An `<origin>` declares its rotation in both ways.
+    #[error("line {line}: an <origin> of {element} has both rpy and quat_xyzw: remove one of them")]
+    TwoRotations {
+        /// Where the `<origin>` starts.
+        line: u32,
+        /// The link or joint, with its name.
+        element: String,
+    },
+    /// An attribute that should hold numbers does not.
+    #[error("line {line}, {element}: {attribute}=\"{value}\" is not {expected}: correct it, as in {example}")]
     NotANumber {
         /// Where the attribute's element starts.
         line: u32,
@@ -70,12 +85,16 @@ pub enum UrdfError {
         attribute: &'static str,
         /// Its value.
         value: String,
-        /// `a number` or `three numbers`.
+        /// What it should be, such as `three numbers`.
         expected: &'static str,
+        /// How that is written, the element around it.
+        example: String,
     },
     /// Two links or two joints share a name.
-    #[error("two {kind}s are called `{name}`: rename one")]
+    #[error("line {line}: two {kind}s are called `{name}`: rename one")]
     Duplicate {
+        /// Where the second one starts.
+        line: u32,
         /// `link` or `joint`.
         kind: &'static str,
         /// The shared name.
@@ -83,10 +102,12 @@ pub enum UrdfError {
     },
     /// A joint names a link that the file does not define.
     #[error(
-        "joint `{joint}` names the link `{link}`, which the URDF does not define{}",
+        "line {line}: joint `{joint}` names the link `{link}`, which the URDF does not define{}",
         did_you_mean(nearest)
     )]
     UnknownLink {
+        /// Where the joint starts.
+        line: u32,
         /// The joint.
         joint: String,
         /// The link it names.
@@ -96,9 +117,11 @@ pub enum UrdfError {
     },
     /// A link is the child of two joints.
     #[error(
-        "link `{link}` is the child of both joint `{first}` and joint `{second}`: only trees can be read, cut the loop at one of them"
+        "line {line}: link `{link}` is the child of both joint `{first}` and joint `{second}`: only trees can be read, cut the loop at one of them"
     )]
     TwoParents {
+        /// Where the second joint starts.
+        line: u32,
         /// The link.
         link: String,
         /// One joint.
@@ -134,10 +157,12 @@ pub enum UrdfError {
     },
     /// A `<mimic>` follows a joint that is not in the URDF.
     #[error(
-        "joint `{joint}` mimics `{leader}`, but the URDF has no joint of that name{}",
+        "line {line}: joint `{joint}` mimics `{leader}`, but the URDF has no joint of that name{}",
         did_you_mean(nearest)
     )]
     UnknownLeader {
+        /// Where the joint starts.
+        line: u32,
         /// The follower.
         joint: String,
         /// The joint that it names.
@@ -146,8 +171,12 @@ pub enum UrdfError {
         nearest: Option<String>,
     },
     /// A `<mimic>` follows a joint without a single position.
-    #[error("joint `{joint}` mimics `{leader}`, which is {kind} and has no single position to follow")]
+    #[error(
+        "line {line}: joint `{joint}` mimics `{leader}`, which is {kind} and has no single position to follow: remove the <mimic>"
+    )]
     LeaderWithoutPosition {
+        /// Where the joint starts.
+        line: u32,
         /// The follower.
         joint: String,
         /// The leader.
@@ -156,16 +185,32 @@ pub enum UrdfError {
         kind: &'static str,
     },
     /// `<mimic>` joints follow each other in a circle.
-    #[error("joint `{joint}` mimics itself, directly or through others")]
+    #[error("line {line}: joint `{joint}` mimics itself, directly or through others: remove one <mimic>")]
     MimicLoop {
+        /// Where the joint starts.
+        line: u32,
         /// A joint of the circle.
         joint: String,
     },
     /// A joint type that cannot be modelled.
     #[error(
-        "joint `{joint}` is of the type {kind}, which is not supported: hold it (`--hold {joint}`) or make it two or three simple joints"
+        "line {line}: joint `{joint}` is of the type {kind}, which is not supported: hold it (`--hold {joint}`) or make it two or three simple joints"
     )]
     UnsupportedJoint {
+        /// Where the joint starts.
+        line: u32,
+        /// The joint.
+        joint: String,
+        /// Its type.
+        kind: String,
+    },
+    /// A joint type that URDF does not have.
+    #[error(
+        "line {line}: joint `{joint}` is of the type {kind}, which is not supported: URDF has revolute, continuous, prismatic, fixed, floating and planar"
+    )]
+    UnknownType {
+        /// Where the joint starts.
+        line: u32,
         /// The joint.
         joint: String,
         /// Its type.
@@ -173,21 +218,27 @@ pub enum UrdfError {
     },
     /// A floating joint elsewhere than alone behind the root link.
     #[error(
-        "joint `{joint}` is floating but not the only joint of the root link: only a base can float; hold it or make it fixed"
+        "line {line}: joint `{joint}` is floating but not the only joint of the root link: only a base can float; hold it or make it fixed"
     )]
     FloatingNotAtRoot {
+        /// Where the joint starts.
+        line: u32,
         /// The joint.
         joint: String,
     },
     /// A moving joint whose axis is zero.
-    #[error("the axis of joint `{joint}` is zero: give it a direction")]
+    #[error("line {line}: the axis of joint `{joint}` is zero: give it a direction")]
     ZeroAxis {
+        /// Where the joint starts.
+        line: u32,
         /// The joint.
         joint: String,
     },
     /// NaN, infinity, or a number beyond any robot.
-    #[error("{kind} `{name}`: {field} is not a finite number that a robot can have")]
+    #[error("{}{kind} `{name}`: {field} is not a finite number that a robot can have", at(*line))]
     NotFinite {
+        /// Where the link or joint starts, if it is the file that says so.
+        line: Option<u32>,
         /// `link` or `joint`.
         kind: &'static str,
         /// Its name.
@@ -218,6 +269,10 @@ pub(super) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> O
         .filter(|(similarity, _)| *similarity > 0.5)
         .max_by(|(a, _), (b, _)| a.total_cmp(b))
         .map(|(_, candidate)| candidate.to_owned())
+}
+
+fn at(line: Option<u32>) -> String {
+    line.map_or_else(String::new, |line| format!("line {line}, "))
 }
 
 fn did_you_mean(nearest: &Option<String>) -> String {

@@ -1,41 +1,42 @@
 //! `<inertial>`: to standard parameters, and whether a real body can have it.
 
 use super::joint::{is_usable, is_usable_pose, pose};
+use super::robot::{Inertial, Link};
 use super::{Finding, UrdfError};
 use crate::{Inertia, Mat3, Placement};
-use urdf_rs::Link;
 
 /// Share of the trace by which rounding in the file may break positivity or the triangle inequality.
 const ROUNDING: f64 = 1e-6;
 
 /// An error if any number of the link's inertial is NaN, infinite or larger than any robot's.
 pub(super) fn check_finite(link: &Link) -> Result<(), UrdfError> {
-    let i = &link.inertial.inertia;
+    let Some(inertial) = &link.inertial else { return Ok(()) };
     let fields = [
-        ("its mass", is_usable(link.inertial.mass.value)),
-        ("its inertia", [i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz].iter().all(|&x| is_usable(x))),
-        ("the origin of its inertial", is_usable_pose(&link.inertial.origin)),
+        ("its mass", is_usable(inertial.mass)),
+        ("its inertia", inertial.inertia.iter().all(|&x| is_usable(x))),
+        ("the origin of its inertial", is_usable_pose(&inertial.origin)),
     ];
     match fields.into_iter().find(|(_, fine)| !fine) {
-        Some((field, _)) => Err(UrdfError::NotFinite { kind: "link", name: link.name.clone(), field }),
+        Some((field, _)) => {
+            Err(UrdfError::NotFinite { line: Some(link.line), kind: "link", name: link.name.clone(), field })
+        }
         None => Ok(()),
     }
 }
 
-/// The link's inertia in its own frame.
-pub(super) fn inertia(link: &Link) -> Inertia<f64> {
-    let Placement { rotation, translation } = pose(&link.inertial.origin);
+/// The inertia in the link's own frame.
+pub(super) fn inertia(inertial: &Inertial) -> Inertia<f64> {
+    let Placement { rotation, translation } = pose(&inertial.origin);
     Inertia::from_center_of_mass(
-        link.inertial.mass.value,
+        inertial.mass,
         translation,
-        rotation * tensor(link) * rotation.transpose(),
+        rotation * tensor(inertial) * rotation.transpose(),
     )
 }
 
-/// What is wrong with an `<inertial>`.
-pub(super) fn inspect(link: &Link) -> Vec<Finding> {
-    let (mass, tensor) = (link.inertial.mass.value, tensor(link));
-    let link = link.name.clone();
+/// What is wrong with a link's `<inertial>`.
+pub(super) fn inspect(link: &str, inertial: &Inertial) -> Vec<Finding> {
+    let (mass, tensor, link) = (inertial.mass, tensor(inertial), link.to_owned());
     let mut findings = Vec::new();
     let zero = tensor.0.as_flattened().iter().all(|&x| x == 0.0);
     if mass < 0.0 {
@@ -57,7 +58,7 @@ pub(super) fn inspect(link: &Link) -> Vec<Finding> {
     findings
 }
 
-fn tensor(link: &Link) -> Mat3<f64> {
-    let i = &link.inertial.inertia;
-    Mat3([[i.ixx, i.ixy, i.ixz], [i.ixy, i.iyy, i.iyz], [i.ixz, i.iyz, i.izz]])
+fn tensor(inertial: &Inertial) -> Mat3<f64> {
+    let [xx, xy, xz, yy, yz, zz] = inertial.inertia;
+    Mat3([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 }

@@ -11,6 +11,10 @@ mod guard;
 mod inertial;
 mod joint;
 mod movement;
+#[cfg(test)]
+mod oracle;
+mod reading;
+mod robot;
 mod source;
 mod splice;
 mod topology;
@@ -54,14 +58,14 @@ pub struct UrdfReading {
 pub fn read_urdf(xml: &str, options: &UrdfOptions) -> Result<UrdfReading, UrdfError> {
     let limits = Limits::default();
     guard::check(xml, &limits)?;
-    let (robot, declared) = source::read(xml)?;
+    let robot = reading::read(&source::parse(xml)?)?;
     let topology = topology::Topology::new(&robot)?;
     let movements = movement::movements(&robot, options)?;
     let joints = movements.iter().filter(|movement| **movement == movement::Movement::Free).count();
     if joints > limits.moving_joints {
         return Err(UrdfError::TooManyJoints { joints, most: limits.moving_joints });
     }
-    assemble::assemble(&robot, declared, &topology, &movements, options.floating_base)
+    assemble::assemble(&robot, &topology, &movements, options.floating_base)
 }
 
 /// [`read_urdf`] from a file.

@@ -1,9 +1,10 @@
 //! Which joints move by themselves, which follow another, and which stand still.
 
 use super::error::nearest;
+use super::joint::is_usable;
+use super::robot::{Joint, JointKind, Robot};
 use super::{UrdfError, UrdfOptions};
 use std::collections::HashMap;
-use urdf_rs::{Joint, JointType, Robot};
 
 /// How a joint gets its position.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,8 +29,9 @@ pub(super) fn movements(robot: &Robot, options: &UrdfOptions) -> Result<Vec<Move
                 nearest: nearest(name, indices.keys().copied()),
             });
         };
-        if !position.is_finite() {
+        if !is_usable(*position) {
             return Err(UrdfError::NotFinite {
+                line: None,
                 kind: "joint",
                 name: name.clone(),
                 field: "the held position",
@@ -56,10 +58,15 @@ fn movement(
         match (unsingle(joint), current == follower) {
             (Some("floating"), true) => return Ok(Movement::Free),
             (Some(kind), true) => {
-                return Err(UrdfError::UnsupportedJoint { joint: joint.name.clone(), kind: kind.to_owned() });
+                return Err(UrdfError::UnsupportedJoint {
+                    line: joint.line,
+                    joint: joint.name.clone(),
+                    kind: kind.to_owned(),
+                });
             }
             (Some(kind), false) => {
                 return Err(UrdfError::LeaderWithoutPosition {
+                    line: robot.joints[follower].line,
                     joint: robot.joints[follower].name.clone(),
                     leader: joint.name.clone(),
                     kind,
@@ -75,29 +82,40 @@ fn movement(
             });
         };
         current = *indices.get(mimic.joint.as_str()).ok_or_else(|| UrdfError::UnknownLeader {
+            line: joint.line,
             joint: joint.name.clone(),
             leader: mimic.joint.clone(),
             nearest: nearest(&mimic.joint, indices.keys().copied()),
         })?;
-        offset += ratio * mimic.offset.unwrap_or(0.0);
-        ratio *= mimic.multiplier.unwrap_or(1.0);
+        offset += ratio * mimic.offset;
+        ratio *= mimic.multiplier;
+        let own_are_usable = is_usable(mimic.multiplier) && is_usable(mimic.offset);
+        if own_are_usable && !(is_usable(ratio) && is_usable(offset)) {
+            return Err(UrdfError::NotFinite {
+                line: Some(robot.joints[follower].line),
+                kind: "joint",
+                name: robot.joints[follower].name.clone(),
+                field: "what the chain of its mimics multiplies up to",
+            });
+        }
     }
-    Err(UrdfError::MimicLoop { joint: robot.joints[follower].name.clone() })
+    Err(UrdfError::MimicLoop {
+        line: robot.joints[follower].line,
+        joint: robot.joints[follower].name.clone(),
+    })
 }
 
 fn still_at(joint: &Joint, held: Option<&f64>) -> Option<f64> {
-    match joint.joint_type {
-        JointType::Fixed => Some(0.0),
+    match joint.kind {
+        JointKind::Fixed => Some(0.0),
         _ => held.copied(),
     }
 }
 
 /// The name of a joint type that is not described by a single position.
 fn unsingle(joint: &Joint) -> Option<&'static str> {
-    match joint.joint_type {
-        JointType::Floating => Some("floating"),
-        JointType::Planar => Some("planar"),
-        JointType::Spherical => Some("spherical"),
+    match joint.kind {
+        JointKind::Floating | JointKind::Planar | JointKind::Spherical => Some(joint.kind.name()),
         _ => None,
     }
 }

@@ -2,8 +2,8 @@
 
 use super::UrdfError;
 use super::error::nearest;
+use super::robot::{Joint, Robot};
 use std::collections::HashMap;
-use urdf_rs::Robot;
 
 /// Links and joints by index in the file.
 pub(super) struct Topology {
@@ -17,11 +17,12 @@ pub(super) struct Topology {
 
 impl Topology {
     pub(super) fn new(robot: &Robot) -> Result<Self, UrdfError> {
-        let links = index("link", robot.links.iter().map(|link| link.name.as_str()))?;
-        index("joint", robot.joints.iter().map(|joint| joint.name.as_str()))?;
-        let find = |joint: &str, link: &str| {
+        let links = index("link", robot.links.iter().map(|link| (link.name.as_str(), link.line)))?;
+        index("joint", robot.joints.iter().map(|joint| (joint.name.as_str(), joint.line)))?;
+        let find = |joint: &Joint, link: &str| {
             links.get(link).copied().ok_or_else(|| UrdfError::UnknownLink {
-                joint: joint.to_owned(),
+                line: joint.line,
+                joint: joint.name.clone(),
                 link: link.to_owned(),
                 nearest: nearest(link, links.keys().copied()),
             })
@@ -30,11 +31,11 @@ impl Topology {
         let mut child_of = Vec::with_capacity(robot.joints.len());
         let mut joint_before: Vec<Option<usize>> = vec![None; robot.links.len()];
         for (index, joint) in robot.joints.iter().enumerate() {
-            let (parent, child) =
-                (find(&joint.name, &joint.parent.link)?, find(&joint.name, &joint.child.link)?);
+            let (parent, child) = (find(joint, &joint.parent)?, find(joint, &joint.child)?);
             if let Some(other) = joint_before[child].replace(index) {
                 return Err(UrdfError::TwoParents {
-                    link: joint.child.link.clone(),
+                    line: joint.line,
+                    link: joint.child.clone(),
                     first: robot.joints[other].name.clone(),
                     second: joint.name.clone(),
                 });
@@ -70,12 +71,12 @@ impl Topology {
 
 fn index<'a>(
     kind: &'static str,
-    names: impl Iterator<Item = &'a str>,
+    names: impl Iterator<Item = (&'a str, u32)>,
 ) -> Result<HashMap<&'a str, usize>, UrdfError> {
     let mut indices = HashMap::new();
-    for (index, name) in names.enumerate() {
+    for (index, (name, line)) in names.enumerate() {
         if indices.insert(name, index).is_some() {
-            return Err(UrdfError::Duplicate { kind, name: name.to_owned() });
+            return Err(UrdfError::Duplicate { line, kind, name: name.to_owned() });
         }
     }
     Ok(indices)

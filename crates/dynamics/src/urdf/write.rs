@@ -93,7 +93,8 @@ fn merged_links(robot: Node, tree: &Tree) -> Vec<String> {
 
 /// The children of the body's `<inertial>`.
 fn inertial_elements(body: &Body) -> Result<[String; 3], UrdfError> {
-    let not_finite = |field| UrdfError::NotFinite { kind: "link", name: body.link.clone(), field };
+    let not_finite =
+        |field| UrdfError::NotFinite { line: None, kind: "link", name: body.link.clone(), field };
     if !body.inertial.iter().all(|x| x.is_finite()) {
         return Err(not_finite("one of its inertial parameters"));
     }
@@ -118,7 +119,12 @@ fn inertial_elements(body: &Body) -> Result<[String; 3], UrdfError> {
 fn write_friction(joint: Node, friction: &JointFriction, splices: &mut Splices) -> Result<(), UrdfError> {
     let JointFriction { damping, friction: coulomb, joint: joint_name } = friction;
     if !(damping.is_finite() && coulomb.is_finite()) {
-        return Err(UrdfError::NotFinite { kind: "joint", name: joint_name.clone(), field: "its friction" });
+        return Err(UrdfError::NotFinite {
+            line: None,
+            kind: "joint",
+            name: joint_name.clone(),
+            field: "its friction",
+        });
     }
     let values = [("damping", damping), ("friction", coulomb)];
     match child(joint, "dynamics") {

@@ -3,9 +3,10 @@
 //! A criterion only looks back, so what it would have left is the beginning of a run that did not have it.
 
 use super::arm::Arm;
-use super::report::{Results, median};
+use super::report::Results;
 use super::run_file::RunFile;
 use phiw_curriculum::{Certain, Converged, EndCriterion, EndReason};
+use phiw_report::statistics::median;
 
 /// Iterations after which a run would have ended by a criterion; all of them if it would not.
 pub fn ended_after(run: &RunFile, criterion: &dyn EndCriterion) -> usize {

@@ -2,13 +2,14 @@
 
 use super::arm::Arm;
 use super::page::Page;
-use super::report::{Results, median};
+use super::report::Results;
 use super::score::Detail;
 use super::setup::Settings;
 use phiw_report::plot::{
     BoxGroup, BoxPlot, IterationLine, Iterations, Line, MapRow, MotionMap, SupportMap, Svg, box_plot,
     iterations, motion_map, support_map,
 };
+use phiw_report::statistics::median;
 
 /// Draws everything that there are runs of.
 pub fn draw(results: &Results, page: &mut Page) {

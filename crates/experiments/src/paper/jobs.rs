@@ -7,7 +7,9 @@ use super::setup::{Setup, Validation};
 use super::subject::SubjectName;
 use crate::plant::engine::Engine;
 use crate::plant::secret::SecretKind;
-use phiw_curriculum::{Curriculum, FixedCount, RowsAt, Run, unreliable_model};
+use phiw_curriculum::{
+    Curriculum, CurriculumSettings, FixedCount, NoneAllowed, RowsAt, Run, unreliable_model,
+};
 use phiw_plant::Effect;
 use rayon::prelude::*;
 use std::path::Path;
@@ -134,6 +136,10 @@ impl Job {
             growth: (self.arm == Arm::Closed).then_some(growth.as_ref()),
             end: &FixedCount(setup.settings.iterations),
             rows_at: RowsAt::Periods,
+            settings: CurriculumSettings {
+                none_allowed: NoneAllowed::LeastViolation,
+                ..CurriculumSettings::default()
+            },
         };
         while file.run.ended.is_none() {
             if left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_err() {

@@ -2,9 +2,12 @@
 
 use super::arguments::RelaxationName;
 use super::arm::{Arm, Footing};
+use super::ending::Savings;
 use super::reliability;
-use super::report::{Results, median};
+use super::report::Results;
 use super::run_file::RunFile;
+use phiw_identification::accuracy::{Reliability, ReliabilityCriterion};
+use phiw_report::statistics::median;
 
 use Arm::{Curriculum, Greedy, Random, TaskA, TaskB, TorqueOptimal};
 use Footing::Standing;
@@ -14,153 +17,206 @@ const STEADY: f64 = 0.95;
 
 /// Rows of the comparison: what, the paper's, ours, and why they differ.
 pub fn rows(results: &Results) -> Vec<[String; 4]> {
-    let mut rows = Vec::new();
-    let mut row = |what: &str, paper: &str, here: String, why: &str| {
-        rows.push([what.to_owned(), paper.to_owned(), here, why.to_owned()]);
-    };
-    let (last, home) = (results.settings.iterations, results.home());
-    row("D, base parameters with viscous friction", "132", results.settings.parameters.len().to_string(), "");
-    let medians = |series: &[Vec<f64>], digits: usize| {
-        series.iter().map(|values| format!("{:.digits$}", median(values))).collect::<Vec<_>>().join(", ")
-    };
-    let rmse = results.scores(home, Curriculum, |score| Some(score.rmse_w));
-    row(
-        "RMSE_w (17), median: initial, then each iteration",
-        "…, 0.243",
-        medians(&rmse, 3),
-        "in the units of the parameters, mixed: it depends on the robot",
-    );
-    for (name, value) in
-        [("the same logs, least squares (4)", 0), ("the same logs, weighted least squares", 1)]
-    {
-        let series = results.scores(home, Curriculum, |score| match value {
-            0 => score.rmse_w_least_squares,
-            _ => score.rmse_w_weighted,
-        });
-        row(
-            name,
-            "…, 0.243",
-            medians(&series[1..], 3),
-            "the noise moves the robot, and is not in the log: the columns of Φ are correlated with it, which (4) takes for physics; more logs do not help",
-        );
-    }
-    let count = |arm: Arm, iteration: usize| {
-        let all = reliability::of_arm(results, home, arm, iteration);
-        let [well, with_bias] = [reliability::Reliability::well, reliability::Reliability::well_with_bias]
-            .map(|test| all.iter().filter(|parameter| test(parameter)).count());
-        format!("{well} ({with_bias} with bias counted)")
-    };
-    row(
-        "well estimated by (18): initial model",
-        "76",
-        count(Curriculum, 0),
-        "how many parameters are small depends on the robot",
-    );
-    row("well estimated by (18): last iteration", "100", count(Curriculum, last), "");
-    let others = || [Random, TorqueOptimal, Greedy].into_iter().filter(|&arm| results.has(home, arm));
-    for arm in others() {
-        row(&format!("well estimated by (18): last iteration, {}", arm.name()), "", count(arm, last), "");
-    }
-    for arm in others() {
-        let rmse = results.scores(home, arm, |score| Some(score.rmse_w));
-        row(
-            &format!("RMSE_w (17), median: initial, each iteration: {}", arm.name()),
-            "",
-            medians(&rmse, 3),
-            "",
-        );
-    }
-    let cond = |arm: Arm| results.records(home, arm, |record| record.condition_number);
-    row("cond(Φ), median by iteration: curriculum", "falls, see figure 7", medians(&cond(Curriculum), 0), "");
-    if results.has(home, Random) {
-        row("cond(Φ), median by iteration: random", "above it", medians(&cond(Random), 0), "");
-    }
-    for arm in others().filter(|arm| *arm != Random) {
-        row(&format!("cond(Φ), median by iteration: {}", arm.name()), "", medians(&cond(arm), 0), "");
-    }
-    let alpha = results.records(home, Curriculum, |record| Some(record.alpha));
-    row(
-        "α, median by iteration",
-        "0.74, …, 0.3",
-        medians(&alpha, 2),
-        match results.settings.relaxation {
-            RelaxationName::Condition => {
-                "α_max by the share of motions; a such that the second α is 0.8 α_max, as cond has another scale here"
-            }
-            RelaxationName::Uncertainty => {
-                "α_max by the share of motions; then in proportion to how uncertain the torques of all motions are, the second α 0.8 α_max"
-            }
-        },
-    );
-    let motions = results.settings.dataset.len() as f64;
-    let share = results.records(home, Curriculum, |record| Some(100.0 * record.allowed as f64 / motions));
-    row("motions allowed, median by iteration [%]", "5, …", medians(&share, 0), "");
-    let torque = [(Curriculum, "lowest, figure 8"), (TaskA, "higher"), (TaskB, "higher")];
-    for (arm, paper) in torque.into_iter().chain(others().map(|arm| (arm, ""))) {
-        let name = match arm {
-            TaskA => format!("only “{}”", results.settings.tasks[0]),
-            TaskB => format!("only “{}”", results.settings.tasks[1]),
-            _ => arm.name().to_owned(),
-        };
-        let series = results.scores(home, arm, |score| Some(score.rmse_torque));
-        if results.has(home, arm) {
-            row(
-                &format!(
-                    "torque error (19) on held-out motions [N·m], median: initial, each iteration: {name}"
-                ),
-                paper,
-                medians(&series, 2),
-                "",
-            );
-        }
-    }
-    let measured_s: Vec<String> = [Curriculum, TaskA, TaskB]
-        .into_iter()
-        .chain(others())
-        .filter(|&arm| results.has(home, arm))
-        .map(|arm| format!("{} {:.0}", arm.name(), measured_s(results, home, arm)))
-        .collect();
-    row(
-        "measured in all iterations [s], median",
-        "",
-        measured_s.join(", "),
-        "errors fall with the time that is measured, and tasks differ in how long they take",
-    );
+    let mut table = Table { results, home: results.home(), rows: Vec::new() };
+    table.parameters();
+    table.well_estimated();
+    table.parameters_of_others();
+    table.choices();
+    table.torques();
+    table.durations();
     for arm in [Curriculum, Random, TorqueOptimal, Greedy] {
-        let runs = results.of(Standing, arm);
-        let total = runs.clone().count();
-        if total > 0 {
-            let history = || runs.clone().flat_map(|run| &run.run.history);
-            let fell = |run: &&RunFile| run.run.history.iter().any(|record| record.fell_at_s.is_some());
-            let falls = history().filter(|record| record.fell_at_s.is_some()).count();
-            let rocked =
-                history().filter(|record| record.fell_at_s.is_none() && record.still_share < STEADY).count();
-            row(
-                &format!(
-                    "standing freely, {}: seeds with a fall; falls, and motions on which the base rocked, of all motions",
-                    arm.name()
-                ),
-                "none reported",
-                format!(
-                    "{} of {total}; {falls} and {rocked} of {}",
-                    runs.clone().filter(fell).count(),
-                    history().count()
-                ),
-                "",
-            );
-            let rmse = results.scores(Standing, arm, |score| Some(score.rmse_w));
-            let alpha = results.records(Standing, arm, |record| Some(record.alpha));
-            row(
-                &format!("standing freely, {}: RMSE_w, median; α", arm.name()),
-                "",
-                format!("{}; {}", medians(&rmse, 3), medians(&alpha, 2)),
-                "rows in which the base rocks do not count: where noise rattles it all the time nothing is learnt, and α stays",
-            );
-        }
+        table.standing(arm);
     }
     for savings in super::ending::savings(results) {
+        table.ending(&savings);
+    }
+    table.rows
+}
+
+/// The comparison, as far as it is made.
+struct Table<'a> {
+    results: &'a Results,
+    /// How the base was held in the runs that all arms have.
+    home: Footing,
+    rows: Vec<[String; 4]>,
+}
+
+/// The median of each iteration.
+fn medians(series: &[Vec<f64>], digits: usize) -> String {
+    series.iter().map(|values| format!("{:.digits$}", median(values))).collect::<Vec<_>>().join(", ")
+}
+
+impl Table<'_> {
+    fn row(&mut self, what: &str, paper: &str, here: String, why: &str) {
+        self.rows.push([what.to_owned(), paper.to_owned(), here, why.to_owned()]);
+    }
+
+    /// The arms that the paper does not compare in numbers, as far as there are runs of them.
+    fn others(&self) -> Vec<Arm> {
+        [Random, TorqueOptimal, Greedy].into_iter().filter(|&arm| self.results.has(self.home, arm)).collect()
+    }
+
+    fn parameters(&mut self) {
+        let (results, home) = (self.results, self.home);
+        let count = results.settings.parameters.len().to_string();
+        self.row("D, base parameters with viscous friction", "132", count, "");
+        let rmse = results.scores(home, Curriculum, |score| Some(score.rmse_w));
+        self.row(
+            "RMSE_w (17), median: initial, then each iteration",
+            "…, 0.243",
+            medians(&rmse, 3),
+            "in the units of the parameters, mixed: it depends on the robot",
+        );
+        let ordinary = results.scores(home, Curriculum, |score| score.rmse_w_least_squares);
+        let weighted = results.scores(home, Curriculum, |score| score.rmse_w_weighted);
+        for (name, series) in [
+            ("the same logs, least squares (4)", ordinary),
+            ("the same logs, weighted least squares", weighted),
+        ] {
+            self.row(
+                name,
+                "…, 0.243",
+                medians(&series[1..], 3),
+                "the noise moves the robot, and is not in the log: the columns of Φ are correlated with it, which (4) takes for physics; more logs do not help",
+            );
+        }
+    }
+
+    fn well_estimated(&mut self) {
+        let last = self.results.settings.iterations;
+        let initial = self.count_well_estimated(Curriculum, 0);
+        self.row(
+            "well estimated by (18): initial model",
+            "76",
+            initial,
+            "how many parameters are small depends on the robot",
+        );
+        let ours = self.count_well_estimated(Curriculum, last);
+        self.row("well estimated by (18): last iteration", "100", ours, "");
+        for arm in self.others() {
+            let count = self.count_well_estimated(arm, last);
+            self.row(&format!("well estimated by (18): last iteration, {}", arm.name()), "", count, "");
+        }
+    }
+
+    fn count_well_estimated(&self, arm: Arm, iteration: usize) -> String {
+        let all = reliability::of_arm(self.results, self.home, arm, iteration);
+        let criterion = ReliabilityCriterion::default();
+        let [well, with_bias] = [Reliability::well, Reliability::well_with_bias]
+            .map(|test| all.iter().filter(|parameter| test(parameter, &criterion)).count());
+        format!("{well} ({with_bias} with bias counted)")
+    }
+
+    fn parameters_of_others(&mut self) {
+        for arm in self.others() {
+            let rmse = self.results.scores(self.home, arm, |score| Some(score.rmse_w));
+            let what = format!("RMSE_w (17), median: initial, each iteration: {}", arm.name());
+            self.row(&what, "", medians(&rmse, 3), "");
+        }
+    }
+
+    /// What was chosen, and from how much.
+    fn choices(&mut self) {
+        let (results, home) = (self.results, self.home);
+        let cond = |arm: Arm| medians(&results.records(home, arm, |record| record.condition_number), 0);
+        let ours = cond(Curriculum);
+        self.row("cond(Φ), median by iteration: curriculum", "falls, see figure 7", ours, "");
+        for arm in self.others() {
+            let paper = if arm == Random { "above it" } else { "" };
+            self.row(&format!("cond(Φ), median by iteration: {}", arm.name()), paper, cond(arm), "");
+        }
+        let alpha = results.records(home, Curriculum, |record| Some(record.alpha));
+        self.row(
+            "α, median by iteration",
+            "0.74, …, 0.3",
+            medians(&alpha, 2),
+            match results.settings.relaxation {
+                RelaxationName::Condition => {
+                    "α_max by the share of motions; a such that the second α is 0.8 α_max, as cond has another scale here"
+                }
+                RelaxationName::Uncertainty => {
+                    "α_max by the share of motions; then in proportion to how uncertain the torques of all motions are, the second α 0.8 α_max"
+                }
+            },
+        );
+        let motions = results.settings.dataset.len() as f64;
+        let share = results.records(home, Curriculum, |record| Some(100.0 * record.allowed as f64 / motions));
+        self.row("motions allowed, median by iteration [%]", "5, …", medians(&share, 0), "");
+    }
+
+    fn torques(&mut self) {
+        let (results, home) = (self.results, self.home);
+        let papers = [(Curriculum, "lowest, figure 8"), (TaskA, "higher"), (TaskB, "higher")];
+        let others = self.others().into_iter().map(|arm| (arm, ""));
+        for (arm, paper) in papers.into_iter().chain(others).filter(|(arm, _)| results.has(home, *arm)) {
+            let name = match arm {
+                TaskA => format!("only “{}”", results.settings.tasks[0]),
+                TaskB => format!("only “{}”", results.settings.tasks[1]),
+                _ => arm.name().to_owned(),
+            };
+            let what = format!(
+                "torque error (19) on held-out motions [N·m], median: initial, each iteration: {name}"
+            );
+            let series = results.scores(home, arm, |score| Some(score.rmse_torque));
+            self.row(&what, paper, medians(&series, 2), "");
+        }
+    }
+
+    fn durations(&mut self) {
+        let measured_s: Vec<String> = [Curriculum, TaskA, TaskB]
+            .into_iter()
+            .filter(|&arm| self.results.has(self.home, arm))
+            .chain(self.others())
+            .map(|arm| format!("{} {:.0}", arm.name(), measured_s(self.results, self.home, arm)))
+            .collect();
+        self.row(
+            "measured in all iterations [s], median",
+            "",
+            measured_s.join(", "),
+            "errors fall with the time that is measured, and tasks differ in how long they take",
+        );
+    }
+
+    /// The runs of an arm on a base that may topple, if there are any.
+    fn standing(&mut self, arm: Arm) {
+        let results = self.results;
+        let runs: Vec<&RunFile> = results.of(Standing, arm).collect();
+        if runs.is_empty() {
+            return;
+        }
+        let history = || runs.iter().flat_map(|run| &run.run.history);
+        let fell = |run: &&&RunFile| run.run.history.iter().any(|record| record.fell_at_s.is_some());
+        let falls = history().filter(|record| record.fell_at_s.is_some()).count();
+        let rocked =
+            history().filter(|record| record.fell_at_s.is_none() && record.still_share < STEADY).count();
+        self.row(
+            &format!(
+                "standing freely, {}: seeds with a fall; falls, and motions on which the base rocked, of all motions",
+                arm.name()
+            ),
+            "none reported",
+            format!(
+                "{} of {}; {falls} and {rocked} of {}",
+                runs.iter().filter(fell).count(),
+                runs.len(),
+                history().count()
+            ),
+            "",
+        );
+        let rmse = results.scores(Standing, arm, |score| Some(score.rmse_w));
+        let alpha = results.records(Standing, arm, |record| Some(record.alpha));
+        self.row(
+            &format!("standing freely, {}: RMSE_w, median; α", arm.name()),
+            "",
+            format!("{}; {}", medians(&rmse, 3), medians(&alpha, 2)),
+            "rows in which the base rocks do not count: where noise rattles it all the time nothing is learnt, and α stays",
+        );
+    }
+
+    fn ending(&mut self, savings: &Savings) {
+        let last = self.results.settings.iterations;
         let ([then, after], [then_w, after_w]) = (savings.rmse_torque, savings.rmse_w);
-        row(
+        self.row(
             &format!(
                 "end when {}: iterations, mean, of {last}; error with those and with all",
                 savings.criterion
@@ -173,7 +229,6 @@ pub fn rows(results: &Results) -> Vec<[String; 4]> {
             "each motion averages more of the noise away, so fewer of them cannot leave quite the same error",
         );
     }
-    rows
 }
 
 /// How long all motions of a run were, median over the runs \[s\].

@@ -93,16 +93,6 @@ impl Results {
     }
 }
 
-/// The middle one; of an even number the mean of the two.
-pub fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    match sorted.len() {
-        0 => f64::NAN,
-        count => 0.5 * (sorted[(count - 1) / 2] + sorted[count / 2]),
-    }
-}
-
 /// The whole page.
 pub fn page(results: &Results) -> String {
     let settings = &results.settings;

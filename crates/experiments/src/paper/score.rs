@@ -6,6 +6,7 @@ use phiw_curriculum::{
     Curriculum, CurriculumError, Estimator, Evidence, LeastSquares, Measured, RobotModel, RowsAt, Run,
     WeightedLeastSquares,
 };
+use phiw_identification::accuracy::{parameter_rmse, torque_rmse};
 use phiw_identification::{TorqueError, torque_error};
 use phiw_regressor::RegressorError;
 use phiw_zmp::{ZmpModel, ZmpWorkspace, standing_parameters};
@@ -39,12 +40,6 @@ pub struct Detail {
     pub alpha: f64,
     /// ZMP of the chosen reference under the belief of the time \[m\].
     pub zmp: Vec<[f64; 2]>,
-}
-
-/// sqrt(1/D · ‖a − b‖²), equation (17), over the declared parameters, which come first.
-pub fn rmse_w(estimate: &[f64], truth: &[f64]) -> f64 {
-    let sum: f64 = estimate.iter().zip(truth).map(|(estimate, truth)| (estimate - truth).powi(2)).sum();
-    (sum / truth.len().max(1) as f64).sqrt()
 }
 
 impl Setup {
@@ -86,12 +81,12 @@ impl Setup {
             // Rows that count can be few, where the base rocks: then least squares has no answer.
             match estimator.estimate(&design, evidence, model, &parameters) {
                 Err(CurriculumError::Regressor(RegressorError::RankDeficient { .. })) => Ok(None),
-                estimate => Ok(Some(rmse_w(&estimate?.parameters, &truth))),
+                estimate => Ok(Some(parameter_rmse(&estimate?.parameters, &truth))),
             }
         };
         Ok(Score {
-            rmse_w: rmse_w(&parameters, &truth),
-            rmse_torque: (factor.residual_sum_of_squares(&parameters)? / samples).sqrt(),
+            rmse_w: parameter_rmse(&parameters, &truth),
+            rmse_torque: torque_rmse(factor, &parameters, *samples)?,
             rmse_w_least_squares: bystander(&LeastSquares)?,
             rmse_w_weighted: bystander(&WeightedLeastSquares)?,
             parameters,

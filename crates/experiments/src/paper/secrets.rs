@@ -1,11 +1,12 @@
 //! Plants with a secret: what closing the loop is worth. And plants without: what it invents.
 
 use super::arm::{Arm, Footing};
-use super::report::{Results, median};
+use super::report::Results;
 use super::run_file::RunFile;
 use super::score::Score;
 use crate::plant::secret::SecretKind;
 use phiw_identification::EffectSpec;
+use phiw_report::statistics::median;
 use std::collections::BTreeSet;
 
 /// Head of the table.
@@ -80,7 +81,8 @@ pub fn rows(results: &Results) -> Vec<[String; 10]> {
 /// What a run found beside the declared effects.
 fn found(run: &RunFile) -> impl Iterator<Item = &EffectSpec> {
     let specs = run.run.model.effects.iter().map(|effect| &effect.spec);
-    specs.filter(|spec| spec.kind != "viscous_friction")
+    let declared = &run.run.initial.effects;
+    specs.filter(|spec| declared.iter().all(|declared| declared.spec != **spec))
 }
 
 /// Whether an effect is the run's secret: its kind on its joints. A tilt acts on the base, whatever joints feel it.

@@ -18,7 +18,7 @@ use phiw_curriculum::{
 };
 use phiw_dynamics::{PARAMETERS_PER_BODY, Workspace, World};
 use phiw_identification::{parameter_name, standard_unit};
-use phiw_plant::{Effect, Timing};
+use phiw_plant::{Effect, Sensors, Timing};
 use phiw_regressor::factor::Factor;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -161,29 +161,16 @@ impl Setup {
         let dataset = MotionDataset::new(subject.tree.joint_count(), motions.identification)?;
         let weights = subject.row_weights(if arguments.noise > 0.0 { arguments.noise } else { SILENT });
         let candidates = Candidates::new(&robot, robot.declared(), &dataset, &weights)?;
-        // The paper's robot is excited well, and its method is the paper's.
-        let (prior, relaxation) = match subject.standing {
-            Some(_) => (PriorName::Initial, RelaxationName::Uncertainty),
-            None => (PriorName::None, RelaxationName::Condition),
-        };
-        let prior = arguments.prior.unwrap_or(prior);
-        let relaxation = arguments.relaxation.unwrap_or(relaxation);
+        let (prior, relaxation) = method(arguments, &subject);
         let relaxation_of_alpha: Box<dyn Relaxation> = match relaxation {
             RelaxationName::Condition => Box::new(ConditionRelaxation::default()),
             RelaxationName::Uncertainty => Box::new(UncertaintyRelaxation::default()),
         };
-        let constraint = ZmpConstraint::new(subject.stance.clone());
+        let constraint = ZmpConstraint::of_the_paper(subject.stance.clone());
         let settings = Settings {
             backend: format!("{:?}", arguments.backend).to_lowercase(),
             robot: arguments.robot,
-            motions: match (&arguments.motions, arguments.dataset) {
-                (Some(_), _) => "of a folder".to_owned(),
-                (None, Source::Embedded) if subject.standing.is_some() => {
-                    "embedded (synthetic), on synthetic legs that sway, squat and twist with both feet on the floor".to_owned()
-                }
-                (None, Source::Embedded) => "embedded (synthetic)".to_owned(),
-                (None, Source::UeAdl) => "ue_adl (measured on people)".to_owned(),
-            },
+            motions: motions_in_words(arguments, &subject).to_owned(),
             digest: motions.digest,
             dataset: dataset
                 .motions()
@@ -263,8 +250,10 @@ impl Setup {
             effects: self.subject.frictions(),
             controller: Box::new(FeedForward { gains: self.subject.gains.clone() }),
             actuator_noise: noise,
+            sensors: Sensors::exact(timing(backend).control_period_s),
             timing: timing(backend),
             fall_tilt_rad: 0.3,
+            stillness: Default::default(),
             build: Box::new(move |tree, world| backend.build(tree, world)),
         }
     }
@@ -361,6 +350,26 @@ impl Setup {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(SECRET_STREAM);
         Ok(kind.draw(&robot, &samples, &mut random))
+    }
+}
+
+/// What the estimate falls back on and what α follows, unless they are asked for. The paper's robot is excited well, and its method is the paper's.
+fn method(arguments: &RunArguments, subject: &Subject) -> (PriorName, RelaxationName) {
+    let (prior, relaxation) = match subject.standing {
+        Some(_) => (PriorName::Initial, RelaxationName::Uncertainty),
+        None => (PriorName::None, RelaxationName::Condition),
+    };
+    (arguments.prior.unwrap_or(prior), arguments.relaxation.unwrap_or(relaxation))
+}
+
+fn motions_in_words(arguments: &RunArguments, subject: &Subject) -> &'static str {
+    match (&arguments.motions, arguments.dataset) {
+        (Some(_), _) => "of a folder",
+        (None, Source::Embedded) if subject.standing.is_some() => {
+            "embedded (synthetic), on synthetic legs that sway, squat and twist with both feet on the floor"
+        }
+        (None, Source::Embedded) => "embedded (synthetic)",
+        (None, Source::UeAdl) => "ue_adl (measured on people)",
     }
 }
 

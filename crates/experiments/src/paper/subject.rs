@@ -6,7 +6,7 @@ use anyhow::Context;
 use phiw_curriculum::{Robot, RobotModel};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
 use phiw_dynamics::{Foot, InertialParameters, Tree, World};
-use phiw_plant::{Effect, Friction, Gains, apparent_inertia, feet_from_toml};
+use phiw_plant::{Effect, Friction, GainSettings, Gains, apparent_inertia, feet_from_toml};
 use phiw_zmp::{Stance, SupportPolygon};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -30,11 +30,6 @@ const HELD: [&str; 2] = ["torso/joint_3", "head/joint_1"];
 pub const VISCOUS_SHARE: f64 = 0.02;
 /// The fastest that a joint is taken to be [rad/s]; the Torobo's file has placeholders.
 pub const FASTEST: f64 = 4.0;
-/// Position gain over the torque limit [1/rad]: half of all it has for a radian. Small for a robot, whose own weight pulls a third of that.
-const STIFFNESS: f64 = 0.5;
-/// What commands that are held for a period T leave room for: K_p at most these multiples of inertia/T² and friction/T.
-const HELD_INERTIA: f64 = 0.04;
-const HELD_FRICTION: f64 = 0.3;
 /// Base of the Torobo: mass \[kg\], half a side of its square sole and height of its centre \[m\].
 const BASE: [f64; 3] = [25.0, 0.2, 0.2];
 
@@ -189,16 +184,6 @@ impl Subject {
 /// # Errors
 /// A list does not fit the robot.
 pub fn arm_gains(tree: &Tree, viscous: &[f64], control_period_s: f64) -> anyhow::Result<Gains> {
-    let joints = tree.joint_count();
     let inertia = apparent_inertia(tree, &[], &tree.neutral_configuration())?;
-    let position: Vec<f64> = (0..joints)
-        .map(|joint| {
-            let most = HELD_INERTIA * inertia[joint] / control_period_s.powi(2)
-                + HELD_FRICTION * viscous[joint] / control_period_s;
-            (STIFFNESS * tree.joint(joint).limits.effort).min(most)
-        })
-        .collect();
-    // Critically damped, what friction damps counted.
-    let damping = |joint: usize| (2.0 * (position[joint] * inertia[joint]).sqrt() - viscous[joint]).max(0.0);
-    Ok(Gains { velocity: (0..joints).map(damping).collect(), position })
+    Ok(Gains::held(tree, &inertia, viscous, control_period_s, &GainSettings::default())?)
 }

@@ -6,6 +6,7 @@ use super::run_file::replace;
 use super::{numbers, reliability, secrets};
 use crate::plant::secret::SecretKind;
 use phiw_curriculum::Converged;
+use phiw_identification::accuracy::ReliabilityCriterion;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
@@ -86,6 +87,7 @@ fn parameters(results: &Results) -> String {
     let mut text = String::from(
         "footing,arm,iteration,parameter,unit,true,mean,error_std,error_rms,relative_std_percent,well_estimated,well_with_bias\n",
     );
+    let criterion = ReliabilityCriterion::default();
     let plain = results.runs.iter().filter(|run| run.secret.is_none());
     let arms: BTreeSet<_> = plain.map(|run| (run.footing, run.arm)).collect();
     for (footing, arm) in arms {
@@ -104,8 +106,8 @@ fn parameters(results: &Results) -> String {
                     parameter.deviation,
                     parameter.rms_error,
                     parameter.percent(),
-                    parameter.well(),
-                    parameter.well_with_bias()
+                    parameter.well(&criterion),
+                    parameter.well_with_bias(&criterion)
                 );
             }
         }

@@ -11,8 +11,8 @@ use phiw_dynamics::random_tree::{RandomNumbers, random_state};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Tree, Workspace, World};
 use phiw_plant::{
-    ComputedTorque, Effect, Friction, Gains, MultiSine, Plant, PlantSetup, Reference, RigidBodyModel,
-    Sensors, Timing, apparent_inertia,
+    ComputedTorque, Effect, Friction, GainSettings, Gains, MultiSine, Plant, PlantSetup, Reference,
+    RigidBodyModel, Sensors, Timing, least_apparent_inertia,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -23,12 +23,9 @@ use std::time::Instant;
 /// Highest frequency of the motions \[Hz\], and the shares of range and speed that they use.
 const HIGHEST_HZ: f64 = 1.2;
 const USED: [f64; 2] = [0.6, 0.7];
-/// The controller's bandwidth \[rad/s\], and its least stiffness over the effort limit \[1/rad\], as dry friction would hold a light joint
-/// wherever it is: small, so that tracking is poor.
-const BANDWIDTH: f64 = 8.0;
-const STIFFNESS: f64 = 0.15;
-/// Largest bandwidth times control period: held commands are a delay.
-const FASTEST: f64 = 0.2;
+/// Gains that are small, so that tracking is poor.
+const GAINS: GainSettings =
+    GainSettings { bandwidth: 8.0, stiffness: 0.15, held_inertia: 0.04, held_friction: 0.0 };
 /// Least inertia of a rotor behind its gear, over the effort limit \[kg·m²/(N·m)\]: in light joints it outweighs the link.
 const ROTOR: f64 = 1e-3;
 /// Postures over which a joint's least inertia is sought.
@@ -93,22 +90,10 @@ impl Robot {
 
     /// Small gains, critically damped, that stay stable when commands are held for `period_s`.
     fn gains(&self, rotor_inertia: &[f64], period_s: f64) -> anyhow::Result<Gains> {
-        let mut inertia = vec![f64::INFINITY; self.tree.joint_count()];
         let mut random = RandomNumbers::new(1);
-        for _ in 0..POSES {
-            let pose = random_state(&self.tree, &mut random).q;
-            let felt = apparent_inertia(&self.tree, rotor_inertia, &pose)?;
-            inertia.iter_mut().zip(felt).for_each(|(least, felt)| *least = least.min(felt));
-        }
-        let stiffest = (FASTEST / period_s).powi(2);
-        let stiffness = |(joint, inertia): (usize, &f64)| {
-            let wanted =
-                (BANDWIDTH * BANDWIDTH * inertia).max(STIFFNESS * self.tree.joint(joint).limits.effort);
-            wanted.min(stiffest * inertia)
-        };
-        let position: Vec<f64> = inertia.iter().enumerate().map(stiffness).collect();
-        let damping = |(stiffness, inertia): (&f64, &f64)| 2.0 * (stiffness * inertia).sqrt();
-        Ok(Gains { velocity: position.iter().zip(&inertia).map(damping).collect(), position })
+        let poses = (0..POSES).map(|_| random_state(&self.tree, &mut random).q);
+        let inertia = least_apparent_inertia(&self.tree, rotor_inertia, poses)?;
+        Ok(Gains::held(&self.tree, &inertia, &[], period_s, &GAINS)?)
     }
 
     /// Frictions that every joint has.

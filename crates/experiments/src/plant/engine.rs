@@ -1,7 +1,7 @@
 //! Who computes the physics.
 
 use anyhow::Context;
-use phiw_dynamics::{AnalyticBackend, BackendError, DynamicsBackend, Tree, World};
+use phiw_dynamics::{AnalyticBackend, BackendError, SimulationBackend, Tree, World};
 use phiw_sim_mujoco::MujocoBackend;
 use phiw_sim_rapier::RapierBackend;
 use serde::Serialize;
@@ -23,7 +23,7 @@ const RAPIER_ITERATIONS: usize = 4;
 
 impl Engine {
     /// A robot in this engine.
-    pub fn build(self, tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+    pub fn build(self, tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
         Ok(match self {
             Engine::Mujoco => {
                 Box::new(MujocoBackend::new(tree, world).map_err(|error| BackendError::Backend {

@@ -58,10 +58,10 @@ pub struct Arguments {
     /// of the limit are a good part of that.)
     #[arg(long, default_value_t = 0.002)]
     noise: f64,
-    /// Time between two rows of the log, and between two commands of the controller \[s\].
+    /// Time between two rows of the log, and between two commands of the controller, in seconds.
     #[arg(long, default_value_t = 0.01)]
     period: f64,
-    /// Length of each of the three logs \[s\].
+    /// Length of each of the three logs, in seconds.
     #[arg(long, default_value_t = 20.0)]
     duration: f64,
     /// The first seed.

@@ -92,12 +92,12 @@ pub fn score(
     scored
 }
 
-/// The named effects; a kind named on several joints one after another is one effect, but for couplings, whose joints are pairs.
+/// The named effects; a kind named on several joints one after another is one effect, but for those of pairs of joints.
 fn merged(report: &Report) -> Vec<(String, BTreeSet<String>)> {
     let mut all: Vec<(String, BTreeSet<String>)> = Vec::new();
     for effect in &report.effects {
-        let joints = effect.joints.iter().cloned();
-        match all.iter_mut().find(|(kind, _)| *kind == effect.kind && kind != "transmission_coupling") {
+        let (joints, is_of_pair) = (effect.joints.iter().cloned(), effect.joints.len() == 2);
+        match all.iter_mut().find(|(kind, _)| *kind == effect.kind && !is_of_pair) {
             Some((_, all)) => all.extend(joints),
             None => all.push((effect.kind.clone(), joints.collect())),
         }

@@ -89,28 +89,37 @@ impl SecretKind {
 
     /// Draws an effect for motions that go through `samples` (`[q, v, a, torque]` of all joints, from the references).
     pub fn draw(self, robot: &Robot, samples: &[Sample], random: &mut ChaCha8Rng) -> Effect {
-        let joints = robot.tree.joint_count();
-        let joint = random.random_range(0..joints);
-        let share = random.random_range(SIZES[0]..SIZES[1]);
-        let rms = |value: &dyn Fn(&Sample) -> f64| {
-            (samples.iter().map(|sample| value(sample).powi(2)).sum::<f64>() / samples.len() as f64).sqrt()
-        };
-        let wanted = share * rms(&|sample| sample.torque[joint]);
-        let speed = rms(&|sample| sample.v[joint]);
-        // The size that makes an effect of size 1 as large as wanted.
-        let scale = |unit: &dyn Fn(&Sample) -> f64| wanted / rms(unit).max(1e-12);
-        let friction_scale =
-            |law: &Friction| scale(&|sample| law.torque(sample.v[joint], sample.t_s, sample.torque[joint]));
-        let angles = || samples.iter().map(|sample| sample.q[joint]);
-        let (lowest, highest) =
-            (angles().fold(f64::INFINITY, f64::min), angles().fold(f64::NEG_INFINITY, f64::max));
-        let width = robot.sign_width;
-        let friction = |law| Effect::Friction { joint, law };
+        let place = Place::draw(robot, samples, random);
         match self {
-            SecretKind::CoulombFriction => {
-                let torque = friction_scale(&Friction::Coulomb { torque: 1.0, width });
-                friction(Friction::Coulomb { torque, width })
+            SecretKind::CoulombFriction
+            | SecretKind::AsymmetricFriction
+            | SecretKind::StribeckFriction
+            | SecretKind::QuadraticFriction
+            | SecretKind::LoadDependentFriction
+            | SecretKind::ThermalDrift => {
+                Effect::Friction { joint: place.joint, law: self.friction(&place, random) }
             }
+            SecretKind::JointSpring
+            | SecretKind::TorqueRipple
+            | SecretKind::GravityBalancer
+            | SecretKind::EndStop => {
+                Effect::Mechanism { joint: place.joint, law: self.mechanism(&place, random) }
+            }
+            SecretKind::Hysteresis
+            | SecretKind::RotorInertia
+            | SecretKind::TransmissionCoupling
+            | SecretKind::JointElasticity
+            | SecretKind::TimeDelay => self.drive(&place, random),
+            SecretKind::ExternalForce | SecretKind::Payload | SecretKind::GravityTilt => {
+                self.load(&place, random)
+            }
+        }
+    }
+
+    /// A law of friction, of the wanted size.
+    fn friction(self, place: &Place<'_>, random: &mut ChaCha8Rng) -> Friction {
+        let (speed, width) = (place.speed(), place.robot.sign_width);
+        match self {
             SecretKind::AsymmetricFriction => {
                 let positive = random.random_bool(0.5);
                 let law = |size: f64| Friction::Asymmetric {
@@ -119,25 +128,20 @@ impl SecretKind {
                     torque: 0.0,
                     width,
                 };
-                friction(law(friction_scale(&law(1.0))))
+                law(place.friction_scale(&law(1.0)))
             }
             SecretKind::StribeckFriction => {
-                let fall = speed * random.random_range(0.1..0.3);
-                let law = |torque: f64| Friction::Stribeck {
-                    torque,
-                    speed: fall.max(2.0 * width),
-                    exponent: 1.5,
-                    width,
-                };
-                friction(law(friction_scale(&law(1.0))))
+                let fall = (speed * random.random_range(0.1..0.3)).max(2.0 * width);
+                let law = |torque: f64| Friction::Stribeck { torque, speed: fall, exponent: 1.5, width };
+                law(place.friction_scale(&law(1.0)))
             }
             SecretKind::QuadraticFriction => {
-                let coefficient = friction_scale(&Friction::Quadratic { coefficient: 1.0 });
-                friction(Friction::Quadratic { coefficient })
+                let law = |coefficient: f64| Friction::Quadratic { coefficient };
+                law(place.friction_scale(&law(1.0)))
             }
             SecretKind::LoadDependentFriction => {
-                let coefficient = friction_scale(&Friction::LoadDependent { coefficient: 1.0, width });
-                friction(Friction::LoadDependent { coefficient, width })
+                let law = |coefficient: f64| Friction::LoadDependent { coefficient, width };
+                law(place.friction_scale(&law(1.0)))
             }
             SecretKind::ThermalDrift => {
                 let time_constant_s = random.random_range(15.0..40.0);
@@ -147,74 +151,92 @@ impl SecretKind {
                     time_constant_s,
                     width,
                 };
-                friction(law(friction_scale(&law(1.0))))
+                law(place.friction_scale(&law(1.0)))
             }
-            SecretKind::Hysteresis => {
-                let way = random.random_range(0.05..0.2) * (highest - lowest);
-                let elements = [[0.3 * way, 0.4 * wanted], [way, 0.6 * wanted]];
-                Effect::Presliding { joint, law: Presliding::MaxwellSlip { elements: elements.to_vec() } }
+            _ => {
+                let law = |torque: f64| Friction::Coulomb { torque, width };
+                law(place.friction_scale(&law(1.0)))
             }
-            SecretKind::RotorInertia => {
-                Effect::RotorInertia { joint, inertia: scale(&|sample| sample.a[joint]) }
-            }
-            SecretKind::JointSpring => {
-                let rest = random.random_range(lowest..highest);
-                let stiffness = scale(&|sample| sample.q[joint] - rest);
-                Effect::Mechanism { joint, law: Mechanism::Spring { stiffness, rest } }
-            }
+        }
+    }
+
+    /// What pulls at a joint by its angle, of the wanted size.
+    fn mechanism(self, place: &Place<'_>, random: &mut ChaCha8Rng) -> Mechanism {
+        let joint = place.joint;
+        let [lowest, highest] = place.range();
+        match self {
             SecretKind::TorqueRipple => {
                 // At least two periods in the range, at most 6 Hz at usual speed.
-                let (fewest, most) = (2.0 * TAU / (highest - lowest), (6.0 * TAU / speed).min(40.0));
+                let (fewest, most) = (2.0 * TAU / (highest - lowest), (6.0 * TAU / place.speed()).min(40.0));
                 let cycles = (fewest + (most - fewest).max(0.0) * random.random::<f64>()).ceil();
-                let law = Mechanism::Ripple {
-                    torque: wanted * 2.0_f64.sqrt(),
-                    cycles,
-                    phase: random.random_range(0.0..TAU),
-                };
-                Effect::Mechanism { joint, law }
+                let torque = place.wanted() * 2.0_f64.sqrt();
+                Mechanism::Ripple { torque, cycles, phase: random.random_range(0.0..TAU) }
             }
             SecretKind::GravityBalancer => {
                 let zero = random.random_range(-3.0..3.0);
                 let law = |torque: f64| Mechanism::Balancer { torque, zero, arm: 0.35, rest: 0.25 };
-                let torque = scale(&|sample| law(1.0).torque(sample.q[joint]));
-                Effect::Mechanism { joint, law: law(torque) }
+                law(place.scale(&|sample| law(1.0).torque(sample.q[joint])))
             }
             SecretKind::EndStop => {
                 let upper = random.random_bool(0.5);
                 let depth = 0.15 * (highest - lowest);
                 let threshold = if upper { highest - depth } else { lowest + depth };
                 let law = |torque: f64| Mechanism::EndStop { threshold, upper, torque, depth, exponent: 1.0 };
-                let torque = scale(&|sample| law(1.0).torque(sample.q[joint]));
-                Effect::Mechanism { joint, law: law(torque) }
+                law(place.scale(&|sample| law(1.0).torque(sample.q[joint])))
+            }
+            _ => {
+                let rest = random.random_range(lowest..highest);
+                Mechanism::Spring { stiffness: place.scale(&|sample| sample.q[joint] - rest), rest }
+            }
+        }
+    }
+
+    /// What is in the drive of a joint, or of two.
+    fn drive(self, place: &Place<'_>, random: &mut ChaCha8Rng) -> Effect {
+        let (robot, joint) = (place.robot, place.joint);
+        match self {
+            SecretKind::Hysteresis => {
+                let ([lowest, highest], wanted) = (place.range(), place.wanted());
+                let way = random.random_range(0.05..0.2) * (highest - lowest);
+                let elements = [[0.3 * way, 0.4 * wanted], [way, 0.6 * wanted]];
+                Effect::Presliding { joint, law: Presliding::MaxwellSlip { elements: elements.to_vec() } }
+            }
+            SecretKind::RotorInertia => {
+                Effect::RotorInertia { joint, inertia: place.scale(&|sample| sample.a[joint]) }
             }
             SecretKind::TransmissionCoupling => {
-                let pairs: Vec<[usize; 2]> = (1..joints)
+                let pairs: Vec<[usize; 2]> = (1..robot.tree.joint_count())
                     .filter_map(|joint| robot.parent(joint).map(|parent| [parent, joint]))
                     .collect();
                 let pair = pairs[random.random_range(0..pairs.len())];
-                let torque = pair.map(|joint| rms(&|sample| sample.torque[joint]));
-                let sum = rms(&|sample| sample.v[pair[0]] + sample.v[pair[1]]);
+                let torque = pair.map(|joint| place.rms(&|sample| sample.torque[joint]));
+                let sum = place.rms(&|sample| sample.v[pair[0]] + sample.v[pair[1]]);
                 // As large as the smaller of both torques bears.
-                let size = share * torque[0].min(torque[1]);
+                let size = place.share * torque[0].min(torque[1]);
                 Effect::Coupling(Coupling::SharedFriction {
                     joints: pair,
                     coefficient: 0.6 * size / sum,
                     torque: 0.6 * size,
-                    width,
+                    width: robot.sign_width,
                 })
             }
             SecretKind::JointElasticity => {
                 // The spring turns by some hundredths of a radian under the joint's torque.
                 let twist = random.random_range(0.02..0.06);
-                let stiffness = rms(&|sample| sample.torque[joint]) / twist;
+                let stiffness = place.rms(&|sample| sample.torque[joint]) / twist;
                 let inertia = robot.world.rotor_inertia[joint];
-                Effect::Flexibility {
-                    joint,
-                    stiffness,
-                    damping: 0.1 * (stiffness * inertia).sqrt(),
-                    backlash: 0.0,
-                }
+                let damping = 0.1 * (stiffness * inertia).sqrt();
+                Effect::Flexibility { joint, stiffness, damping, backlash: 0.0 }
             }
+            _ => Effect::TimeDelay { joints: vec![joint], delay_s: random.random_range(0.006..0.015) },
+        }
+    }
+
+    /// What pulls at the bodies.
+    fn load(self, place: &Place<'_>, random: &mut ChaCha8Rng) -> Effect {
+        let robot = place.robot;
+        let joints = robot.tree.joint_count();
+        match self {
             SecretKind::ExternalForce => {
                 // Not on the first link, where it is a balancer as well.
                 let body = random.random_range(1..joints);
@@ -222,28 +244,69 @@ impl SecretKind {
                 let direction = [heading.cos() * rise.cos(), heading.sin() * rise.cos(), rise.sin()];
                 let point = [0; 3].map(|_| random.random_range(-0.1..0.1));
                 let felt = |sample: &Sample| moment(robot, body, point, direction, &sample.q);
-                let force = share * rms(&|sample| sample.torque[body]) / rms(&felt).max(1e-3);
+                let force =
+                    place.share * place.rms(&|sample| sample.torque[body]) / place.rms(&felt).max(1e-3);
                 Effect::ExternalForce { body, point, force: direction.map(|x| x * force) }
-            }
-            SecretKind::TimeDelay => {
-                Effect::TimeDelay { joints: vec![joint], delay_s: random.random_range(0.006..0.015) }
             }
             SecretKind::Payload => {
                 let body = random.random_range(1..joints);
                 let own = robot.tree.bodies()[body].inertial[0];
                 let center = [0; 3].map(|_| random.random_range(-0.08..0.08));
-                Effect::Payload {
-                    body,
-                    mass: own * random.random_range(0.2..0.5),
-                    center,
-                    radii: [0.03, 0.035, 0.04],
-                }
+                let mass = own * random.random_range(0.2..0.5);
+                Effect::Payload { body, mass, center, radii: [0.03, 0.035, 0.04] }
             }
-            SecretKind::GravityTilt => Effect::GravityTilt {
+            _ => Effect::GravityTilt {
                 heading: random.random_range(0.0..TAU),
                 angle: random.random_range(0.03..0.1),
             },
         }
+    }
+}
+
+/// Where a secret is, and what there is to measure its size by.
+struct Place<'a> {
+    robot: &'a Robot,
+    samples: &'a [Sample],
+    joint: usize,
+    /// RMS of the secret's torque over that of the joint's.
+    share: f64,
+}
+
+impl<'a> Place<'a> {
+    fn draw(robot: &'a Robot, samples: &'a [Sample], random: &mut ChaCha8Rng) -> Self {
+        let joint = random.random_range(0..robot.tree.joint_count());
+        Place { robot, samples, joint, share: random.random_range(SIZES[0]..SIZES[1]) }
+    }
+
+    fn rms(&self, value: &dyn Fn(&Sample) -> f64) -> f64 {
+        let sum = self.samples.iter().map(|sample| value(sample).powi(2)).sum::<f64>();
+        (sum / self.samples.len() as f64).sqrt()
+    }
+
+    /// RMS that the secret's torque is to have \[N·m\].
+    fn wanted(&self) -> f64 {
+        self.share * self.rms(&|sample| sample.torque[self.joint])
+    }
+
+    /// RMS speed of the joint \[rad/s\].
+    fn speed(&self) -> f64 {
+        self.rms(&|sample| sample.v[self.joint])
+    }
+
+    /// Lowest and highest angle of the joint \[rad\].
+    fn range(&self) -> [f64; 2] {
+        let angles = || self.samples.iter().map(|sample| sample.q[self.joint]);
+        [angles().fold(f64::INFINITY, f64::min), angles().fold(f64::NEG_INFINITY, f64::max)]
+    }
+
+    /// The size that makes an effect of size 1 as large as wanted.
+    fn scale(&self, unit: &dyn Fn(&Sample) -> f64) -> f64 {
+        self.wanted() / self.rms(unit).max(1e-12)
+    }
+
+    fn friction_scale(&self, law: &Friction) -> f64 {
+        let joint = self.joint;
+        self.scale(&|sample| law.torque(sample.v[joint], sample.t_s, sample.torque[joint]))
     }
 }
 

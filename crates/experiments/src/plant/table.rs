@@ -4,6 +4,7 @@ use super::Arguments;
 use super::engine::Engine;
 use super::score::{Outcome, Scored};
 use super::secret::SecretKind;
+use phiw_report::statistics;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -69,9 +70,8 @@ pub fn markdown(cases: &[Scored], arguments: &Arguments) -> String {
 }
 
 fn median(values: impl Iterator<Item = f64>) -> String {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).map_or_else(|| "–".to_owned(), |middle| format!("{middle:.2}"))
+    let middle = statistics::median(&values.collect::<Vec<f64>>());
+    if middle.is_nan() { "–".to_owned() } else { format!("{middle:.2}") }
 }
 
 /// One line for each case.

@@ -9,6 +9,7 @@ use phiw_bspline_retarget::c3d::{C3dFormat, write_c3d};
 use phiw_bspline_retarget::embedded::embedded_motions;
 use phiw_bspline_retarget::{MarkerRecording, read_recording};
 use phiw_report::plot::{BoxGroup, BoxPlot, box_plot};
+use phiw_report::statistics::median;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -181,13 +182,6 @@ pub fn c3d_files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     }
     files.sort();
     Ok(files)
-}
-
-/// The middle one.
-pub fn median(values: &[f64]) -> f64 {
-    let mut values = values.to_vec();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 fn largest(values: &[f64]) -> f64 {

@@ -1,13 +1,13 @@
 //! Figure 9: time and final cost of retargeting one motion of T = 740 from several starts, without and with splines by quasi-Newton, and
 //! by the solver that knows the structure.
 
-use super::database::median;
 use super::page::Page;
 use super::{Example, Scene};
 use phiw_bspline_retarget::bspline::Basis;
 use phiw_bspline_retarget::solver::{Iterations, QuasiNewton, Solution, quasi_newton, solve};
-use phiw_bspline_retarget::{Problem, RetargetOptions};
+use phiw_bspline_retarget::{Calibration, MarkerRecording, Problem, RetargetOptions, Retargeter};
 use phiw_report::plot::{BoxGroup, BoxPlot, box_plot};
+use phiw_report::statistics::median;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -55,11 +55,13 @@ pub fn measure(scene: &Scene, starts: usize, seed: u64, page: &mut Page) -> anyh
         splines.variables(),
         samples.variables()
     ));
-    let iterations = Iterations { hard_limits: false, ..options.iterations };
-    let mut seconds = vec![Vec::new(); STRATEGIES.len()];
-    let mut costs = vec![Vec::new(); STRATEGIES.len()];
-    // When the quasi-Newton methods could have stopped, had they known where they would end.
-    let mut as_good = [Vec::new(), Vec::new()];
+    let subject = Subject {
+        retargeter: &retargeter,
+        recording: &recording,
+        calibration: calibration.as_ref(),
+        iterations: Iterations { hard_limits: false, ..options.iterations },
+    };
+    let mut measured = Measured::default();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     for start in 0..starts {
         let shift: Vec<f64> = (0..splines.coordinates())
@@ -68,105 +70,164 @@ pub fn measure(scene: &Scene, starts: usize, seed: u64, page: &mut Page) -> anyh
                 SPREAD * draw
             })
             .collect();
+        subject.run_all(start, [&samples, &splines], &shift, &mut measured)?;
+    }
+    measured.say(page);
+    let better = measured.better();
+    let (time, cost) = (median(&measured.seconds[better]), median(&measured.costs[better]));
+    subject.say_when_as_low(time, cost, page)?;
+    measured.draw(starts, page);
+    Ok(())
+}
+
+/// What is retargeted, and how far the structured solver goes.
+struct Subject<'a> {
+    retargeter: &'a Retargeter,
+    recording: &'a MarkerRecording,
+    calibration: Option<&'a Calibration>,
+    iterations: Iterations,
+}
+
+impl Subject<'_> {
+    /// Runs all strategies from one start: rest, shifted by `shift` \[rad\].
+    fn run_all(
+        &self,
+        start: usize,
+        [samples, splines]: [&Problem<'_>; 2],
+        shift: &[f64],
+        measured: &mut Measured,
+    ) -> anyhow::Result<()> {
         let shifted = |problem: &Problem<'_>| {
-            let mut variables = retargeter.placed_at_rest(problem, calibration.as_ref());
+            let mut variables = self.retargeter.placed_at_rest(problem, self.calibration);
             let control = problem.basis().control_points() * shift.len();
             for (variable, shift) in variables[..control].iter_mut().zip(shift.iter().cycle()) {
                 *variable += shift;
             }
             variables
         };
-        let mut run =
-            |strategy: usize, solver: &dyn Fn() -> anyhow::Result<Solution>| -> anyhow::Result<()> {
-                let begin = Instant::now();
-                let solution = solver()?;
-                let duration = begin.elapsed().as_secs_f64();
-                println!(
-                    "start {start}, {}: {duration:.3} s, cost {:.4}, {} steps, {:?}",
-                    STRATEGIES[strategy],
-                    solution.cost.total(),
-                    solution.iterations,
-                    solution.stop
-                );
-                seconds[strategy].push(duration);
-                costs[strategy].push(solution.cost.total());
-                Ok(())
-            };
         let quasi = QuasiNewton::default();
-        for (strategy, problem) in [&samples, &splines].into_iter().enumerate() {
+        for (strategy, problem) in [samples, splines].into_iter().enumerate() {
             let way: RefCell<Vec<(f64, f64)>> = RefCell::default();
-            run(strategy, &|| {
+            measured.run(start, strategy, &|| {
                 let begin = Instant::now();
                 let seen = |cost| way.borrow_mut().push((begin.elapsed().as_secs_f64(), cost));
                 Ok(quasi_newton(problem, shifted(problem), &quasi, &seen))
             })?;
-            as_good[strategy].push(as_good_as_done(&way.borrow()));
+            measured.as_good[strategy].push(as_good_as_done(&way.borrow()));
         }
-        run(2, &|| Ok(solve(&splines, shifted(&splines), &iterations)))?;
-        // From the recording on: the search for the start is in the time.
-        let from_own_start =
-            |solver: &dyn Fn(&Problem<'_>, Vec<f64>) -> Solution| -> anyhow::Result<Solution> {
-                let person = retargeter.person(&recording, calibration.as_ref())?;
-                let problem = retargeter.problem(&person, &recording);
-                let first = retargeter.start(&problem, &person);
-                Ok(solver(&problem, first))
-            };
-        run(3, &|| from_own_start(&|problem, first| solve(problem, first, &iterations)))?;
-        run(4, &|| from_own_start(&|problem, first| quasi_newton(problem, first, &quasi, &|_| {})))?;
+        measured.run(start, 2, &|| Ok(solve(splines, shifted(splines), &self.iterations)))?;
+        measured
+            .run(start, 3, &|| self.own_start(&|problem, first| solve(problem, first, &self.iterations)))?;
+        measured.run(start, 4, &|| {
+            self.own_start(&|problem, first| quasi_newton(problem, first, &quasi, &|_| {}))
+        })
     }
-    for (strategy, name) in STRATEGIES.iter().enumerate() {
+
+    /// From the recording on: the search for the start is in the time.
+    fn own_start(&self, solver: &dyn Fn(&Problem<'_>, Vec<f64>) -> Solution) -> anyhow::Result<Solution> {
+        let person = self.retargeter.person(self.recording, self.calibration)?;
+        let problem = self.retargeter.problem(&person, self.recording);
+        let first = self.retargeter.start(&problem, &person);
+        Ok(solver(&problem, first))
+    }
+
+    /// The first number of steps of the structured solver that gives a cost as low, from the recording on, against the `time` \[s\] of another.
+    fn say_when_as_low(&self, time: f64, cost: f64, page: &mut Page) -> anyhow::Result<()> {
+        for most in 0..self.iterations.most {
+            let begin = Instant::now();
+            let iterations = Iterations { most, ..self.iterations };
+            let solution = self.own_start(&|problem, first| solve(problem, first, &iterations))?;
+            let duration = begin.elapsed().as_secs_f64();
+            if solution.cost.total() <= cost {
+                page.say(&format!(
+                    "To the same cost ({:.4} against {cost:.4}) it takes {duration:.3} s: {:.0} times as fast",
+                    solution.cost.total(),
+                    time / duration
+                ));
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What came of all starts.
+#[derive(Default)]
+struct Measured {
+    /// Time of each strategy's runs \[s\].
+    seconds: [Vec<f64>; STRATEGIES.len()],
+    /// Final costs of each strategy's runs.
+    costs: [Vec<f64>; STRATEGIES.len()],
+    /// When the quasi-Newton methods could have stopped, had they known where they would end \[s\].
+    as_good: [Vec<f64>; 2],
+}
+
+impl Measured {
+    fn run(
+        &mut self,
+        start: usize,
+        strategy: usize,
+        solver: &dyn Fn() -> anyhow::Result<Solution>,
+    ) -> anyhow::Result<()> {
+        let begin = Instant::now();
+        let solution = solver()?;
+        let duration = begin.elapsed().as_secs_f64();
+        println!(
+            "start {start}, {}: {duration:.3} s, cost {:.4}, {} steps, {:?}",
+            STRATEGIES[strategy],
+            solution.cost.total(),
+            solution.iterations,
+            solution.stop
+        );
+        self.seconds[strategy].push(duration);
+        self.costs[strategy].push(solution.cost.total());
+        Ok(())
+    }
+
+    /// The quasi-Newton method with the lower cost.
+    fn better(&self) -> usize {
+        if median(&self.costs[0]) < median(&self.costs[1]) { 0 } else { 1 }
+    }
+
+    fn say(&self, page: &mut Page) {
+        for (strategy, name) in STRATEGIES.iter().enumerate() {
+            page.say(&format!(
+                "{name}: median {:.3} s, cost {:.4}",
+                median(&self.seconds[strategy]),
+                median(&self.costs[strategy])
+            ));
+        }
+        let better = self.better();
         page.say(&format!(
-            "{name}: median {:.3} s, cost {:.4}",
-            median(&seconds[strategy]),
-            median(&costs[strategy])
+            "To its end the structured solver with its own start is {:.0} times as fast as the better of the two ({}), at {:.3} of its cost",
+            median(&self.seconds[better]) / median(&self.seconds[3]),
+            STRATEGIES[better],
+            median(&self.costs[3]) / median(&self.costs[better])
+        ));
+        page.say(&format!(
+            "Had the quasi-Newton method stopped as soon as it was within {:.1} % of its own final cost, which it cannot know, it would have \
+             taken {:.3} s over samples and {:.3} s over B-splines: {:.0} times as long as the structured solver to its end",
+            100.0 * AS_GOOD_AS_DONE,
+            median(&self.as_good[0]),
+            median(&self.as_good[1]),
+            median(&self.as_good[better]) / median(&self.seconds[3])
         ));
     }
-    let better = if median(&costs[0]) < median(&costs[1]) { 0 } else { 1 };
-    let (time, cost) = (median(&seconds[better]), median(&costs[better]));
-    page.say(&format!(
-        "To its end the structured solver with its own start is {:.0} times as fast as the better of the two ({}), at {:.3} of its cost",
-        time / median(&seconds[3]),
-        STRATEGIES[better],
-        median(&costs[3]) / cost
-    ));
-    page.say(&format!(
-        "Had the quasi-Newton method stopped as soon as it was within {:.1} % of its own final cost, which it cannot know, it would have \
-         taken {:.3} s over samples and {:.3} s over B-splines: {:.0} times as long as the structured solver to its end",
-        100.0 * AS_GOOD_AS_DONE,
-        median(&as_good[0]),
-        median(&as_good[1]),
-        median(&as_good[better]) / median(&seconds[3])
-    ));
-    // The first number of steps that gives a cost as low, from the recording on.
-    for most in 0..iterations.most {
-        let begin = Instant::now();
-        let person = retargeter.person(&recording, calibration.as_ref())?;
-        let problem = retargeter.problem(&person, &recording);
-        let first = retargeter.start(&problem, &person);
-        let solution = solve(&problem, first, &Iterations { most, ..iterations });
-        let duration = begin.elapsed().as_secs_f64();
-        if solution.cost.total() <= cost {
-            page.say(&format!(
-                "To the same cost ({:.4} against {cost:.4}) it takes {duration:.3} s: {:.0} times as fast",
-                solution.cost.total(),
-                time / duration
-            ));
-            break;
+
+    fn draw(&self, starts: usize, page: &mut Page) {
+        let places = STRATEGIES.map(str::to_owned);
+        for (samples, label) in [(&self.seconds, "time [s]"), (&self.costs, "final cost")] {
+            let groups = [BoxGroup { name: "starts", samples }];
+            let plot = BoxPlot {
+                groups: &groups,
+                places: &places,
+                x_label: "strategy",
+                y_label: label,
+                logarithmic: true,
+            };
+            page.picture(box_plot(&plot).as_str(), &format!("{label} over {starts} starts"));
         }
     }
-    let places = STRATEGIES.map(str::to_owned);
-    for (samples, label) in [(&seconds, "time [s]"), (&costs, "final cost")] {
-        let groups = [BoxGroup { name: "starts", samples }];
-        let plot = BoxPlot {
-            groups: &groups,
-            places: &places,
-            x_label: "strategy",
-            y_label: label,
-            logarithmic: true,
-        };
-        page.picture(box_plot(&plot).as_str(), &format!("{label} over {starts} starts"));
-    }
-    Ok(())
 }
 
 /// The first time at which a way of (time, cost) is nearly as low as it ever gets.

@@ -4,12 +4,12 @@ use super::curriculum::Outcome;
 use crate::paper::{RunFile, Score, balance, choices};
 use phiw_curriculum::RobotModel;
 use phiw_dynamics::Tree;
+use phiw_effects::sentence;
 use phiw_identification::TorqueError;
 use phiw_plant::{Effect, Friction};
 use phiw_report::number::{percent, significant};
 use phiw_report::page::{ExperimentPage, Picture, Section, Table};
 use phiw_report::plot::{BarGroup, IterationLine, Iterations, JointBars, iterations, joint_bars};
-use phiw_residual::catalogue::sentence;
 
 /// The page.
 ///

@@ -4,6 +4,7 @@ use super::kind::Name;
 use super::run::Scored;
 use super::score::{Outcome, Score};
 use super::suite::Suite;
+use phiw_report::statistics;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -168,9 +169,7 @@ fn by_robot(cases: &[&Scored], text: &mut String) {
 fn timing(cases: &[&Scored], text: &mut String) {
     let seconds: Vec<f64> = cases.iter().filter(|case| case.score.is_ok()).map(|case| case.seconds).collect();
     let longest = seconds.iter().copied().fold(0.0, f64::max);
-    let mut sorted = seconds;
-    sorted.sort_by(f64::total_cmp);
-    let middle = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    let middle = if seconds.is_empty() { 0.0 } else { statistics::median(&seconds) };
     let _ = writeln!(text, "\n`explain` took {middle:.2} s in the median, {longest:.2} s at most.\n");
 }
 
@@ -258,10 +257,9 @@ pub fn percent(part: usize, whole: usize) -> String {
     format!("{:.1} %", 100.0 * part as f64 / whole.max(1) as f64)
 }
 
-fn median(mut values: Vec<f64>) -> String {
-    values.sort_by(f64::total_cmp);
-    match values.get(values.len() / 2) {
-        Some(middle) => format!("{:.1} % of {} cases", 100.0 * middle, values.len()),
-        None => "no case".to_owned(),
+fn median(values: Vec<f64>) -> String {
+    match values.len() {
+        0 => "no case".to_owned(),
+        count => format!("{:.1} % of {count} cases", 100.0 * statistics::median(&values)),
     }
 }

@@ -3,16 +3,20 @@
 use super::motions::Motions;
 use crate::Error;
 use crate::arguments::NextArguments;
+use crate::model_file::ModelFile;
 use crate::session::{Session, declared};
-use phiw_curriculum::{CurriculumError, KnownEffect, RobotModel};
-use phiw_dynamics::Tree;
-use phiw_identification::{
-    Design, EffectCatalogue, EffectSpec, Fit, Identified, Model, Progress, fit, identify, merge, with_masses,
+use phiw_curriculum::{
+    BayesianLeastSquares, Candidates, CurriculumError, Estimate, Estimator, Evidence, LogNoise, Prior, Robot,
+    RobotModel, RowsAt, Triangle,
 };
-use phiw_regressor::factor::{Factor, FactorBuilder};
-use phiw_regressor::least_squares::GroupedFactor;
+use phiw_dynamics::{InertialParameters, Tree};
+use phiw_effects::Catalogue;
+use phiw_identification::{
+    Design, EffectCatalogue, EffectSpec, IdentificationError, Identified, Progress, check_size_of_robot, fit,
+    identify, merge, with_masses,
+};
+use phiw_limits::Limits;
 use phiw_regressor::{BaseParameters, RegressorError};
-use phiw_residual::Catalogue;
 use phiw_telemetry::Survey;
 use serde::Serialize;
 
@@ -28,184 +32,137 @@ pub enum Source {
     Logs,
 }
 
-/// The present estimate.
-pub struct Estimate {
-    /// Where it comes from.
+/// What is believed and what has been measured.
+pub struct Present {
+    /// Where the estimate comes from.
     pub source: Source,
-    /// Standard parameters and effects.
-    pub model: RobotModel,
-    /// The belief before anything was measured.
-    pub initial: RobotModel,
+    /// The robot with the effects of the model.
+    pub robot: Robot,
     /// The columns of the model.
     pub design: Design,
-    /// w, in the design's order.
-    pub parameters: Vec<f64>,
-    /// R of all that is known of w, in rows of unit variance: what has been measured, and the URDF.
-    pub known: Factor,
-    /// The parameters that its columns stand for; the others (effects that no log has excited) are zero.
-    pub determined: Vec<usize>,
-    /// What has been measured; none if no log is given.
-    pub measured: Option<MeasuredLogs>,
+    /// The URDF, and how far off it may be.
+    pub prior: Prior,
+    /// w in the design's order, and how sure it is.
+    pub estimate: Estimate,
+    /// The present belief.
+    pub model: RobotModel,
+    /// What each motion would tell.
+    pub candidates: Candidates,
+    /// R of all that has been measured, in the columns of the candidates; none if no log is given.
+    pub triangle: Option<Triangle>,
+    /// cond(Φ) of all that had been measured after each log.
+    pub condition_numbers: Vec<Option<f64>>,
+    /// How many logs there are, and how long they are together \[s\].
+    pub measured: Option<(usize, f64)>,
 }
 
 /// The measured logs, reduced.
-pub struct MeasuredLogs {
-    /// The factors of their rows.
-    pub factor: GroupedFactor,
-    /// Those of the first log's.
-    pub first: GroupedFactor,
-    /// Rows a second that each torque has in them \[Hz\].
-    pub rate_hz: f64,
-    /// How long they are \[s\].
-    pub seconds: f64,
-    /// How many there are.
-    pub logs: usize,
+struct MeasuredLogs {
+    /// What had been measured after each log.
+    after_each: Vec<Evidence>,
+    /// How long they are together \[s\].
+    seconds: f64,
 }
 
-/// Weighted rows of \[Φ f\].
-struct Evidence {
-    factor: Factor,
-    /// The parameters that its columns stand for; the others are zero in it.
-    columns: Vec<usize>,
-    /// How many times wider standard deviations are than those of independent rows: samples of a log are correlated.
-    correlation: f64,
+/// A model's columns and what is known of their parameters.
+struct Known {
+    source: Source,
+    design: Design,
+    evidence: Evidence,
+    noise: LogNoise,
+    measured: Option<MeasuredLogs>,
 }
 
-impl Estimate {
+impl Present {
     /// Reads the model file and the logs that are given.
     pub fn new(
         arguments: &NextArguments,
         tree: &Tree,
+        base_link: InertialParameters,
         motions: &Motions,
         progress: Progress<'_>,
     ) -> Result<Self, Error> {
-        let model = arguments.model.as_ref().map(|path| read_model(path)).transpose()?;
-        let logs = match arguments.measured.is_empty() {
-            true => None,
-            false => Some(Logs::new(arguments, tree, model.as_ref(), progress)?),
-        };
-        let share = arguments.urdf_error;
-        match (model, logs) {
-            (Some(model), logs) => {
-                let (design, _) = model.design(tree, &Catalogue::default())?;
-                let measured = logs.map(|logs| logs.measured);
-                Self::of_evidence(design, Some((Source::Model, Evidence::of_model(&model)?)), measured, share)
-            }
-            (None, Some(Logs { design, evidence, measured })) => {
-                Self::of_evidence(design, Some((Source::Logs, evidence)), Some(measured), share)
-            }
-            (None, None) => {
-                Self::of_evidence(unmeasured_design(arguments, tree, motions)?, None, None, share)
-            }
-        }
-    }
-
-    /// The likeliest parameters, and how sure they are.
-    fn of_evidence(
-        design: Design,
-        evidence: Option<(Source, Evidence)>,
-        measured: Option<MeasuredLogs>,
-        urdf_error: f64,
-    ) -> Result<Self, Error> {
-        let reference = with_masses(design.tree());
-        let (known, determined) =
-            posterior(&design, &reference, urdf_error, evidence.as_ref().map(|(_, evidence)| evidence))
-                .map_err(CurriculumError::from)?;
-        let mut parameters = vec![0.0; design.parameter_count()];
-        let found = known.solve().map_err(CurriculumError::from)?.parameters;
-        determined.iter().zip(found).for_each(|(&parameter, value)| parameters[parameter] = value);
-        let base = design.base();
-        let standard =
-            base.to_standard(&parameters[..base.count()], &reference).map_err(CurriculumError::from)?;
-        Ok(Estimate {
-            source: evidence.map_or(Source::Urdf, |(source, _)| source),
-            model: RobotModel { standard, effects: effects(&design, &parameters) },
-            initial: RobotModel {
-                standard: reference,
-                effects: effects(&design, &vec![0.0; parameters.len()]),
-            },
+        let Known { source, design, evidence, noise, measured } =
+            Known::read(arguments, tree, motions, progress)?;
+        let catalogue = Catalogue::default();
+        let robot =
+            Robot::with_base(tree.clone(), design.base().clone(), base_link, specs(&design), catalogue)?;
+        let nothing = vec![0.0; design.parameter_count() - design.base().count()];
+        let initial = RobotModel { standard: with_masses(tree), ..robot.truth(&nothing)? };
+        let prior = Prior { model: initial, share: arguments.urdf_error };
+        let estimator = BayesianLeastSquares { noise, prior: prior.clone() };
+        let present = prior.model.parameters(&robot)?;
+        let estimate = estimator.estimate(&design, &evidence, &prior.model, &present)?;
+        let model = prior.model.with_parameters(&robot, &specs(&design), &estimate.parameters)?;
+        let weights = vec![1.0; tree.joint_count()];
+        let candidates = Candidates::foreseeable(&robot, &design, &motions.dataset, &weights)?;
+        let after_each = measured.iter().flat_map(|measured| &measured.after_each);
+        let triangles: Vec<Triangle> = after_each
+            .map(|logs| candidates.measured(logs))
+            .collect::<Result<_, _>>()
+            .map_err(CurriculumError::from)?;
+        let condition_numbers = triangles.iter().map(|all| Some(all.condition_number())).collect();
+        let measured = measured.map(|measured| (measured.after_each.len(), measured.seconds));
+        Ok(Present {
+            source,
+            robot,
             design,
-            parameters,
-            known,
-            determined,
+            prior,
+            estimate,
+            model,
+            candidates,
+            triangle: triangles.into_iter().last(),
+            condition_numbers,
             measured,
         })
     }
 }
 
-/// The evidence, its rows counted as so many independent ones, and the URDF as more rows: each standard parameter within `urdf_error` of its
-/// body's magnitude. Without the URDF, one short log would leave a resting arm's parameters to the noise.
-fn posterior(
-    design: &Design,
-    reference: &[f64],
-    urdf_error: f64,
-    evidence: Option<&Evidence>,
-) -> Result<(Factor, Vec<usize>), RegressorError> {
-    let (base, count) = (design.base(), design.parameter_count());
-    let mut builder = FactorBuilder::new(count + 1);
-    let mut columns: Vec<usize> = (0..count).collect();
-    if let Some(evidence) = evidence {
-        columns = evidence.columns.clone();
-        let with_torque: Vec<usize> = columns.iter().copied().chain([count]).collect();
-        builder.push_factor(&evidence.factor, &with_torque, 1.0 / evidence.correlation)?;
+impl Known {
+    fn read(
+        arguments: &NextArguments,
+        tree: &Tree,
+        motions: &Motions,
+        progress: Progress<'_>,
+    ) -> Result<Self, Error> {
+        let model = arguments.model.as_ref().map(|path| ModelFile::read(path)).transpose()?;
+        let logs = match arguments.measured.is_empty() {
+            true => None,
+            false => Some(Self::of_logs(arguments, tree, model.as_ref(), progress)?),
+        };
+        match (model, logs) {
+            (Some(model), logs) => {
+                let known = Self::of_model(arguments, tree, &model)?;
+                Ok(Known { measured: logs.and_then(|logs| logs.measured), ..known })
+            }
+            (None, Some(logs)) => Ok(logs),
+            (None, None) => {
+                let design = unmeasured_design(arguments, tree, motions)?;
+                let evidence = Evidence::none(&design, RowsAt::Stamps)?;
+                let noise = LogNoise::unit(evidence.factor().groups().len());
+                Ok(Known { source: Source::Urdf, design, evidence, noise, measured: None })
+            }
+        }
     }
-    let mut row = vec![0.0; count + 1];
-    for prior in base.prior_rows(reference, urdf_error)?.chunks_exact(base.count() + 1) {
-        row[..base.count()].copy_from_slice(&prior[..base.count()]);
-        row[count] = prior[base.count()];
-        builder.push_row(&row)?;
-    }
-    let known = builder.factor();
-    let undetermined = known.undetermined_columns();
-    let determined: Vec<usize> =
-        columns.into_iter().filter(|parameter| !undetermined.contains(parameter)).collect();
-    let kept: Vec<usize> = determined.iter().copied().chain([count]).collect();
-    Ok((known.select(&kept)?, determined))
-}
 
-impl Evidence {
-    fn of_model(model: &Model) -> Result<Self, Error> {
+    fn of_model(arguments: &NextArguments, tree: &Tree, file: &ModelFile) -> Result<Self, Error> {
+        let (design, _) = file.design(&arguments.urdf, tree, &Catalogue::default())?;
+        let model = &file.model;
         let effects = model.effects.iter().flat_map(|effect| &effect.parameters);
         let named = model.base_parameters.iter().chain(effects);
         let deviations: Vec<f64> = named.map(|parameter| parameter.std.unwrap_or(f64::NAN)).collect();
-        let (factor, columns) = (model.factor.factor()?, model.factor.parameters.clone());
-        Ok(Evidence { correlation: correlation(&factor, &columns, &deviations), factor, columns })
+        let (factor, parameters) = (file.factor()?, model.factor.parameters.clone());
+        let noise = LogNoise::of_weighted_rows(&factor, &parameters, &deviations);
+        let evidence = Evidence::of_weighted_rows(design.parameter_count(), parameters, factor)
+            .map_err(CurriculumError::from)?;
+        Ok(Known { source: Source::Model, design, evidence, noise, measured: None })
     }
 
-    /// All columns of the logs, those that they do not determine included: the URDF will.
-    fn of_fit(fit: &Fit, measured: &GroupedFactor) -> Result<Self, RegressorError> {
-        let weights: Vec<f64> = fit.residual_std.iter().map(|std| 1.0 / std).collect();
-        Ok(Evidence {
-            correlation: correlation(&fit.factor, &fit.determined(), &fit.standard_deviations),
-            factor: measured.combine(&weights)?,
-            columns: (0..measured.parameter_count()).collect(),
-        })
-    }
-}
-
-/// The median over the parameters of their standard deviation over that of independent rows; 1 where nothing tells.
-fn correlation(factor: &Factor, columns: &[usize], deviations: &[f64]) -> f64 {
-    let Ok(independent) = factor.standard_deviations(1.0) else { return 1.0 };
-    let ratios =
-        columns.iter().zip(independent).map(|(&parameter, independent)| deviations[parameter] / independent);
-    let mut ratios: Vec<f64> = ratios.filter(|ratio| ratio.is_finite()).collect();
-    ratios.sort_by(f64::total_cmp);
-    ratios.get(ratios.len() / 2).copied().unwrap_or(1.0).max(1.0)
-}
-
-/// The logs, and what they say.
-struct Logs {
-    design: Design,
-    evidence: Evidence,
-    measured: MeasuredLogs,
-}
-
-impl Logs {
     /// Fits the declared model (or the columns of `model`) to all logs.
-    fn new(
+    fn of_logs(
         arguments: &NextArguments,
         tree: &Tree,
-        model: Option<&Model>,
+        model: Option<&ModelFile>,
         progress: Progress<'_>,
     ) -> Result<Self, Error> {
         // A first motion may leave joints at rest: the next will not.
@@ -214,7 +171,7 @@ impl Logs {
         let data = session.data(&sources);
         let effects = match model {
             Some(model) => {
-                let (design, _) = model.design(tree, &session.catalogue)?;
+                let (design, _) = model.design(&arguments.urdf, tree, &session.catalogue)?;
                 let build = |spec: &EffectSpec| Ok(vec![session.catalogue.build(spec, tree)?]);
                 specs(&design).iter().map(build).collect::<Result<_, Error>>()?
             }
@@ -223,28 +180,22 @@ impl Logs {
         let Identified { design, train_folds, held_out_folds, .. } = identify(tree, effects, &data)?;
         // What was held out to choose constants has been measured, too.
         let folds = [train_folds, held_out_folds].concat();
-        let of_first = data.train.iter().chain(&data.held_out).zip(&folds).filter(|(fold, _)| fold.log == 0);
-        let first_log: Vec<GroupedFactor> = of_first.map(|(_, factor)| factor.clone()).collect();
-        let first = &session.logs.surveys()[0];
-        let measured = MeasuredLogs {
-            factor: merge(&folds).map_err(CurriculumError::from)?,
-            first: merge(&first_log).map_err(CurriculumError::from)?,
-            rate_hz: session.logs.conditioning().plan(first)?.output_rate_hz(),
-            seconds: session.logs.training().iter().map(Survey::duration).sum(),
-            logs: session.logs.training().len(),
+        let rate_hz = session.logs.conditioning().plan(&session.logs.surveys()[0])?.output_rate_hz();
+        let up_to = |log: usize| {
+            let stretches = data.train.iter().chain(&data.held_out).zip(&folds);
+            let own = stretches.filter(|(fold, _)| fold.log <= log).map(|(_, factor)| factor.clone());
+            Ok(Evidence::of_factor(merge(&own.collect::<Vec<_>>())?, Some(rate_hz)))
         };
-        let fit = fit(&design, &folds)?;
-        let evidence = Evidence::of_fit(&fit, &measured.factor).map_err(CurriculumError::from)?;
-        Ok(Logs { design, evidence, measured })
+        let surveys = session.logs.training();
+        let after_each: Result<Vec<Evidence>, RegressorError> = (0..surveys.len()).map(up_to).collect();
+        let measured = MeasuredLogs {
+            after_each: after_each.map_err(CurriculumError::from)?,
+            seconds: surveys.iter().map(Survey::duration).sum(),
+        };
+        let noise = LogNoise::of_fit(&fit(&design, &folds)?);
+        let evidence = Evidence::of_factor(merge(&folds).map_err(CurriculumError::from)?, Some(rate_hz));
+        Ok(Known { source: Source::Logs, design, evidence, noise, measured: Some(measured) })
     }
-}
-
-fn read_model(path: &std::path::Path) -> Result<Model, Error> {
-    let text = crate::input::read_text(path, phiw_limits::Limits::default().model_bytes)?;
-    let model: Model =
-        serde_json::from_str(&text).map_err(|source| Error::NotAModel { path: path.to_owned(), source })?;
-    model.check().map_err(|source| Error::Model { path: path.to_owned(), source: Box::new(source) })?;
-    Ok(model)
 }
 
 /// The declared columns when there is no log yet. Nothing can choose among an effect's constants then: the simplest stand for all.
@@ -255,18 +206,13 @@ fn unmeasured_design(arguments: &NextArguments, tree: &Tree, motions: &Motions) 
         let variants = catalogue.declare(&kind, tree, &motions.ranges)?;
         effects.extend(variants.into_iter().filter_map(|variants| variants.into_iter().next()));
     }
+    // The factors of a motion, and those of all that is known.
+    let of_effects = effects.iter().map(|effect| effect.as_ref());
+    check_size_of_robot(tree, of_effects, 2, &Limits::default()).map_err(IdentificationError::from)?;
     let base = BaseParameters::of_tree(tree, Default::default()).map_err(CurriculumError::from)?;
     Ok(Design::new(tree.clone(), base, effects))
 }
 
 fn specs(design: &Design) -> Vec<EffectSpec> {
     design.effects().iter().map(|effect| effect.spec()).collect()
-}
-
-fn effects(design: &Design, parameters: &[f64]) -> Vec<KnownEffect> {
-    let known = |index: usize| KnownEffect {
-        spec: design.effects()[index].spec(),
-        parameters: parameters[design.effect_parameters(index)].to_vec(),
-    };
-    (0..design.effects().len()).map(known).collect()
 }

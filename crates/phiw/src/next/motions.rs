@@ -1,10 +1,10 @@
 //! The motions to choose from: a folder of logs without torques, as `phiw retarget` writes them.
 
 use crate::Error;
-use phiw_curriculum::{Motion, MotionDataset};
+use phiw_curriculum::{CurriculumError, Motion, MotionDataset, StepTolerance};
 use phiw_dynamics::{JointType, Tree};
+use phiw_effects::SignalRanges;
 use phiw_identification::{IdentificationError, Progress};
-use phiw_residual::SignalRanges;
 use phiw_telemetry::{Recording, Survey, TorqueColumns};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -35,13 +35,16 @@ pub fn read(folder: &Path, tree: &Tree, progress: Progress<'_>) -> Result<Motion
         return Err(Error::NoMotions { folder: folder.to_owned() });
     }
     let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
+    let speed_limits: Vec<f64> =
+        (0..tree.joint_count()).map(|joint| tree.joint(joint).limits.velocity).collect();
     let (done, total) = (AtomicU64::new(0), files.len() as u64);
     let read = |path: &PathBuf| {
         let log = |source| Error::from(IdentificationError::from(source));
         let recording = Recording::from_csv(path, &joints, TorqueColumns::Absent).map_err(log)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        let motion = Motion::from_recording(&name, "", &recording)
-            .map_err(|source| Error::Motion { path: path.clone(), source })?;
+        let wrong = |source: CurriculumError| Error::Motion { path: path.clone(), source: Box::new(source) };
+        let motion = Motion::from_recording(&name, "", &recording).map_err(wrong)?;
+        motion.check_steps(&joints, &speed_limits, &StepTolerance::default()).map_err(wrong)?;
         progress("reading motions", done.fetch_add(1, Ordering::Relaxed) + 1, total);
         Ok((motion, recording.survey().map_err(log)?))
     };

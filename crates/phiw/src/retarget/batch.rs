@@ -1,11 +1,11 @@
 //! Many recordings, in parallel, each by itself.
 
 use super::motion_file::{MotionFile, Settings};
-use super::stem;
 use crate::Error;
 use crate::arguments::RetargetArguments;
 use crate::console::Console;
 use phiw_bspline_retarget::{Artefact, Calibration, Quality, RecordingError, RetargetError, Retargeter};
+use phiw_report::statistics::median;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -126,7 +126,8 @@ fn summary(
         counts.failed
     );
     if !qualities.is_empty() {
-        let median = |value: &dyn Fn(&Quality) -> f64| median(qualities.iter().map(|q| value(q)).collect());
+        let median =
+            |value: &dyn Fn(&Quality) -> f64| median(&qualities.iter().map(|q| value(q)).collect::<Vec<_>>());
         let most = |value: &dyn Fn(&Quality) -> f64| qualities.iter().map(|q| value(q)).fold(0.0, f64::max);
         let _ = writeln!(
             summary,
@@ -220,7 +221,7 @@ fn one(
     Ok(Done::Retargeted(Box::new(motion.quality), recording.duration_s(), artefacts))
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+/// A file's name without folder and extension.
+pub(super) fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }

@@ -83,14 +83,7 @@ fn unwritable(path: &Path) -> impl FnOnce(io::Error) -> Error {
 fn log(motion: &Retargeted, retargeter: &Retargeter, derivatives: Derivatives) -> io::Result<Vec<u8>> {
     let joints: Vec<String> = retargeter.robot().tree().joint_names().map(str::to_owned).collect();
     let (count, frames) = (joints.len(), motion.frames);
-    let mut scratch = vec![0.0; motion.robot.basis().degree() + 1];
-    // Position, velocity, acceleration of all samples.
-    let mut signals = [0, 1, 2].map(|_| vec![0.0; frames * count]);
-    for (order, signal) in signals.iter_mut().enumerate() {
-        for (frame, values) in signal.chunks_exact_mut(count.max(1)).enumerate() {
-            motion.robot.evaluate(order, frame as f64 / motion.rate_hz, &mut scratch, values);
-        }
-    }
+    let mut signals = motion.signals();
     let [q, qd, qdd] = &mut signals;
     if derivatives == Derivatives::BackwardDifferences {
         backward_differences(q, count, 1.0 / motion.rate_hz, qd, qdd)

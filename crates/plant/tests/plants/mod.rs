@@ -2,8 +2,10 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
-use phiw_dynamics::{AnalyticBackend, BackendError, DynamicsBackend, Tree, Workspace, World};
-use phiw_plant::{ComputedTorque, Effect, Gains, History, MultiSine, Plant, PlantSetup, RigidBodyModel, Run};
+use phiw_dynamics::{AnalyticBackend, BackendError, SimulationBackend, Tree, Workspace, World};
+use phiw_plant::{
+    ComputedTorque, Effect, Gains, History, MultiSine, Plant, PlantRun, PlantSetup, RigidBodyModel,
+};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -15,7 +17,7 @@ pub fn model(name: &str, floating_base: bool) -> Tree {
 }
 
 /// The analytic backend, as a plant's builder.
-pub fn analytic(tree: &Tree, world: &World) -> Result<Box<dyn DynamicsBackend>, BackendError> {
+pub fn analytic(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     Ok(Box::new(AnalyticBackend::in_world(tree.clone(), world)?))
 }
 
@@ -55,7 +57,7 @@ pub fn random(seed: u64) -> ChaCha8Rng {
 }
 
 /// Six seconds of motion of a plant.
-pub fn run(tree: &Tree, world: &World, setup: PlantSetup, seed: u64) -> Run {
+pub fn run(tree: &Tree, world: &World, setup: PlantSetup, seed: u64) -> PlantRun {
     let mut plant = Plant::new(tree, world, setup, analytic).unwrap();
     plant.run(&motion(tree, 6.0, seed), 6.0, &mut random(seed)).unwrap()
 }

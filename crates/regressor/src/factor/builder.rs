@@ -5,7 +5,7 @@ use crate::RegressorError;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, recommended_block_size};
 use faer::{Mat, Par};
-use phiw_dynamics::check_size;
+use phiw_dynamics::{check_index, check_size};
 
 /// Collects rows of \[Φ f\] and folds them into R, a block at a time. Memory does not depend on the number of rows, and
 /// nothing is allocated after [`FactorBuilder::new`].
@@ -108,7 +108,7 @@ impl FactorBuilder {
         columns: &[usize],
         weight: f64,
     ) -> Result<(), RegressorError> {
-        check_size("columns of the merged factor", columns.len(), factor.columns())?;
+        check_size("the columns of a factor to be taken in", columns.len(), factor.columns())?;
         let rows = self.rows + factor.rows();
         let mut row = vec![0.0; self.columns];
         for index in 0..factor.columns() {
@@ -116,7 +116,7 @@ impl FactorBuilder {
             let mut says_something = false;
             for column in index..factor.columns() {
                 let target = columns[column];
-                check_size("column index", target.max(self.columns - 1) + 1, self.columns)?;
+                check_index("column", target, self.columns)?;
                 row[target] = factor.entry(index, column);
                 says_something |= row[target] != 0.0;
             }

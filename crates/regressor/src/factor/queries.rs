@@ -1,9 +1,10 @@
 //! What a factor answers: least squares, condition, standard deviations, residuals.
 
-use super::Factor;
+use super::{Factor, solve_lower, solve_upper};
 use crate::RegressorError;
 use faer::Mat;
 use phiw_dynamics::check_size;
+use phiw_dynamics::dense::dot;
 
 /// A column whose part orthogonal to the columns before it is smaller than this share of its norm is undetermined.
 const RANK_TOLERANCE: f64 = 1e-7;
@@ -73,12 +74,32 @@ impl Factor {
             return Err(RegressorError::RankDeficient { columns: size, undetermined });
         }
         let mut parameters = vec![0.0; size];
-        for row in (0..size).rev() {
-            let known: f64 = (row + 1..size).map(|column| self.entry(row, column) * parameters[column]).sum();
-            parameters[row] = (self.entry(row, size) - known) / self.entry(row, row);
+        if size < self.columns() {
+            parameters.copy_from_slice(&self.column(size)[..size]);
         }
+        self.solve_upper(&mut parameters)?;
         let corner = if size < self.columns() { self.entry(size, size) } else { 0.0 };
         Ok(Solution { parameters, residual_sum_of_squares: corner * corner, rows: self.rows() })
+    }
+
+    /// `x` ← R⁻¹·x, R that of Φ alone; not finite where the rows do not determine a column.
+    ///
+    /// # Errors
+    /// `x` has the wrong length.
+    pub fn solve_upper(&self, x: &mut [f64]) -> Result<(), RegressorError> {
+        check_size("right-hand side", x.len(), self.parameters())?;
+        solve_upper(|column| self.column(column), x);
+        Ok(())
+    }
+
+    /// `x` ← R⁻ᵀ·x, R that of Φ alone; not finite where the rows do not determine a column.
+    ///
+    /// # Errors
+    /// `x` has the wrong length.
+    pub fn solve_lower(&self, x: &mut [f64]) -> Result<(), RegressorError> {
+        check_size("right-hand side", x.len(), self.parameters())?;
+        solve_lower(|column| self.column(column), x);
+        Ok(())
     }
 
     /// ‖Φw − f‖² for any `w`, without the rows.
@@ -173,8 +194,4 @@ impl Factor {
         );
         Ok(inverse)
     }
-}
-
-fn dot(left: &[f64], right: &[f64]) -> f64 {
-    left.iter().zip(right).map(|(a, b)| a * b).sum()
 }

@@ -3,7 +3,7 @@
 use super::FactorBuilder;
 use crate::RegressorError;
 use faer::{Mat, MatRef};
-use phiw_dynamics::check_size;
+use phiw_dynamics::{check_index, check_size};
 
 /// The upper triangular R with RᵀR = \[Φ f\]ᵀ\[Φ f\]; the last column is the right-hand side f.
 ///
@@ -122,7 +122,7 @@ impl Factor {
         let identity: Vec<usize> = (0..first.columns).collect();
         let mut builder = FactorBuilder::new(first.columns);
         for factor in std::iter::once(first).chain(factors) {
-            check_size("columns of the merged factor", factor.columns, first.columns)?;
+            check_size("the columns of a factor to be taken in", factor.columns, first.columns)?;
             builder.push_factor(factor, &identity, 1.0)?;
         }
         Ok(builder.factor())
@@ -135,10 +135,12 @@ impl Factor {
     /// A column does not exist.
     pub fn select(&self, columns: &[usize]) -> Result<Factor, RegressorError> {
         let mut builder = FactorBuilder::new(columns.len());
-        let last = columns.iter().copied().max().unwrap_or_default();
-        check_size("columns named", last.max(self.columns.saturating_sub(1)) + 1, self.columns)?;
+        let Some(&last) = columns.iter().max() else {
+            return Ok(Factor { rows: self.rows, ..builder.factor() });
+        };
+        check_index("column", last, self.columns)?;
         let mut row = vec![0.0; columns.len()];
-        for index in 0..=last.min(self.columns.saturating_sub(1)) {
+        for index in 0..=last {
             for (value, &column) in row.iter_mut().zip(columns) {
                 *value = if column >= index { self.r[(index, column)] } else { 0.0 };
             }

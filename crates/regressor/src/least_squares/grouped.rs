@@ -5,7 +5,7 @@
 
 use crate::RegressorError;
 use crate::factor::{Factor, FactorBuilder};
-use phiw_dynamics::check_size;
+use phiw_dynamics::{check_index, check_size};
 
 /// The rows of one torque.
 #[derive(Clone, Debug)]
@@ -31,12 +31,9 @@ impl GroupedFactor {
     pub fn new(parameter_count: usize, groups: Vec<Group>) -> Result<Self, RegressorError> {
         for group in &groups {
             check_size("parameters of a group", group.parameters.len(), group.factor.parameters())?;
-            let largest = group.parameters.iter().copied().max().unwrap_or_default();
-            check_size(
-                "parameter index",
-                largest.max(parameter_count.saturating_sub(1)) + 1,
-                parameter_count.max(1),
-            )?;
+            for &parameter in &group.parameters {
+                check_index("parameter", parameter, parameter_count)?;
+            }
         }
         Ok(GroupedFactor { parameter_count, groups })
     }
@@ -91,11 +88,7 @@ impl GroupedFactor {
     pub fn select(&self, kept: &[usize]) -> Result<Self, RegressorError> {
         let mut renumbered = vec![None; self.parameter_count];
         for (new, &old) in kept.iter().enumerate() {
-            check_size(
-                "parameter index",
-                old.max(self.parameter_count.saturating_sub(1)) + 1,
-                self.parameter_count,
-            )?;
+            check_index("parameter", old, self.parameter_count)?;
             renumbered[old] = Some(new);
         }
         let restrict = |group: &Group| {

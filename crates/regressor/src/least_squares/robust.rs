@@ -3,7 +3,7 @@
 use super::{Group, GroupedFactor, WeightedSolution, weighted_least_squares};
 use crate::RegressorError;
 use crate::factor::FactorBuilder;
-use phiw_dynamics::check_size;
+use phiw_dynamics::check_index;
 
 /// How rows are judged.
 #[derive(Clone, Copy, Debug)]
@@ -45,7 +45,7 @@ pub fn robust_least_squares<E: From<RegressorError>>(
     let mut builders: Vec<FactorBuilder> =
         group_parameters.iter().map(|parameters| FactorBuilder::new(parameters.len() + 1)).collect();
     stream(&mut |group, row| {
-        check_size("group", group.max(builders.len().saturating_sub(1)) + 1, builders.len())?;
+        check_index("group of rows", group, builders.len())?;
         builders[group].push_row(row)
     })?;
     let mut solution = solve(parameter_count, group_parameters, &mut builders)?;

@@ -1,6 +1,6 @@
 //! What was done to the logs before the fit.
 
-use super::Picture;
+use super::parts::Picture;
 use maud::{Markup, html};
 
 /// What was done to the logs before the fit.

@@ -1,6 +1,6 @@
 //! The effects that were added to the declared model, and what they leave.
 
-use super::{Picture, share_bar};
+use super::parts::{Picture, share_bar};
 use crate::number::{percent, significant};
 use maud::{Markup, html};
 

@@ -1,6 +1,7 @@
 //! The table of torque errors, joint by joint.
 
-use super::{JointSection, share_bar};
+use super::JointSection;
+use super::parts::share_bar;
 use crate::number::{ABSENT, percent, significant};
 use crate::plot::{BarGroup, JointBars, joint_bars};
 use maud::{Markup, PreEscaped, html};

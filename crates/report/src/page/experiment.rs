@@ -1,6 +1,7 @@
 //! A page that tells an experiment: headline, then sections of sentences, tables and pictures.
 
-use super::{Picture, list, shell};
+use super::parts::Picture;
+use super::{list, shell};
 use maud::{Markup, html};
 
 /// An experiment as plain data; what is empty does not appear.

@@ -5,6 +5,7 @@ use super::canvas::{Drawn, Svg, WIDTH, picture};
 use super::drawable;
 use super::palette::{Colour, series};
 use super::panel::{Legend, Mark, Plot, dots, line, panel, stroke};
+use crate::statistics::quantile;
 use plotters::element::Rectangle;
 use plotters::style::Color;
 
@@ -93,15 +94,10 @@ impl Summary {
     fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         let mut sorted: Vec<f64> = values.filter(|&value| drawable(value)).collect();
         sorted.sort_by(f64::total_cmp);
-        let last = sorted.len().checked_sub(1)?;
-        // Linear interpolation between order statistics (Hyndman and Fan's type 7, NumPy's default).
-        let quantile = |share: f64| {
-            let position = share * last as f64;
-            let below = position as usize;
-            let above = (below + 1).min(last);
-            sorted[below] + (position - below as f64) * (sorted[above] - sorted[below])
-        };
-        let quartiles = [0.25, 0.5, 0.75].map(quantile);
+        if sorted.is_empty() {
+            return None;
+        }
+        let quartiles = [0.25, 0.5, 0.75].map(|share| quantile(&sorted, share));
         let reach = 1.5 * (quartiles[2] - quartiles[0]);
         let inside = |value: &f64| *value >= quartiles[0] - reach && *value <= quartiles[2] + reach;
         let whiskers = [

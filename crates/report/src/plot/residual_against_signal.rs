@@ -5,6 +5,7 @@ use super::canvas::{Svg, WIDTH, picture, px};
 use super::palette::{BEFORE, INK, PREDICTED, RESIDUAL};
 use super::panel::{HEADER, Legend, Mark, dots, draw_legend, line, panel, stroke, text};
 use super::{Line, drawable};
+use crate::statistics::median;
 use plotters::style::Color;
 use plotters::style::text_anchor::{HPos, VPos};
 
@@ -71,12 +72,6 @@ fn binned_median(points: Line<'_>, (from, to): (f64, f64)) -> Vec<(f64, f64)> {
             (centre(bin), if enough { median(ys) } else { f64::NAN })
         })
         .collect()
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
 }
 
 #[cfg(test)]

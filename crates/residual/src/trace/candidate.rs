@@ -1,7 +1,7 @@
 //! What could be missing: every kind, site and constant that the logs may be asked about.
 
-use crate::catalogue::{Catalogue, Constants, EffectKind, SignalRanges};
 use phiw_dynamics::Tree;
+use phiw_effects::{Catalogue, Constants, EffectKind, SignalRanges};
 use phiw_identification::{Effect, EffectSpec};
 use std::ops::Range;
 
@@ -61,7 +61,7 @@ pub(super) fn enumerate(
             if occupied.closed.iter().any(|spec| is_this(spec)) || (!changed && present.iter().any(is_this)) {
                 continue;
             }
-            for constants in scan(kind, &site, ranges, present, &joints) {
+            for constants in scan(catalogue, kind, &site, ranges, present, &joints) {
                 all.push(rank, vec![kind.build(tree, &site, &constants)], constants.len());
             }
         }
@@ -70,37 +70,39 @@ pub(super) fn enumerate(
     all
 }
 
-/// Constants to try; a sign's width is the one that the joint's declared friction has, where there is one.
+/// Constants to try; those that belong to the joint are what another effect of the model says of it.
 fn scan(
+    catalogue: &Catalogue,
     kind: &dyn EffectKind,
     site: &[usize],
     ranges: &SignalRanges,
     present: &[EffectSpec],
     joints: &[String],
 ) -> Vec<Constants> {
-    const WIDTH: &str = "sign_width";
-    let declared = present
-        .iter()
-        .find(|spec| spec.kind == "coulomb_friction" && spec.joints == joints)
-        .and_then(|spec| spec.constants.get(WIDTH).copied());
-    let mut scanned = kind.scan(site, ranges);
-    let Some(width) = declared else { return scanned };
-    if kind.name() != "coulomb_friction" {
-        for constants in scanned.iter_mut().filter(|constants| constants.contains_key(WIDTH)) {
-            constants.insert(WIDTH.to_owned(), width);
-        }
-        let mut unique: Vec<Constants> = Vec::new();
-        scanned.into_iter().for_each(|constants| {
-            if !unique.contains(&constants) {
-                unique.push(constants);
-            }
-        });
-        return unique;
+    let mut known = Constants::new();
+    for other in catalogue.kinds().filter(|other| other.name() != kind.name()) {
+        let spec = present.iter().find(|spec| spec.kind == other.name() && spec.joints == joints);
+        let Some(spec) = spec else { continue };
+        let constants =
+            spec.constants.iter().filter(|(name, _)| other.constants_of_the_site().contains(&name.as_str()));
+        known.extend(constants.map(|(name, value)| (name.clone(), *value)));
     }
-    scanned
+    if known.is_empty() {
+        return kind.scan(site, ranges);
+    }
+    let mut unique: Vec<Constants> = Vec::new();
+    for mut constants in kind.scan(site, ranges) {
+        for (name, value) in &mut constants {
+            *value = known.get(name).copied().unwrap_or(*value);
+        }
+        if !unique.contains(&constants) {
+            unique.push(constants);
+        }
+    }
+    unique
 }
 
-/// Viscous and Coulomb friction of a joint go together: either alone mimics the other in part.
+/// Kinds that go together, where the model has none of them.
 fn add_pairs(
     catalogue: &Catalogue,
     tree: &Tree,
@@ -108,21 +110,21 @@ fn add_pairs(
     present: &[EffectSpec],
     all: &mut Candidates,
 ) {
-    let (Ok(viscous), Ok(coulomb)) = (catalogue.kind("viscous_friction"), catalogue.kind("coulomb_friction"))
-    else {
-        return;
-    };
-    for site in coulomb.sites(tree) {
-        let joint = &tree.joint(site[0]).joint;
-        let is_friction =
-            |spec: &EffectSpec| spec.kind == "viscous_friction" || spec.kind == "coulomb_friction";
-        if present.iter().any(|spec| is_friction(spec) && spec.joints.contains(joint)) {
-            continue;
-        }
-        for constants in coulomb.scan(&site, ranges) {
-            let pair =
-                vec![viscous.build(tree, &site, &Constants::new()), coulomb.build(tree, &site, &constants)];
-            all.push(1, pair, constants.len());
+    for (rank, kind) in catalogue.kinds().enumerate() {
+        for partner in kind.goes_with().iter().filter_map(|name| catalogue.kind(name).ok()) {
+            let is_either = |spec: &EffectSpec| [kind.name(), partner.name()].contains(&spec.kind.as_str());
+            for site in kind.sites(tree) {
+                let on_site = |spec: &EffectSpec| {
+                    site.iter().any(|&joint| spec.joints.contains(&tree.joint(joint).joint))
+                };
+                if present.iter().any(|spec| is_either(spec) && on_site(spec)) {
+                    continue;
+                }
+                for constants in kind.scan(&site, ranges) {
+                    let alone = partner.build(tree, &site, &Constants::new());
+                    all.push(rank, vec![alone, kind.build(tree, &site, &constants)], constants.len());
+                }
+            }
         }
     }
 }
@@ -152,5 +154,115 @@ impl Candidates {
         let specs = effects.iter().map(|effect| effect.spec()).collect();
         self.effects.extend(effects);
         self.list.push(Candidate { specs, rank, effects: first..self.effects.len(), constants });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+    use phiw_effects::{JointRange, OwnTorque, ParameterKind};
+    use phiw_identification::Sample;
+
+    /// A kind of two constants, of which one belongs to the joint.
+    struct Rubbing;
+
+    impl EffectKind for Rubbing {
+        fn name(&self) -> &str {
+            "rubbing"
+        }
+        fn scan(&self, _site: &[usize], _ranges: &SignalRanges) -> Vec<Constants> {
+            let constants = |own: f64| Constants::from([("width".into(), 0.1 * own), ("own".into(), own)]);
+            vec![constants(1.0), constants(2.0)]
+        }
+        fn constants_of_the_site(&self) -> &'static [&'static str] {
+            &["width"]
+        }
+        fn telling_motion(&self) -> &'static str {
+            "any"
+        }
+        fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+            one_column("rubbing", tree, site[0], constants)
+        }
+    }
+
+    /// A kind that is tried together with the other, and has only the constant that belongs to the joint.
+    struct Grinding;
+
+    impl EffectKind for Grinding {
+        fn name(&self) -> &str {
+            "grinding"
+        }
+        fn scan(&self, _site: &[usize], _ranges: &SignalRanges) -> Vec<Constants> {
+            [0.1, 0.2].map(|width| Constants::from([("width".into(), width)])).to_vec()
+        }
+        fn goes_with(&self) -> &'static [&'static str] {
+            &["rubbing", "a kind that the catalogue lacks"]
+        }
+        fn telling_motion(&self) -> &'static str {
+            "any"
+        }
+        fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+            one_column("grinding", tree, site[0], constants)
+        }
+    }
+
+    fn one_column(kind: &str, tree: &Tree, joint: usize, constants: &Constants) -> Box<dyn Effect> {
+        let column = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = sample.qd()[joint];
+        let parameters = [("k", ParameterKind::Torque, 0.0)];
+        Box::new(OwnTorque::new(kind, tree, joint, constants, &parameters, column))
+    }
+
+    /// Candidates with a rubbing or a grinding part beside `present`, each as the kinds and constants of its effects.
+    fn candidates(present: &[EffectSpec]) -> Vec<Vec<(String, Vec<f64>)>> {
+        let urdf = r#"<robot name="arm"><link name="base"/><link name="arm"/>
+            <joint name="pivot" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/></joint></robot>"#;
+        let tree = read_urdf(urdf, &UrdfOptions::default()).unwrap().tree;
+        let joint = JointRange { position: (-1.0, 1.0), velocity_rms: 1.0, ..JointRange::default() };
+        let ranges = SignalRanges {
+            joints: vec![joint],
+            session: (0.0, 10.0),
+            ripple_frequencies: vec![vec![]],
+            ..SignalRanges::default()
+        };
+        let catalogue = Catalogue::default().with(Rubbing).with(Grinding);
+        let occupied = Occupied { present, closed: &[], held: false };
+        let all = enumerate(&catalogue, &tree, &ranges, &occupied);
+        let parts = |candidate: Candidate| {
+            let part = |spec: EffectSpec| (spec.kind, spec.constants.into_values().collect::<Vec<f64>>());
+            candidate.specs.into_iter().map(part).collect::<Vec<_>>()
+        };
+        let ours = |parts: &Vec<(String, Vec<f64>)>| {
+            parts.iter().any(|(kind, _)| kind == "rubbing" || kind == "grinding")
+        };
+        all.list.into_iter().map(parts).filter(ours).collect()
+    }
+
+    /// The parts of a candidate by kind and constants, in the order of the constants' names.
+    fn parts(expected: &[(&str, &[f64])]) -> Vec<(String, Vec<f64>)> {
+        expected.iter().map(|(kind, constants)| ((*kind).to_owned(), constants.to_vec())).collect()
+    }
+
+    #[test]
+    fn kinds_that_go_together_are_tried_alone_and_together() {
+        let expected = vec![
+            parts(&[("rubbing", &[1.0, 0.1])]),
+            parts(&[("rubbing", &[2.0, 0.2])]),
+            parts(&[("grinding", &[0.1])]),
+            parts(&[("grinding", &[0.2])]),
+            parts(&[("rubbing", &[]), ("grinding", &[0.1])]),
+            parts(&[("rubbing", &[]), ("grinding", &[0.2])]),
+        ];
+        assert_eq!(candidates(&[]), expected);
+    }
+
+    #[test]
+    fn a_constant_of_the_joint_is_taken_of_the_effect_that_the_model_has() {
+        let declared = EffectSpec::new("rubbing", &["pivot"]).with("width", 0.7).with("own", 3.0);
+        assert_eq!(candidates(&[declared]), vec![parts(&[("grinding", &[0.7])])]);
+        // Grinding says nothing of the joint: rubbing keeps its own constants.
+        let declared = EffectSpec::new("grinding", &["pivot"]).with("width", 0.7);
+        let expected = vec![parts(&[("rubbing", &[1.0, 0.1])]), parts(&[("rubbing", &[2.0, 0.2])])];
+        assert_eq!(candidates(&[declared]), expected);
     }
 }

@@ -1,7 +1,7 @@
 //! What a trace starts from, and when it believes a candidate.
 
-use crate::catalogue::{Catalogue, SignalRanges};
 use phiw_dynamics::Tree;
+use phiw_effects::{Catalogue, SignalRanges};
 use phiw_identification::{Data, EffectSpec};
 use phiw_regressor::factor::Factor;
 

@@ -4,7 +4,7 @@ use super::candidate::{Candidate, Candidates};
 use super::evidence::paired_t;
 use super::signal_shapes::{Shape, neighbours, other_shapes, own_shapes};
 use super::stage::{Fixed, Stage};
-use crate::catalogue::SignalRanges;
+use phiw_effects::SignalRanges;
 use phiw_identification::{EffectSpec, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, FactorBuilder};

@@ -7,7 +7,7 @@ use super::residuals::residual_shape;
 use super::stage::{Fixed, Prior, Stage};
 use super::tracing::{FoundEffect, Tracing};
 use super::verdict::Account;
-use crate::catalogue::SignalRanges;
+use phiw_effects::SignalRanges;
 use phiw_identification::{
     BlockSource, Data, Design, EffectSpec, IdentificationError, KeptBlocks, TorqueError, torque_error,
 };

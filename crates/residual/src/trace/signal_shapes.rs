@@ -1,8 +1,8 @@
 //! Shapes without a name: broken lines over one signal, for whatever a torque may follow.
 
 use super::stage::Fixed;
-use crate::catalogue::{Constants, OwnTorque, ParameterKind, SignalRanges, smooth_sign};
 use phiw_dynamics::Tree;
+use phiw_effects::{Constants, OwnTorque, ParameterKind, SignalRanges, smooth_sign};
 use phiw_identification::{Effect, Needs, Sample};
 
 /// A signal, as in `report.json`, and broken lines over it in one joint's torque.

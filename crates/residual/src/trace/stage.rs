@@ -2,8 +2,8 @@
 
 use super::candidate::{Candidate, Candidates};
 use super::evidence::{Evidence, Refit};
-use crate::Catalogue;
 use phiw_dynamics::Tree;
+use phiw_effects::Catalogue;
 use phiw_identification::{
     Data, Design, Effect, EffectCatalogue, EffectSpec, IdentificationError, ReferenceModel, accumulate, merge,
 };

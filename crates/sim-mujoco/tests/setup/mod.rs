@@ -2,7 +2,7 @@
 #![allow(dead_code)] // each test binary uses its part
 
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, RandomTreeOptions, random_state, random_tree};
-use phiw_dynamics::{DynamicsBackend, Foot, Placement, Tree, World};
+use phiw_dynamics::{DynamicsBackend, Foot, Placement, SimulationBackend, Tree, World};
 use phiw_sim_mujoco::{MujocoBackend, MujocoError};
 
 /// The robot in MuJoCo; says so and gives `None` where MuJoCo is not there.
@@ -46,7 +46,7 @@ pub fn assert_close(found: &[f64], expected: &[f64], tolerance: f64) {
 }
 
 /// The state of a backend.
-pub fn state_of(backend: &dyn DynamicsBackend) -> (Vec<f64>, Vec<f64>) {
+pub fn state_of(backend: &dyn SimulationBackend) -> (Vec<f64>, Vec<f64>) {
     let (mut q, mut v) = (vec![0.0; backend.configuration_size()], vec![0.0; backend.velocity_size()]);
     backend.state(&mut q, &mut v).unwrap();
     (q, v)

@@ -1,4 +1,6 @@
 //! What is tried, and what has to come of it.
+//!
+//! A case is made on a good run of the ground, and the ground runs its good cases as trials that judge a case: case, ground and trial name each other.
 
 use super::Ground;
 use rand_chacha::ChaCha8Rng;

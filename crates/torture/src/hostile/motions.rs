@@ -50,14 +50,16 @@ fn positions(ground: &Ground, random: &mut ChaCha8Rng) -> Case {
 }
 
 fn jumps(ground: &Ground, random: &mut ChaCha8Rng) -> Case {
-    let size = random.random_range(0.5..3.0);
+    // As many small jumps as large ones, to either side.
+    let size =
+        0.02 * 150_f64.powf(random.random_range(0.0..1.0)) * *[-1.0, 1.0].choose(random).unwrap_or(&1.0);
     let joint = random.random_range(0..4);
     let row = random.random_range(50..450);
-    let length = random.random_range(1..300);
+    let length = if random.random_bool(0.5) { 1 } else { random.random_range(2..300) };
     case(ground, random, Expectation::Refused, |table| {
         let column = table.columns("q.")[joint];
         table.map(column, |at, q| if (row..row + length).contains(&at) { q + size } else { q });
-        format!("{} jumps by {size:.2} for {length} rows", table.header[column])
+        format!("{} jumps by {size:.3} for {length} rows", table.header[column])
     })
 }
 

@@ -1,0 +1,125 @@
+//! The catalogue finds kinds of effects by name, declares them for a robot, and builds them from a model's file.
+
+use crate::{Constants, EffectKind, FittedEffect, JointProperty, SignalRanges};
+use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};
+use phiw_dynamics::Tree;
+use phiw_identification::{Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Variants};
+
+/// Kinds of effects by name, in the order of simplicity: of two that explain alike, the earlier is preferred.
+pub struct Catalogue {
+    kinds: Vec<Box<dyn EffectKind>>,
+}
+
+impl Default for Catalogue {
+    /// All kinds that phiw knows.
+    fn default() -> Self {
+        Catalogue {
+            kinds: vec![
+                Box::new(friction::Viscous),
+                Box::new(friction::Coulomb),
+                Box::new(drive::TorqueOffset),
+                Box::new(drive::RotorInertia),
+                Box::new(drive::TorqueGain),
+                Box::new(friction::Asymmetric),
+                Box::new(friction::Quadratic),
+                Box::new(friction::Stribeck),
+                Box::new(friction::LoadDependent),
+                Box::new(position::JointSpring),
+                Box::new(position::GravityBalancer),
+                Box::new(position::TorqueRipple),
+                Box::new(position::EndStop),
+                Box::new(coupling::TransmissionCoupling),
+                Box::new(sensing::TimeDelay),
+                Box::new(sensing::EncoderOffset),
+                Box::new(sensing::ActuatorSaturation),
+                Box::new(hysteresis::Hysteresis),
+                Box::new(drift::ThermalDrift),
+                Box::new(elasticity::JointElasticity),
+                Box::new(external::GravityTilt),
+                Box::new(external::Payload),
+                Box::new(external::ExternalForce),
+            ],
+        }
+    }
+}
+
+impl Catalogue {
+    /// The same with a kind of the user's own.
+    pub fn with(mut self, kind: impl EffectKind + 'static) -> Self {
+        self.kinds.push(Box::new(kind));
+        self
+    }
+
+    /// All kinds.
+    pub fn kinds(&self) -> impl Iterator<Item = &dyn EffectKind> {
+        self.kinds.iter().map(Box::as_ref)
+    }
+
+    /// A kind by its name.
+    ///
+    /// # Errors
+    /// There is none of that name; the error knows the nearest.
+    pub fn kind(&self, name: &str) -> Result<&dyn EffectKind, EffectError> {
+        self.kinds().find(|kind| kind.name() == name).ok_or_else(|| {
+            let known: Vec<String> = self.kinds().map(|kind| kind.name().to_owned()).collect();
+            let distance = |other: &&String| strsim::damerau_levenshtein(other, name);
+            let nearest = known.iter().min_by_key(distance).filter(|other| distance(other) <= 5).cloned();
+            EffectError::UnknownKind { kind: name.to_owned(), nearest, known }
+        })
+    }
+
+    /// The property of a joint that expresses an effect, if its kind is known and has one.
+    pub fn joint_property(&self, spec: &EffectSpec) -> Option<JointProperty> {
+        self.kind(&spec.kind).ok()?.joint_property()
+    }
+
+    /// What an effect means, with its fitted values; a kind that is unknown here gets its name and numbers.
+    pub fn sentence(&self, spec: &EffectSpec, parameters: &[EffectParameter], fitted: &[f64]) -> String {
+        let found = FittedEffect::new(spec, parameters, fitted);
+        self.kind(&spec.kind).map_or_else(|_| found.plainly(), |kind| kind.sentence(&found))
+    }
+
+    /// A kind on every joint of the robot, each with the constants that the data may choose from.
+    ///
+    /// # Errors
+    /// The kind is unknown, or cannot be declared for all joints at once.
+    pub fn declare(
+        &self,
+        name: &str,
+        tree: &Tree,
+        ranges: &SignalRanges,
+    ) -> Result<Vec<Variants>, EffectError> {
+        let kind = self.kind(name)?;
+        let Some(declared) = kind.declared_constants() else {
+            return Err(EffectError::NotDeclarable { kind: name.to_owned() });
+        };
+        let agrees = |constants: &Constants| {
+            declared.iter().all(|(name, value)| constants.get(name).is_none_or(|other| other == value))
+        };
+        let variants = |site: Vec<usize>| -> Variants {
+            let scanned = kind.scan(&site, ranges).into_iter().filter(agrees);
+            scanned.map(|constants| kind.build(tree, &site, &constants)).collect()
+        };
+        Ok(kind.sites(tree).into_iter().map(variants).collect())
+    }
+}
+
+impl EffectCatalogue for Catalogue {
+    fn build(&self, spec: &EffectSpec, tree: &Tree) -> Result<Box<dyn Effect>, EffectError> {
+        let kind = self.kind(&spec.kind)?;
+        let index = |joint: &String| {
+            let unknown = EffectError::UnknownJoint { kind: spec.kind.clone(), joint: joint.clone() };
+            tree.joint_index(joint).ok_or(unknown)
+        };
+        let site: Result<Vec<usize>, EffectError> = spec.joints.iter().map(index).collect();
+        let site = site?;
+        if !kind.accepts(tree, &site) {
+            return Err(EffectError::WrongJoints {
+                kind: spec.kind.clone(),
+                needed: kind.acts_on(),
+                found: site.len(),
+            });
+        }
+        Ok(kind.build(tree, &site, &spec.constants))
+    }
+}

@@ -1,0 +1,245 @@
+//! Two joints behind one transmission: each feels the other's motion, or their sum (differential wrists).
+
+use crate::columns::{ParameterKind, smooth_sign};
+use crate::fitted::FittedEffect;
+use crate::friction::WIDTH;
+use crate::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
+use phiw_dynamics::Tree;
+use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Sample};
+
+/// Torque at one joint from the motion of another, both ways or one way.
+///
+/// Motors that turn with the sum q_i + q_j feel viscous friction, Coulomb friction and inertia of the sum; what the joints' own friction and
+/// rotor inertia do not take up is the part that crosses over.
+pub struct TransmissionCoupling;
+
+/// Which terms a coupling has: one bit for each of [`TERMS`].
+const TERMS_CONSTANT: &str = "terms";
+
+/// Joints further apart than this along the tree do not share a transmission.
+const LARGEST_DISTANCE: usize = 2;
+
+/// A column computed from the motion of both joints.
+type MotionColumn = fn(&Motion) -> f64;
+
+#[derive(Clone, Copy)]
+struct Term {
+    name: &'static str,
+    dimension: ParameterKind,
+    lower: f64,
+    /// Columns in the torques of the first and the second joint of the pair, of the velocities and accelerations of both, and the sign's width.
+    columns: [Option<MotionColumn>; 2],
+}
+
+struct Motion {
+    velocity: [f64; 2],
+    acceleration: [f64; 2],
+    width: f64,
+}
+
+impl Motion {
+    fn sign_of_sum(&self) -> f64 {
+        smooth_sign(self.velocity[0] + self.velocity[1], self.width)
+    }
+    fn sign_of_difference(&self) -> f64 {
+        smooth_sign(self.velocity[0] - self.velocity[1], self.width)
+    }
+}
+
+const TERMS: [Term; 8] = [
+    Term {
+        name: "fv_cross",
+        dimension: ParameterKind::PerVelocity,
+        lower: f64::NEG_INFINITY,
+        columns: [Some(|motion| motion.velocity[1]), Some(|motion| motion.velocity[0])],
+    },
+    Term {
+        name: "Ia_cross",
+        dimension: ParameterKind::Inertia,
+        lower: f64::NEG_INFINITY,
+        columns: [Some(|motion| motion.acceleration[1]), Some(|motion| motion.acceleration[0])],
+    },
+    Term {
+        name: "fc_sum",
+        dimension: ParameterKind::Torque,
+        lower: 0.0,
+        columns: [Some(Motion::sign_of_sum), Some(Motion::sign_of_sum)],
+    },
+    Term {
+        name: "fc_difference",
+        dimension: ParameterKind::Torque,
+        lower: 0.0,
+        columns: [Some(Motion::sign_of_difference), Some(|motion| -motion.sign_of_difference())],
+    },
+    Term {
+        name: "fv_of_second_on_first",
+        dimension: ParameterKind::PerVelocity,
+        lower: f64::NEG_INFINITY,
+        columns: [Some(|motion| motion.velocity[1]), None],
+    },
+    Term {
+        name: "fv_of_first_on_second",
+        dimension: ParameterKind::PerVelocity,
+        lower: f64::NEG_INFINITY,
+        columns: [None, Some(|motion| motion.velocity[0])],
+    },
+    Term {
+        name: "fc_of_second_on_first",
+        dimension: ParameterKind::Torque,
+        lower: f64::NEG_INFINITY,
+        columns: [Some(|motion| smooth_sign(motion.velocity[1], motion.width)), None],
+    },
+    Term {
+        name: "fc_of_first_on_second",
+        dimension: ParameterKind::Torque,
+        lower: f64::NEG_INFINITY,
+        columns: [None, Some(|motion| smooth_sign(motion.velocity[0], motion.width))],
+    },
+];
+
+/// How each term is said, the most telling first.
+const SAID: [(&str, &str); 8] = [
+    ("fv_cross", "of coupled viscous friction"),
+    ("fc_sum", "of friction with the sign of the sum of their speeds"),
+    ("fc_difference", "of friction with the sign of the difference of their speeds"),
+    ("Ia_cross", "of coupled inertia"),
+    ("fv_of_second_on_first", "of viscous friction of the second on the first"),
+    ("fv_of_first_on_second", "of viscous friction of the first on the second"),
+    ("fc_of_second_on_first", "of Coulomb friction of the second on the first"),
+    ("fc_of_first_on_second", "of Coulomb friction of the first on the second"),
+];
+
+/// Sets of terms to try, simplest first: single terms, then the differential's.
+const COMBINATIONS: [u32; 14] =
+    [1, 2, 4, 8, 16, 32, 64, 128, 1 | 4, 1 | 8, 1 | 2 | 4, 1 | 2 | 8, 16 | 64, 32 | 128];
+
+impl EffectKind for TransmissionCoupling {
+    fn name(&self) -> &str {
+        "transmission_coupling"
+    }
+    fn sites(&self, tree: &Tree) -> Vec<Vec<usize>> {
+        let count = tree.joint_count();
+        let pairs = (0..count).flat_map(|first| (first + 1..count).map(move |second| vec![first, second]));
+        pairs.filter(|pair| distance(tree, pair[0], pair[1]) <= LARGEST_DISTANCE).collect()
+    }
+    fn acts_on(&self) -> &'static str {
+        "two joints at most two apart along the arm"
+    }
+    fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
+        let speed = site.iter().map(|&joint| ranges.joints[joint].velocity_rms).fold(0.0, f64::max);
+        product(&values(TERMS_CONSTANT, COMBINATIONS.map(f64::from)), &values(WIDTH, [0.02 * speed]))
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        None
+    }
+    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+        if constant(found, TERMS_CONSTANT, 0.0) as u32 & 0b1100_1100 == 0 {
+            return Vec::new();
+        }
+        crate::kind::around(found, WIDTH, step)
+    }
+    fn telling_motion(&self) -> &'static str {
+        "each of the two joints moving alone, then both together"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let terms = SAID.iter().flat_map(|(term, words)| {
+            found
+                .quantities()
+                .filter(move |(name, _)| name == term)
+                .map(move |(_, value)| format!("{value} {words}"))
+        });
+        let terms: Vec<String> = terms.collect();
+        format!("{} share a transmission: {}.", found.joints(), terms.join(", "))
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let chosen = constant(constants, TERMS_CONSTANT, 7.0) as u32;
+        let terms: Vec<Term> = TERMS
+            .iter()
+            .enumerate()
+            .filter(|(bit, _)| chosen >> bit & 1 == 1)
+            .map(|(_, term)| *term)
+            .collect();
+        let describe = |term: &Term| EffectParameter {
+            joint: tree.joint(site[0]).joint.clone(),
+            name: term.name.to_owned(),
+            unit: term.dimension.unit(tree, site[0]).to_owned(),
+            bounds: (term.lower, f64::INFINITY),
+        };
+        Box::new(Coupling {
+            site: [site[0], site[1]],
+            parameters: terms.iter().map(describe).collect(),
+            terms,
+            spec: EffectSpec {
+                kind: self.name().to_owned(),
+                joints: site.iter().map(|&joint| tree.joint(joint).joint.clone()).collect(),
+                constants: constants.clone(),
+            },
+        })
+    }
+}
+
+/// Steps from one joint to another along the tree.
+fn distance(tree: &Tree, first: usize, second: usize) -> usize {
+    let path = |joint: usize| {
+        let own = tree.bodies().iter().position(|body| body.joint == tree.joint(joint).joint);
+        std::iter::successors(own, |&body| tree.bodies()[body].parent).collect::<Vec<usize>>()
+    };
+    let (first, second) = (path(first), path(second));
+    let shared = first.iter().rev().zip(second.iter().rev()).take_while(|(a, b)| a == b).count();
+    // Siblings hang on the world or on one body: count the way over it.
+    first.len() + second.len() - 2 * shared
+}
+
+struct Coupling {
+    site: [usize; 2],
+    terms: Vec<Term>,
+    parameters: Vec<EffectParameter>,
+    spec: EffectSpec,
+}
+
+impl Effect for Coupling {
+    fn spec(&self) -> EffectSpec {
+        self.spec.clone()
+    }
+    fn parameters(&self) -> Vec<EffectParameter> {
+        self.parameters.clone()
+    }
+    fn entries(&self) -> Vec<Entry> {
+        let of_term = |(parameter, term): (usize, &Term)| {
+            let rows = self.site.into_iter().zip(term.columns);
+            rows.filter(|(_, column)| column.is_some())
+                .map(|(row, _)| Entry { row, parameter })
+                .collect::<Vec<_>>()
+        };
+        self.terms.iter().enumerate().flat_map(of_term).collect()
+    }
+    /// Terms with a sign, whose parameters are torques, are not.
+    fn is_linear_in_motion(&self, parameter: usize) -> bool {
+        self.terms.get(parameter).is_some_and(|term| term.dimension != ParameterKind::Torque)
+    }
+    fn evaluator(&self) -> Box<dyn Evaluator + '_> {
+        Box::new(CouplingColumns {
+            site: self.site,
+            width: constant(&self.spec.constants, WIDTH, 0.0),
+            formulas: self.terms.iter().flat_map(|term| term.columns).flatten().collect(),
+        })
+    }
+}
+
+struct CouplingColumns {
+    site: [usize; 2],
+    /// Velocity over which a sign turns \[rad/s, m/s\].
+    width: f64,
+    formulas: Vec<MotionColumn>,
+}
+
+impl Evaluator for CouplingColumns {
+    fn evaluate(&mut self, sample: &Sample<'_>, columns: &mut [f64]) {
+        let both = |values: &[f64]| self.site.map(|joint| values[joint]);
+        let motion =
+            Motion { velocity: both(sample.qd()), acceleration: both(sample.qdd()), width: self.width };
+        for (column, formula) in columns.iter_mut().zip(&self.formulas) {
+            *column = formula(&motion);
+        }
+    }
+}

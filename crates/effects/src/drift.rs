@@ -1,0 +1,75 @@
+//! Friction that changes with time or temperature.
+
+use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
+use crate::fitted::FittedEffect;
+use crate::friction::WIDTH;
+use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, values};
+use phiw_dynamics::Tree;
+use phiw_identification::{Effect, Sample};
+
+/// Viscous and Coulomb friction times a factor that falls from one to zero: exp(−t / `time_constant`), or with the temperature where the log has
+/// one (`time_constant` zero).
+pub struct ThermalDrift;
+
+const TIME_CONSTANT: &str = "time_constant";
+/// Temperatures enter over this span \[K\], so that the parameters are torques at a change worth speaking of.
+const TEMPERATURE_SPAN: f64 = 10.0;
+const ROOM_TEMPERATURE: f64 = 20.0;
+
+impl EffectKind for ThermalDrift {
+    fn name(&self) -> &str {
+        "thermal_drift"
+    }
+    fn scan(&self, _site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
+        let duration = ranges.session.1 - ranges.session.0;
+        let mut variants = values(TIME_CONSTANT, [1.0, 0.5, 0.25, 0.125].map(|share| share * duration));
+        if ranges.temperature {
+            variants.extend(values(TIME_CONSTANT, [0.0]));
+        }
+        variants
+    }
+    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+        around(found, TIME_CONSTANT, step)
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        None
+    }
+    fn telling_motion(&self) -> &'static str {
+        "the same motion cold and warm"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, time) = (found.joints(), found.constant(TIME_CONSTANT));
+        format!("The friction of {joint} falls as it warms up, over {time:.0} s.")
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Time
+    }
+    fn needs_session_time(&self) -> bool {
+        true
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let joint = site[0];
+        let time_constant = constant(constants, TIME_CONSTANT, 60.0);
+        let width = constant(constants, WIDTH, 0.0);
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            let factor = if time_constant > 0.0 {
+                (-sample.time() / time_constant).exp()
+            } else {
+                let temperature = sample.temperature().get(joint).copied().unwrap_or(f64::NAN);
+                if temperature.is_finite() {
+                    (ROOM_TEMPERATURE - temperature) / TEMPERATURE_SPAN
+                } else {
+                    0.0
+                }
+            };
+            let velocity = sample.qd()[joint];
+            out[0] = factor * velocity;
+            out[1] = factor * smooth_sign(velocity, width);
+        };
+        let parameters = [
+            ("fv_cold", ParameterKind::PerVelocity, f64::NEG_INFINITY),
+            ("fc_cold", ParameterKind::Torque, f64::NEG_INFINITY),
+        ];
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+    }
+}

@@ -1,0 +1,96 @@
+//! What the motor and its measurement add: rotor inertia, offset, gain.
+
+use crate::columns::{OwnTorque, ParameterKind};
+use crate::fitted::FittedEffect;
+use crate::kind::{Constants, EffectKind, JointProperty, Signal};
+use phiw_dynamics::Tree;
+use phiw_identification::{Effect, Needs, Sample};
+
+/// Ia·q̈.
+pub struct RotorInertia;
+
+impl EffectKind for RotorInertia {
+    fn name(&self) -> &str {
+        "rotor_inertia"
+    }
+    fn may_change(&self) -> bool {
+        true
+    }
+    fn telling_motion(&self) -> &'static str {
+        "quick accelerations in several poses of the joints behind"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, inertia) = (found.joints(), found.quantity(0));
+        format!("{joint} carries a rotor inertia of {inertia} that the links do not account for.")
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Acceleration
+    }
+    fn joint_property(&self) -> Option<JointProperty> {
+        Some(JointProperty::Armature)
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let joint = site[0];
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = sample.qdd()[joint];
+        let parameters = [("Ia", ParameterKind::Inertia, 0.0)];
+        let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
+        Box::new(effect.linear_in_motion())
+    }
+}
+
+/// A constant torque.
+pub struct TorqueOffset;
+
+impl EffectKind for TorqueOffset {
+    fn name(&self) -> &str {
+        "torque_offset"
+    }
+    fn may_change(&self) -> bool {
+        true
+    }
+    fn telling_motion(&self) -> &'static str {
+        "rests in several poses"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!("The torque of {} is off by a constant {}.", found.joints(), found.quantity(0))
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let columns = move |_: &Sample<'_>, out: &mut [f64]| out[0] = 1.0;
+        let parameters = [("offset", ParameterKind::Torque, f64::NEG_INFINITY)];
+        Box::new(OwnTorque::new(self.name(), tree, site[0], constants, &parameters, columns))
+    }
+}
+
+/// (1 + ε) on the measured torque: the column is all torque that the model knows of, friction included. Where the friction is fitted its own columns take up that
+/// part of the change; where it is held nothing else would.
+pub struct TorqueGain;
+
+impl EffectKind for TorqueGain {
+    fn name(&self) -> &str {
+        "torque_gain"
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        None
+    }
+    fn telling_motion(&self) -> &'static str {
+        "a known load on the joint"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!("The torque of {} is measured {:+.1} % too large.", found.joints(), 100.0 * found.value(0))
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Torque
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let joint = site[0];
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            out[0] = sample.total_torque().get(joint).copied().unwrap_or_default();
+        };
+        let parameters = [("gain_error", ParameterKind::Ratio, -1.0)];
+        let needs = Needs { total_torque: true, ..Needs::default() };
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns).needing(needs))
+    }
+}

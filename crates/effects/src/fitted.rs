@@ -1,0 +1,79 @@
+//! An effect with its fitted values, and how it is said to a user.
+
+use crate::Catalogue;
+use phiw_identification::{EffectParameter, EffectSpec};
+
+/// An effect and the values of its parameters, as its kind's sentence needs them ([`crate::EffectKind::sentence`]).
+#[derive(Clone, Copy, Debug)]
+pub struct FittedEffect<'a> {
+    spec: &'a EffectSpec,
+    parameters: &'a [EffectParameter],
+    values: &'a [f64],
+}
+
+impl<'a> FittedEffect<'a> {
+    /// `values` are those of `parameters`, in their order and units.
+    pub fn new(spec: &'a EffectSpec, parameters: &'a [EffectParameter], values: &'a [f64]) -> Self {
+        FittedEffect { spec, parameters, values }
+    }
+
+    /// Its joints, in words.
+    pub fn joints(&self) -> String {
+        self.spec.joints.join(" and ")
+    }
+
+    /// One of its constants (SI units), zero if it has none of that name.
+    pub fn constant(&self, name: &str) -> f64 {
+        self.spec.constants.get(name).copied().unwrap_or_default()
+    }
+
+    /// The value of the parameter at `place`, in its own unit; zero if there is none.
+    pub fn value(&self, place: usize) -> f64 {
+        self.values.get(place).copied().unwrap_or_default()
+    }
+
+    /// The unit of the parameter at `place`; nothing if there is none.
+    pub fn unit(&self, place: usize) -> &str {
+        self.parameters.get(place).map_or("", |info| &info.unit)
+    }
+
+    /// The parameter at `place` with its unit; nothing if there is none.
+    pub fn quantity(&self, place: usize) -> String {
+        self.in_unit_of(place, self.value(place))
+    }
+
+    /// A value \[the unit of the parameter at `place`\] with that unit; nothing if there is no such parameter.
+    pub fn in_unit_of(&self, place: usize, value: f64) -> String {
+        self.parameters.get(place).map(|info| quantity(value, &info.unit)).unwrap_or_default()
+    }
+
+    /// All parameters, each by its name and with its unit.
+    pub fn quantities(&self) -> impl Iterator<Item = (&str, String)> {
+        let named =
+            |(info, value): (&'a EffectParameter, &f64)| (info.name.as_str(), quantity(*value, &info.unit));
+        self.parameters.iter().zip(self.values).map(named)
+    }
+
+    /// The amplitude of two parameters that are a sine and a cosine, with their unit.
+    pub(crate) fn amplitude(&self) -> String {
+        self.in_unit_of(0, self.value(0).hypot(self.value(1)))
+    }
+
+    /// Kind, joints and numbers: the sentence of a kind that has none of its own.
+    pub fn plainly(&self) -> String {
+        let values: Vec<String> =
+            self.quantities().map(|(name, value)| format!("{name} = {value}")).collect();
+        format!("{} on {}: {}.", self.spec.kind.replace('_', " "), self.joints(), values.join(", "))
+    }
+}
+
+/// What an effect of [`Catalogue::default`] means, with its fitted values; kinds that it does not know get their name and numbers.
+pub fn sentence(spec: &EffectSpec, parameters: &[EffectParameter], fitted: &[f64]) -> String {
+    Catalogue::default().sentence(spec, parameters, fitted)
+}
+
+/// Three significant digits and the unit.
+fn quantity(value: f64, unit: &str) -> String {
+    let digits = if value == 0.0 { 0 } else { (2 - value.abs().log10().floor() as i32).clamp(0, 8) };
+    format!("{value:.*} {unit}", digits as usize)
+}

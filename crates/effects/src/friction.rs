@@ -1,0 +1,280 @@
+//! Friction that depends on the velocity alone, or on the load.
+
+use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
+use crate::fitted::FittedEffect;
+use crate::kind::{
+    Constants, EffectKind, JointProperty, Signal, SignalRanges, around, constant, product, values,
+};
+use phiw_dynamics::Tree;
+use phiw_identification::{Effect, Needs, Sample};
+
+/// The constant of every smoothed sign: the speed over which it turns \[rad/s, m/s\].
+pub(crate) const WIDTH: &str = "sign_width";
+
+/// Speeds over which a sign may turn: the plain sign, then up to 0.064 rad/s (m/s), but no more than half of the joint's RMS speed.
+pub(crate) fn sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
+    let largest = 0.5 * ranges.joints[joint].velocity_rms;
+    let widths =
+        (0..15).map(|step| 0.0005 * 2.0_f64.powf(0.5 * f64::from(step))).filter(|&width| width <= largest);
+    values(WIDTH, [0.0].into_iter().chain(widths))
+}
+
+/// A few of them, for effects that are not themselves about the sign.
+pub(crate) fn few_sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
+    sign_widths(joint, ranges).into_iter().step_by(5).collect()
+}
+
+fn width_of(constants: &Constants) -> f64 {
+    constant(constants, WIDTH, 0.0)
+}
+
+const VISCOUS: &str = "viscous_friction";
+
+/// fv·q̇.
+pub struct Viscous;
+
+impl EffectKind for Viscous {
+    fn name(&self) -> &str {
+        VISCOUS
+    }
+    fn may_change(&self) -> bool {
+        true
+    }
+    fn telling_motion(&self) -> &'static str {
+        "a motion at several constant speeds"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!("{} has viscous friction of {}.", found.joints(), found.quantity(0))
+    }
+    fn joint_property(&self) -> Option<JointProperty> {
+        Some(JointProperty::Damping)
+    }
+    fn dissipates(&self) -> bool {
+        true
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let joint = site[0];
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = sample.qd()[joint];
+        let parameters = [("fv", ParameterKind::PerVelocity, 0.0)];
+        let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
+        Box::new(effect.linear_in_motion())
+    }
+}
+
+/// fc·sign(q̇).
+pub struct Coulomb;
+
+impl EffectKind for Coulomb {
+    fn name(&self) -> &str {
+        "coulomb_friction"
+    }
+    fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
+        sign_widths(site[0], ranges)
+    }
+    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+        around(found, WIDTH, step)
+    }
+    fn may_change(&self) -> bool {
+        true
+    }
+    fn telling_motion(&self) -> &'static str {
+        "a motion that reverses often, at low and at high speed"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!("{} has Coulomb friction of {}.", found.joints(), found.quantity(0))
+    }
+    fn joint_property(&self) -> Option<JointProperty> {
+        Some(JointProperty::Friction)
+    }
+    fn goes_with(&self) -> &'static [&'static str] {
+        &[VISCOUS]
+    }
+    fn constants_of_the_site(&self) -> &'static [&'static str] {
+        &[WIDTH]
+    }
+    fn dissipates(&self) -> bool {
+        true
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let (joint, width) = (site[0], width_of(constants));
+        let columns =
+            move |sample: &Sample<'_>, out: &mut [f64]| out[0] = smooth_sign(sample.qd()[joint], width);
+        let parameters = [("fc", ParameterKind::Torque, 0.0)];
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+    }
+}
+
+/// Half the difference between the two directions, of the viscous part, the Coulomb part, or both (`part` 0, 1, 2).
+pub struct Asymmetric;
+
+impl EffectKind for Asymmetric {
+    fn name(&self) -> &str {
+        "asymmetric_friction"
+    }
+    fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
+        let widths = few_sign_widths(site[0], ranges);
+        let mut variants = values("part", [0.0]);
+        variants.extend(product(&values("part", [1.0, 2.0]), &widths));
+        variants
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        Some(Constants::from([("part".to_owned(), 2.0)]))
+    }
+    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+        around(found, WIDTH, step)
+    }
+    fn telling_motion(&self) -> &'static str {
+        "the same path forth and back at several speeds, with rests"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let halves: Vec<String> = found.quantities().map(|(_, half)| half).collect();
+        let (joint, halves) = (found.joints(), halves.join(" and "));
+        format!("{joint} rubs differently in its two directions: half the difference is {halves}.")
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let (joint, width) = (site[0], width_of(constants));
+        let viscous = ("fv_difference", ParameterKind::PerVelocity, f64::NEG_INFINITY);
+        let coulomb = ("fc_difference", ParameterKind::Torque, f64::NEG_INFINITY);
+        let part = constant(constants, "part", 2.0);
+        let viscous_column = move |sample: &Sample<'_>| sample.qd()[joint].abs();
+        let coulomb_column = move |sample: &Sample<'_>| smooth_sign(sample.qd()[joint], width).abs();
+        let kind = self.name();
+        if part == 0.0 {
+            let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = viscous_column(sample);
+            Box::new(OwnTorque::new(kind, tree, joint, constants, &[viscous], columns))
+        } else if part == 1.0 {
+            let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = coulomb_column(sample);
+            Box::new(OwnTorque::new(kind, tree, joint, constants, &[coulomb], columns))
+        } else {
+            let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+                out[0] = viscous_column(sample);
+                out[1] = coulomb_column(sample);
+            };
+            Box::new(OwnTorque::new(kind, tree, joint, constants, &[viscous, coulomb], columns))
+        }
+    }
+}
+
+/// f2·q̇·|q̇|.
+pub struct Quadratic;
+
+impl EffectKind for Quadratic {
+    fn name(&self) -> &str {
+        "quadratic_friction"
+    }
+    fn telling_motion(&self) -> &'static str {
+        "a fast motion beside a slow one"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, coefficient) = (found.joints(), found.quantity(0));
+        format!("The friction of {joint} bends with the square of the speed: {coefficient}.")
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let joint = site[0];
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            let velocity = sample.qd()[joint];
+            out[0] = velocity * velocity.abs();
+        };
+        let parameters = [("f2", ParameterKind::PerSquaredVelocity, f64::NEG_INFINITY)];
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+    }
+}
+
+/// fs·exp(−|q̇/vs|^δ)·sign(q̇), on top of Coulomb friction.
+pub struct Stribeck;
+
+const STRIBECK_VELOCITY: &str = "stribeck_velocity";
+const EXPONENT: &str = "exponent";
+
+impl EffectKind for Stribeck {
+    fn name(&self) -> &str {
+        "stribeck_friction"
+    }
+    fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
+        let speed = ranges.joints[site[0]].velocity_rms;
+        let speeds = values(STRIBECK_VELOCITY, (0..5).map(|halvings| speed * 0.5_f64.powi(halvings)));
+        let shapes = product(&speeds, &values(EXPONENT, [1.0, 2.0]));
+        product(&shapes, &values(WIDTH, [0.02 * speed]))
+    }
+    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+        let mut near = around(found, STRIBECK_VELOCITY, step);
+        near.extend(around(found, WIDTH, step));
+        near.extend(around(found, EXPONENT, step));
+        near
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        None
+    }
+    fn telling_motion(&self) -> &'static str {
+        "a slow motion, well below the speed at which friction is lowest"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!(
+            "{} sticks at low speed: {} on top of Coulomb friction, gone above {:.3} rad/s or m/s (Stribeck).",
+            found.joints(),
+            found.quantity(0),
+            found.constant(STRIBECK_VELOCITY)
+        )
+    }
+    fn dissipates(&self) -> bool {
+        true
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let (joint, width) = (site[0], width_of(constants));
+        let speed = constant(constants, STRIBECK_VELOCITY, 0.1);
+        let exponent = constant(constants, EXPONENT, 2.0);
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            let velocity = sample.qd()[joint];
+            let relative = (velocity / speed).abs();
+            let power = if exponent == 1.0 {
+                relative
+            } else if exponent == 2.0 {
+                relative * relative
+            } else {
+                relative.powf(exponent)
+            };
+            // Far above the Stribeck velocity nothing is left.
+            out[0] = if power > 40.0 { 0.0 } else { (-power).exp() * smooth_sign(velocity, width) };
+        };
+        let parameters = [("fs", ParameterKind::Torque, 0.0)];
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+    }
+}
+
+/// μ·|τ of the rigid body|·sign(q̇).
+pub struct LoadDependent;
+
+impl EffectKind for LoadDependent {
+    fn name(&self) -> &str {
+        "load_dependent_friction"
+    }
+    fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
+        few_sign_widths(site[0], ranges)
+    }
+    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+        around(found, WIDTH, step)
+    }
+    fn telling_motion(&self) -> &'static str {
+        "the same motion with the arm stretched out and folded, or with a load"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, share) = (found.joints(), found.value(0));
+        format!("The friction of {joint} grows with its load: {share:.3} of the torque that it carries.")
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Torque
+    }
+    fn dissipates(&self) -> bool {
+        true
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let (joint, width) = (site[0], width_of(constants));
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            let load = sample.reference_torque().get(joint).copied().unwrap_or_default();
+            out[0] = load.abs() * smooth_sign(sample.qd()[joint], width);
+        };
+        let parameters = [("mu", ParameterKind::Ratio, 0.0)];
+        let needs = Needs { torque: true, ..Needs::default() };
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns).needing(needs))
+    }
+}

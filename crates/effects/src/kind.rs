@@ -1,0 +1,216 @@
+//! What the catalogue knows of a kind of effect.
+
+use crate::FittedEffect;
+use phiw_dynamics::Tree;
+use phiw_identification::Effect;
+use phiw_telemetry::Survey;
+use std::collections::BTreeMap;
+
+/// Non-linear constants of an effect by name, SI units.
+pub type Constants = BTreeMap<String, f64>;
+
+/// A signal that an effect's torque can be plotted against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Signal {
+    /// The joint's position \[rad, m\].
+    Position,
+    /// The joint's velocity \[rad/s, m/s\].
+    Velocity,
+    /// The joint's acceleration \[rad/s², m/s²\].
+    Acceleration,
+    /// The joint's measured torque \[N·m, N\].
+    Torque,
+    /// Time \[s\].
+    Time,
+}
+
+/// A property of a joint by which simulators express an effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointProperty {
+    /// Torque against the velocity, over it \[N·m·s/rad, N·s/m\]; `damping` of a URDF.
+    Damping,
+    /// Torque against the direction of motion \[N·m, N\]; `friction` of a URDF.
+    Friction,
+    /// Inertia that the joint's own motion alone feels \[kg·m², kg\]; a URDF has no place for it.
+    Armature,
+}
+
+/// A kind of effect: where it can act, which constants to try, how to build it, and what the rest of the program needs to know of it.
+///
+/// What it says of its parameters (units, physical bounds) and columns (linear in the motion, causal) the [`Effect`] says that it builds.
+/// Implement it for an effect of your own and add it with [`crate::Catalogue::with`]: see the recipe on the crate's front page.
+pub trait EffectKind: Send + Sync {
+    /// Its name, as in `report.json`.
+    fn name(&self) -> &str;
+
+    /// The joints, or groups of joints, that it can act on: each joint by default.
+    fn sites(&self, tree: &Tree) -> Vec<Vec<usize>> {
+        (0..tree.joint_count()).map(|joint| vec![joint]).collect()
+    }
+
+    /// In words, what it acts on, for error messages.
+    fn acts_on(&self) -> &'static str {
+        "one joint"
+    }
+
+    /// Whether it can act on these joints.
+    fn accepts(&self, tree: &Tree, site: &[usize]) -> bool {
+        self.sites(tree).iter().any(|known| known == site)
+    }
+
+    /// Constants to try on a site, given the ranges of the signals; one empty set where it has none.
+    fn scan(&self, _site: &[usize], _ranges: &SignalRanges) -> Vec<Constants> {
+        vec![Constants::new()]
+    }
+
+    /// Constants near `found`, closer together than the scan's; `step` counts the refinements so far.
+    fn refine(&self, _found: &Constants, _step: usize) -> Vec<Constants> {
+        Vec::new()
+    }
+
+    /// Constants to use when the kind is declared for all joints; `None` if that makes no sense.
+    fn declared_constants(&self) -> Option<Constants> {
+        Some(Constants::new())
+    }
+
+    /// Whether its parameters may have changed against a held model that has it already: the change is then found as the same kind again.
+    fn may_change(&self) -> bool {
+        false
+    }
+
+    /// Whether a free rigid body takes the effect up entirely, so that it can only be seen against a held model.
+    fn needs_held_model(&self) -> bool {
+        false
+    }
+
+    /// The motion, or the signal, that would tell it from its rivals.
+    fn telling_motion(&self) -> &'static str;
+
+    /// What it means when it was found, with its fitted values, in one sentence to a user: its name and numbers by default.
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        found.plainly()
+    }
+
+    /// The signal that its torque is best seen against.
+    fn seen_against(&self) -> Signal {
+        Signal::Velocity
+    }
+
+    /// Names of kinds that are tried together with it on one site as well: either alone mimics the other in part.
+    fn goes_with(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// Names of its constants that belong to the joint rather than to the effect: where it is in a model, other kinds on the same site take the values that it has.
+    fn constants_of_the_site(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// The property of a joint that holds its only parameter, in a URDF or a simulator; none if neither can express it.
+    fn joint_property(&self) -> Option<JointProperty> {
+        None
+    }
+
+    /// Whether it always takes energy from the motion: its power is that of a brake at every moment, whatever its parameters are within their bounds.
+    fn dissipates(&self) -> bool {
+        false
+    }
+
+    /// Whether it changes with the time since the session began, so that logs whose clocks each begin anew cannot tell it.
+    fn needs_session_time(&self) -> bool {
+        false
+    }
+
+    /// Builds it. `site` is one that it accepts; constants that are missing take their defaults.
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect>;
+}
+
+/// Ranges of the signals of one joint over the training logs.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointRange {
+    /// Lowest and highest position \[rad, m\].
+    pub position: (f64, f64),
+    /// RMS of the velocity \[rad/s, m/s\].
+    pub velocity_rms: f64,
+    /// RMS of the torque \[N·m, N\].
+    pub torque_rms: f64,
+    /// Largest torque \[N·m, N\].
+    pub torque_peak: f64,
+}
+
+/// What the training logs cover: bounds for the constants to try.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SignalRanges {
+    /// One for each joint.
+    pub joints: Vec<JointRange>,
+    /// First and last moment of the session \[s\].
+    pub session: (f64, f64),
+    /// Time between samples \[s\].
+    pub period: f64,
+    /// For each joint, spatial frequencies N \[1/rad\] at which its residual has peaks.
+    pub ripple_frequencies: Vec<Vec<f64>>,
+    /// Whether any joint has a temperature.
+    pub temperature: bool,
+}
+
+impl SignalRanges {
+    /// Ranges as the surveys of the training logs tell them.
+    pub fn of_surveys(surveys: &[Survey]) -> Self {
+        let count = surveys.first().map_or(0, |survey| survey.joints.len());
+        let joint = |index: usize| {
+            let mut range =
+                JointRange { position: (f64::INFINITY, f64::NEG_INFINITY), ..JointRange::default() };
+            for joint in surveys.iter().map(|survey| &survey.joints[index]) {
+                range.position = (range.position.0.min(joint.q_min), range.position.1.max(joint.q_max));
+                range.velocity_rms = range.velocity_rms.max(joint.velocity_rms);
+                if let Some(torque) = joint.torque {
+                    range.torque_rms = range.torque_rms.max(torque.rms);
+                    range.torque_peak = range.torque_peak.max(torque.max).max(-torque.min);
+                }
+            }
+            range
+        };
+        let moment = |pick: fn((f64, f64)) -> f64, fold: fn(f64, f64) -> f64| {
+            surveys
+                .iter()
+                .map(|survey| pick(survey.time_range()) + survey.session.offset)
+                .fold(f64::NAN, fold)
+        };
+        SignalRanges {
+            joints: (0..count).map(joint).collect(),
+            session: (moment(|range| range.0, f64::min), moment(|range| range.1, f64::max)),
+            period: surveys.first().map_or(0.0, |survey| survey.period),
+            ripple_frequencies: vec![Vec::new(); count],
+            temperature: surveys.iter().any(|survey| survey.joints.iter().any(|joint| joint.temperature)),
+        }
+    }
+}
+
+/// One set for each value of one constant.
+pub(crate) fn values(name: &str, values: impl IntoIterator<Item = f64>) -> Vec<Constants> {
+    values.into_iter().map(|value| Constants::from([(name.to_owned(), value)])).collect()
+}
+
+/// Every pair of a set of each.
+pub(crate) fn product(left: &[Constants], right: &[Constants]) -> Vec<Constants> {
+    let join = |a: &Constants, b: &Constants| a.clone().into_iter().chain(b.clone()).collect();
+    left.iter().flat_map(|a| right.iter().map(move |b| join(a, b))).collect()
+}
+
+/// `found` with one constant times each factor, `spread` shrinking with every step.
+pub(crate) fn around(found: &Constants, name: &str, step: usize) -> Vec<Constants> {
+    let Some(&value) = found.get(name) else { return Vec::new() };
+    let spread = 1.5_f64.powf(0.5_f64.powi(step as i32));
+    [1.0 / spread, spread]
+        .map(|factor| {
+            let mut near = found.clone();
+            near.insert(name.to_owned(), value * factor);
+            near
+        })
+        .to_vec()
+}
+
+/// A constant, or its default.
+pub(crate) fn constant(constants: &Constants, name: &str, default: f64) -> f64 {
+    constants.get(name).copied().unwrap_or(default)
+}

@@ -1,0 +1,20 @@
+#![doc = include_str!("../README.md")]
+
+mod catalogue;
+mod columns;
+mod coupling;
+mod drift;
+mod drive;
+mod elasticity;
+mod external;
+mod fitted;
+mod friction;
+mod hysteresis;
+mod kind;
+mod position;
+mod sensing;
+
+pub use catalogue::Catalogue;
+pub use columns::{Formula, OwnTorque, ParameterKind, smooth_sign};
+pub use fitted::{FittedEffect, sentence};
+pub use kind::{Constants, EffectKind, JointProperty, JointRange, Signal, SignalRanges};

@@ -1,0 +1,184 @@
+//! Torques that depend on the position alone: springs, balancers, ripple, end stops.
+
+use crate::columns::{OwnTorque, ParameterKind};
+use crate::fitted::FittedEffect;
+use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant, product, values};
+use phiw_dynamics::{JointType, Tree};
+use phiw_identification::{Effect, Sample};
+
+/// k·(q − q0).
+pub struct JointSpring;
+
+impl EffectKind for JointSpring {
+    fn name(&self) -> &str {
+        "joint_spring"
+    }
+    fn telling_motion(&self) -> &'static str {
+        "slow motion over the whole range of the joint"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        format!("A spring pulls {} back: {}.", found.joints(), found.quantity(0))
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let joint = site[0];
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            out[0] = sample.q()[joint];
+            out[1] = -1.0;
+        };
+        let parameters =
+            [("k", ParameterKind::Stiffness, 0.0), ("k_q0", ParameterKind::Torque, f64::NEG_INFINITY)];
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+    }
+}
+
+/// k·sin(q − q0), as k·cos q0·sin q − k·sin q0·cos q.
+pub struct GravityBalancer;
+
+impl EffectKind for GravityBalancer {
+    fn name(&self) -> &str {
+        "gravity_balancer"
+    }
+    fn sites(&self, tree: &Tree) -> Vec<Vec<usize>> {
+        let turns = |&joint: &usize| tree.joint(joint).joint_type != JointType::Prismatic;
+        (0..tree.joint_count()).filter(turns).map(|joint| vec![joint]).collect()
+    }
+    fn acts_on(&self) -> &'static str {
+        "one joint that turns"
+    }
+    fn telling_motion(&self) -> &'static str {
+        "slow motion over the whole range, in several poses of the joints behind"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, amplitude) = (found.joints(), found.amplitude());
+        format!("{joint} is counterbalanced: up to {amplitude} as a sine of its angle.")
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let joint = site[0];
+        let columns =
+            move |sample: &Sample<'_>, out: &mut [f64]| (out[0], out[1]) = sample.q()[joint].sin_cos();
+        let parameters = [
+            ("sine", ParameterKind::Torque, f64::NEG_INFINITY),
+            ("cosine", ParameterKind::Torque, f64::NEG_INFINITY),
+        ];
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+    }
+}
+
+/// a·sin(N·q) + b·cos(N·q), with `harmonics` of it.
+pub struct TorqueRipple;
+
+const FREQUENCY: &str = "periods";
+const HARMONICS: &str = "harmonics";
+
+impl EffectKind for TorqueRipple {
+    fn name(&self) -> &str {
+        "torque_ripple"
+    }
+    fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
+        let peaks = ranges.ripple_frequencies.get(site[0]).cloned().unwrap_or_default();
+        product(&values(FREQUENCY, peaks), &values(HARMONICS, [1.0, 2.0]))
+    }
+    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+        // The scan knows N to a hundredth; a phase slip over the range is what decides.
+        let Some(&frequency) = found.get(FREQUENCY) else { return Vec::new() };
+        let spread = 0.01 * 0.4_f64.powi(step as i32);
+        let near = |factor: f64| {
+            let mut near = found.clone();
+            near.insert(FREQUENCY.to_owned(), frequency * factor);
+            near
+        };
+        vec![near(1.0 - spread), near(1.0 + spread)]
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        None
+    }
+    fn telling_motion(&self) -> &'static str {
+        "slow motion at constant speed"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let periods = found.constant(FREQUENCY);
+        format!(
+            "The torque of {} ripples by {} with {:.2} periods a radian over 2π ({periods:.1} a turn).",
+            found.joints(),
+            found.amplitude(),
+            periods / std::f64::consts::TAU
+        )
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let joint = site[0];
+        let frequency = constant(constants, FREQUENCY, 1.0);
+        let harmonics = constant(constants, HARMONICS, 1.0).clamp(1.0, 3.0) as usize;
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            for harmonic in 0..harmonics {
+                let angle = (harmonic + 1) as f64 * frequency * sample.q()[joint];
+                (out[2 * harmonic], out[2 * harmonic + 1]) = angle.sin_cos();
+            }
+        };
+        let free = |name: &'static str| (name, ParameterKind::Torque, f64::NEG_INFINITY);
+        let parameters = [free("a1"), free("b1"), free("a2"), free("b2"), free("a3"), free("b3")];
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters[..2 * harmonics], columns))
+    }
+}
+
+/// A stiff torque that sets in near a limit: k·(q − q_stop) beyond `stop`, on the `side` +1 or −1.
+pub struct EndStop;
+
+const STOP: &str = "stop";
+const SIDE: &str = "side";
+
+impl EffectKind for EndStop {
+    fn name(&self) -> &str {
+        "end_stop"
+    }
+    fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
+        let (lower, upper) = ranges.joints[site[0]].position;
+        let shares = [0.01, 0.03, 0.06, 0.1, 0.15, 0.2];
+        let side = |side: f64, edge: f64| {
+            let stops = shares.map(|share| edge - side * share * (upper - lower));
+            product(&values(SIDE, [side]), &values(STOP, stops))
+        };
+        [side(1.0, upper), side(-1.0, lower)].concat()
+    }
+    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+        let Some(&stop) = found.get(STOP) else { return Vec::new() };
+        let spread = 0.02 * 0.5_f64.powi(step as i32);
+        [stop - spread, stop + spread]
+            .map(|value| {
+                let mut near = found.clone();
+                near.insert(STOP.to_owned(), value);
+                near
+            })
+            .to_vec()
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        None
+    }
+    fn telling_motion(&self) -> &'static str {
+        "slow motion up to the limit and back"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, stiffness) = (found.joints(), found.quantity(0));
+        format!("{joint} runs into something stiff at {:.3}: {stiffness}.", found.constant(STOP))
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let joint = site[0];
+        let (stop, side) = (constant(constants, STOP, 0.0), constant(constants, SIDE, 1.0));
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            out[0] = side * (side * (sample.q()[joint] - stop)).max(0.0);
+        };
+        let parameters = [("k", ParameterKind::Stiffness, 0.0)];
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+    }
+}

@@ -1,0 +1,267 @@
+//! What stands between the torque that acts and the numbers in the log: delay, encoder offset, saturation.
+
+use crate::columns::{OwnTorque, ParameterKind};
+use crate::fitted::FittedEffect;
+use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant, values};
+use phiw_dynamics::{JointType, Tree};
+use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
+use phiw_telemetry::Block;
+
+/// The torque is stamped later (positive) or earlier than the position: on one joint, or on all alike.
+///
+/// Linear in the delay about the value that has been corrected for already; a fitted delay really shifts the torque.
+pub struct TimeDelay;
+
+const DELAY: &str = "delay";
+
+impl EffectKind for TimeDelay {
+    fn name(&self) -> &str {
+        "time_delay"
+    }
+    fn sites(&self, tree: &Tree) -> Vec<Vec<usize>> {
+        let count = tree.joint_count();
+        let mut sites: Vec<Vec<usize>> = (0..count).map(|joint| vec![joint]).collect();
+        if count > 1 {
+            sites.push((0..count).collect());
+        }
+        sites
+    }
+    fn acts_on(&self) -> &'static str {
+        "one joint, or all joints"
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        None
+    }
+    fn telling_motion(&self) -> &'static str {
+        "quick reversals of the torque"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let delay = found.constant(DELAY) + found.value(0);
+        format!("The torque of {} is stamped {:.2} ms late.", found.joints(), 1e3 * delay)
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let spec = spec(self.name(), tree, site, constants);
+        Box::new(Delay { site: site.to_vec(), delay: constant(constants, DELAY, 0.0), spec })
+    }
+}
+
+struct Delay {
+    site: Vec<usize>,
+    /// What has been corrected for already \[s\].
+    delay: f64,
+    spec: EffectSpec,
+}
+
+impl Effect for Delay {
+    fn spec(&self) -> EffectSpec {
+        self.spec.clone()
+    }
+    fn parameters(&self) -> Vec<EffectParameter> {
+        let joint = self.spec.joints.first().cloned().unwrap_or_default();
+        let bounds = (f64::NEG_INFINITY, f64::INFINITY);
+        vec![EffectParameter { joint, name: DELAY.to_owned(), unit: "s".to_owned(), bounds }]
+    }
+    fn entries(&self) -> Vec<Entry> {
+        self.site.iter().map(|&row| Entry { row, parameter: 0 }).collect()
+    }
+    fn needs(&self) -> Needs {
+        Needs { torque: true, ..Needs::default() }
+    }
+    fn is_causal(&self) -> bool {
+        false
+    }
+    fn evaluator(&self) -> Box<dyn Evaluator + '_> {
+        Box::new(DelayColumns(self))
+    }
+    fn correct(&self, block: &mut Block) {
+        if self.delay != 0.0 && !block.tau.is_empty() {
+            self.site.iter().for_each(|&joint| advance(block, joint, self.delay));
+        }
+    }
+    fn relinearised(&self, fitted: &[f64]) -> Option<Box<dyn Effect>> {
+        let delay = self.delay + fitted.first().copied().unwrap_or_default();
+        let spec = self.spec.clone().with(DELAY, delay);
+        Some(Box::new(Delay { site: self.site.clone(), delay, spec }))
+    }
+}
+
+struct DelayColumns<'a>(&'a Delay);
+
+impl Evaluator for DelayColumns<'_> {
+    /// τ(t − d) ≈ τ(t) − d·τ̇(t).
+    fn evaluate(&mut self, sample: &Sample<'_>, columns: &mut [f64]) {
+        let rates = sample.total_torque_rate();
+        for (column, &joint) in columns.iter_mut().zip(&self.0.site) {
+            *column = -rates.get(joint).copied().unwrap_or_default();
+        }
+    }
+}
+
+/// Shifts a joint's torque earlier by `delay`, by cubic interpolation; the ends keep their last value.
+fn advance(block: &mut Block, joint: usize, delay: f64) {
+    let samples = block.t.len();
+    if samples < 4 {
+        return;
+    }
+    let period = (block.t[samples - 1] - block.t[0]) / (samples - 1) as f64;
+    let shift = delay / period;
+    let joints = block.joints;
+    let original: Vec<f64> = (0..samples).map(|sample| block.tau[sample * joints + joint]).collect();
+    let last = (samples - 1) as f64;
+    for sample in 0..samples {
+        let place = (sample as f64 + shift).clamp(0.0, last);
+        let before = (place.floor() as usize).clamp(1, samples - 3);
+        let u = place - before as f64;
+        // Lagrange's polynomial through the samples at −1, 0, 1, 2.
+        let weights = [
+            -u * (u - 1.0) * (u - 2.0) / 6.0,
+            (u + 1.0) * (u - 1.0) * (u - 2.0) / 2.0,
+            -(u + 1.0) * u * (u - 2.0) / 2.0,
+            (u + 1.0) * u * (u - 1.0) / 6.0,
+        ];
+        let value = weights.iter().zip(&original[before - 1..before + 3]).map(|(w, x)| w * x).sum();
+        block.tau[sample * joints + joint] = value;
+    }
+}
+
+/// The true angle is q + δ. Linear in δ about the value that has been corrected for already.
+pub struct EncoderOffset;
+
+const OFFSET: &str = "offset";
+
+impl EffectKind for EncoderOffset {
+    fn name(&self) -> &str {
+        "encoder_offset"
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        None
+    }
+    fn telling_motion(&self) -> &'static str {
+        "rests in many poses of the joint and of those behind it"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let offset = found.in_unit_of(0, found.constant(OFFSET) + found.value(0));
+        format!("The zero of {}'s encoder is off by {offset}.", found.joints())
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let unit = if tree.joint(site[0]).joint_type == JointType::Prismatic { "m" } else { "rad" };
+        Box::new(Offset {
+            joint: site[0],
+            joints: tree.joint_count(),
+            offset: constant(constants, OFFSET, 0.0),
+            unit,
+            spec: spec(self.name(), tree, site, constants),
+        })
+    }
+}
+
+#[derive(Clone)]
+struct Offset {
+    joint: usize,
+    joints: usize,
+    offset: f64,
+    unit: &'static str,
+    spec: EffectSpec,
+}
+
+impl Effect for Offset {
+    fn spec(&self) -> EffectSpec {
+        self.spec.clone()
+    }
+    fn parameters(&self) -> Vec<EffectParameter> {
+        let joint = self.spec.joints.first().cloned().unwrap_or_default();
+        let bounds = (f64::NEG_INFINITY, f64::INFINITY);
+        vec![EffectParameter { joint, name: OFFSET.to_owned(), unit: self.unit.to_owned(), bounds }]
+    }
+    fn entries(&self) -> Vec<Entry> {
+        (0..self.joints).map(|row| Entry { row, parameter: 0 }).collect()
+    }
+    fn needs(&self) -> Needs {
+        Needs { torque: true, derivatives: true, ..Needs::default() }
+    }
+    fn evaluator(&self) -> Box<dyn Evaluator + '_> {
+        Box::new(OffsetColumns(self))
+    }
+    fn correct(&self, block: &mut Block) {
+        block
+            .q
+            .iter_mut()
+            .skip(self.joint)
+            .step_by(self.joints)
+            .for_each(|position| *position += self.offset);
+    }
+    fn relinearised(&self, fitted: &[f64]) -> Option<Box<dyn Effect>> {
+        let offset = self.offset + fitted.first().copied().unwrap_or_default();
+        Some(Box::new(Offset { offset, spec: self.spec.clone().with(OFFSET, offset), ..self.clone() }))
+    }
+}
+
+struct OffsetColumns<'a>(&'a Offset);
+
+impl Evaluator for OffsetColumns<'_> {
+    fn evaluate(&mut self, sample: &Sample<'_>, columns: &mut [f64]) {
+        let derivatives = sample.torque_by_position();
+        for (row, column) in columns.iter_mut().enumerate() {
+            *column = derivatives.get(row * self.0.joints + self.0.joint).copied().unwrap_or_default();
+        }
+    }
+}
+
+/// The logged torque is the commanded one; what is delivered clips at `limit`. The column is the part beyond it, whose parameter is one where
+/// the drive clips in truth.
+pub struct ActuatorSaturation;
+
+const LIMIT: &str = "limit";
+
+impl EffectKind for ActuatorSaturation {
+    fn name(&self) -> &str {
+        "actuator_saturation"
+    }
+    fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
+        // A drive that clips most of the time would be no drive: and below the torque's own level the column is the torque itself.
+        let range = ranges.joints[site[0]];
+        let (lowest, highest) = (1.2 * range.torque_rms, 0.97 * range.torque_peak);
+        if lowest >= highest {
+            return Vec::new();
+        }
+        let step = (highest / lowest).powf(1.0 / 7.0);
+        values(LIMIT, (0..8).map(|power| lowest * step.powi(power)))
+    }
+    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+        let Some(&limit) = found.get(LIMIT) else { return Vec::new() };
+        let spread = 0.04 * 0.5_f64.powi(step as i32);
+        [1.0 - spread, 1.0 + spread]
+            .map(|factor| Constants::from([(LIMIT.to_owned(), limit * factor)]))
+            .to_vec()
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        None
+    }
+    fn telling_motion(&self) -> &'static str {
+        "a motion that asks for more torque than the drive has"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let (joint, limit) = (found.joints(), found.constant(LIMIT));
+        format!("The drive of {joint} delivers no more than {limit:.3} N·m or N, whatever is commanded.")
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Torque
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let (joint, limit) = (site[0], constant(constants, LIMIT, f64::INFINITY));
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            let torque = sample.tau().get(joint).copied().unwrap_or_default();
+            out[0] = torque.signum() * (torque.abs() - limit).max(0.0);
+        };
+        let parameters = [("clipped_share", ParameterKind::Ratio, 0.3)];
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+    }
+}
+
+fn spec(kind: &str, tree: &Tree, site: &[usize], constants: &Constants) -> EffectSpec {
+    let joints = site.iter().map(|&joint| tree.joint(joint).joint.clone()).collect();
+    EffectSpec { kind: kind.to_owned(), joints, constants: constants.clone() }
+}

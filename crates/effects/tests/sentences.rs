@@ -1,0 +1,115 @@
+//! What the catalogue says of each kind, in words.
+
+use phiw_dynamics::Tree;
+use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+use phiw_effects::{Catalogue, EffectKind, JointRange, SignalRanges};
+use phiw_identification::{EffectParameter, EffectSpec};
+
+const ARM: &str = r#"<robot name="arm">
+  <link name="base"/>
+  <link name="upper"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="fore"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="shoulder" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/></joint>
+  <joint name="elbow" type="continuous"><parent link="upper"/><child link="fore"/><axis xyz="1 0 0"/></joint>
+</robot>"#;
+
+/// Kinds with what they say.
+const SENTENCES: &[(&str, &str)] = &[
+    ("viscous_friction", "shoulder has viscous friction of 0.500 N·m·s/rad."),
+    ("coulomb_friction", "shoulder has Coulomb friction of 0.500 N·m."),
+    ("torque_offset", "The torque of shoulder is off by a constant 0.500 N·m."),
+    ("rotor_inertia", "shoulder carries a rotor inertia of 0.500 kg·m² that the links do not account for."),
+    ("torque_gain", "The torque of shoulder is measured +50.0 % too large."),
+    (
+        "asymmetric_friction",
+        "shoulder rubs differently in its two directions: half the difference is 0.500 N·m·s/rad and 0.250 N·m.",
+    ),
+    ("quadratic_friction", "The friction of shoulder bends with the square of the speed: 0.500 N·m·s²/rad²."),
+    (
+        "stribeck_friction",
+        "shoulder sticks at low speed: 0.500 N·m on top of Coulomb friction, gone above 0.050 rad/s or m/s (Stribeck).",
+    ),
+    (
+        "load_dependent_friction",
+        "The friction of shoulder grows with its load: 0.500 of the torque that it carries.",
+    ),
+    ("joint_spring", "A spring pulls shoulder back: 0.500 N·m/rad."),
+    ("gravity_balancer", "shoulder is counterbalanced: up to 0.559 N·m as a sine of its angle."),
+    (
+        "torque_ripple",
+        "The torque of shoulder ripples by 0.559 N·m with 1.91 periods a radian over 2π (12.0 a turn).",
+    ),
+    ("end_stop", "shoulder runs into something stiff at -0.600: 0.500 N·m/rad."),
+    (
+        "transmission_coupling",
+        "shoulder and elbow share a transmission: 0.500 N·m·s/rad of viscous friction of the first on the second, 0.250 N·m of Coulomb friction of the first on the second.",
+    ),
+    ("time_delay", "The torque of shoulder is stamped 500.00 ms late."),
+    ("encoder_offset", "The zero of shoulder's encoder is off by 0.500 rad."),
+    (
+        "actuator_saturation",
+        "The drive of shoulder delivers no more than 8.730 N·m or N, whatever is commanded.",
+    ),
+    (
+        "hysteresis",
+        "The torque of shoulder depends on the way since the last reversal: 0.500 N·m over 0.0047 rad or m.",
+    ),
+    ("thermal_drift", "The friction of shoulder falls as it warms up, over 8 s."),
+    ("joint_elasticity", "The transmission of shoulder gives: 5.000e-1 rad/(N·m)."),
+    ("gravity_tilt", "The base is not level: gravity leans by 3.27 degrees."),
+    ("payload", "The link behind shoulder carries 0.500 kg more than the model knows."),
+    ("external_force", "Something pulls at the link behind shoulder (a hose, a cable): 0.500 N along x."),
+];
+
+/// The kind on its first site, with the last of its constants and parameters 0.5, 0.25, 0.125, …
+fn said(tree: &Tree, kind: &dyn EffectKind) -> String {
+    let joint = JointRange { position: (-1.0, 1.0), velocity_rms: 0.8, torque_rms: 2.0, torque_peak: 9.0 };
+    let ranges = SignalRanges {
+        joints: vec![joint; 2],
+        session: (0.0, 60.0),
+        period: 0.01,
+        ripple_frequencies: vec![vec![12.0]; 2],
+        temperature: false,
+    };
+    let site = kind.sites(tree).remove(0);
+    let constants = kind.scan(&site, &ranges).pop().unwrap();
+    let effect = kind.build(tree, &site, &constants);
+    let parameters = effect.parameters();
+    let fitted: Vec<f64> = (1..=parameters.len()).map(|place| 0.5_f64.powi(place as i32)).collect();
+    Catalogue::default().sentence(&effect.spec(), &parameters, &fitted)
+}
+
+#[test]
+fn each_kind_says_its_sentence() {
+    let tree = read_urdf(ARM, &UrdfOptions::default()).unwrap().tree;
+    let catalogue = Catalogue::default();
+    for &(kind, words) in SENTENCES {
+        assert_eq!(said(&tree, catalogue.kind(kind).unwrap()), words);
+    }
+}
+
+#[test]
+fn each_sentence_is_one() {
+    let tree = read_urdf(ARM, &UrdfOptions::default()).unwrap().tree;
+    for kind in Catalogue::default().kinds() {
+        let words = said(&tree, kind);
+        assert!(
+            words.ends_with('.') && words.chars().count() > 20 && !words.contains('\n'),
+            "{}: {words}",
+            kind.name()
+        );
+    }
+}
+
+#[test]
+fn a_kind_without_a_sentence_says_its_name_and_numbers() {
+    let spec = EffectSpec::new("cubic_spring", &["elbow"]);
+    let parameter = EffectParameter {
+        joint: "elbow".to_owned(),
+        name: "k3".to_owned(),
+        unit: "N·m/rad³".to_owned(),
+        bounds: (0.0, f64::INFINITY),
+    };
+    let words = Catalogue::default().sentence(&spec, &[parameter], &[12.5]);
+    assert_eq!(words, "cubic spring on elbow: k3 = 12.5 N·m/rad³.");
+}

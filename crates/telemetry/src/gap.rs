@@ -1,0 +1,52 @@
+//! Why samples are missing.
+
+use std::fmt;
+
+/// Why a log is interrupted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum GapReason {
+    /// A cell that is needed is empty.
+    EmptyCell,
+    /// A NaN or an infinity.
+    NotFinite,
+    /// A magnitude above 1e100: memory that nobody wrote to, not a measurement.
+    Huge,
+    /// A position, velocity or torque that leaves where the signal is and comes back within a few samples.
+    Spike,
+    /// No torque changes for a while though the robot moves: the drives had stopped logging.
+    StillTorques,
+    /// The time stamp of the row before, once more.
+    DuplicateStamp,
+    /// The last row is cut short, or may be since its line feed is missing.
+    TruncatedLastRow,
+    /// Time jumps: samples are missing, though no row is.
+    TimeJump,
+}
+
+impl GapReason {
+    pub(crate) const ALL: [GapReason; 8] = [
+        GapReason::EmptyCell,
+        GapReason::NotFinite,
+        GapReason::Huge,
+        GapReason::Spike,
+        GapReason::StillTorques,
+        GapReason::DuplicateStamp,
+        GapReason::TruncatedLastRow,
+        GapReason::TimeJump,
+    ];
+}
+
+impl fmt::Display for GapReason {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            GapReason::EmptyCell => "empty cell",
+            GapReason::NotFinite => "NaN or infinity",
+            GapReason::Huge => "value beyond 1e100",
+            GapReason::Spike => "spike",
+            GapReason::StillTorques => "no torque changes while the robot moves",
+            GapReason::DuplicateStamp => "duplicate time stamp",
+            GapReason::TruncatedLastRow => "truncated last row",
+            GapReason::TimeJump => "jump in time",
+        })
+    }
+}
