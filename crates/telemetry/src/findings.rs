@@ -215,8 +215,11 @@ impl CheckSettings {
     fn torque(&self, torque: &TorqueSurvey) -> Found {
         let shape = &torque.shape;
         let mut found = Vec::new();
+        let flat_top = self.flat_top(torque, shape);
+        // What stands still at a flat top is the flat top.
+        let at_top = |value: f64| flat_top.is_some() && (value == torque.max || value == torque.min);
         let still = shape.still.filter(|still| still.rows as f64 > self.still_runs * shape.mean_run);
-        if let Some(still) = still {
+        if let Some(still) = still.filter(|still| !at_top(still.value)) {
             let (kind, value) = match still.value {
                 0.0 => (FindingKind::ZeroTorque, "exactly 0".to_owned()),
                 value => (FindingKind::StillTorque, format!("{value:.4} throughout")),
@@ -245,7 +248,7 @@ impl CheckSettings {
                 format!("comes in steps of {:.3}, 1/{:.0} of its RMS", shape.step, torque.rms / shape.step),
             ));
         }
-        if let Some(measured) = self.flat_top(torque, shape) {
+        if let Some(measured) = flat_top {
             found.push((FindingKind::FlatTop, measured));
         }
         let across = shape.smallest > (self.steps_across_zero * shape.step).max(self.dead_band * torque.rms);
