@@ -213,7 +213,7 @@ pub enum Error {
         /// Their names.
         logs: String,
         /// What is wrong with them.
-        source: InputError,
+        source: Box<InputError>,
     },
     /// The logs, the effects or the fit.
     #[error(transparent)]
