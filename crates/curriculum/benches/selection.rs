@@ -39,7 +39,13 @@ fn all(criterion: &mut Criterion) {
         measured.absorb(&mut candidate.triangle.clone());
     }
     let allowed: Vec<usize> = (0..MOTIONS).collect();
-    let question = Question { candidates: &candidates, allowed: &allowed, measured: Some(&measured) };
+    let question = Question {
+        dataset: &dataset,
+        candidates: &candidates,
+        allowed: &allowed,
+        measured: Some(&measured),
+        history: &[],
+    };
     criterion.bench_function("smallest condition, 98 candidates", |bencher| {
         bencher.iter(|| SmallestCondition.choose(black_box(&question), &mut random));
     });

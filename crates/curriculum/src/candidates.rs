@@ -1,11 +1,10 @@
 //! What each motion of the dataset would tell: its factor, computed once for all iterations and all runs.
 
+use crate::estimation::grouped_factor;
 use crate::triangle::Triangle;
 use crate::{CurriculumError, Evidence, MotionDataset, Robot, RobotModel};
-use phiw_identification::{Design, EffectSpec, Fold, accumulate};
+use phiw_identification::{Design, EffectSpec};
 use phiw_regressor::RegressorError;
-use phiw_regressor::least_squares::GroupedFactor;
-use phiw_telemetry::Block;
 use rayon::prelude::*;
 
 /// One motion as a candidate.
@@ -141,11 +140,4 @@ impl Candidates {
         let weights: Vec<f64> = self.weights.iter().map(|weight| density * weight).collect();
         Ok(Triangle::of_factor(&evidence.factor().select(&self.parameters)?.combine(&weights)?))
     }
-}
-
-/// The factors of a block's rows, one for each torque.
-pub(crate) fn grouped_factor(design: &Design, block: Block) -> Result<GroupedFactor, CurriculumError> {
-    let everything = Fold { log: block.log, start: f64::NEG_INFINITY, end: f64::INFINITY };
-    let mut factors = accumulate(design, &[everything], &[&vec![block]])?;
-    Ok(factors.swap_remove(0))
 }

@@ -5,11 +5,13 @@ use crate::estimation::RowsAt;
 use crate::experiment::check_noise;
 use crate::growth::Found;
 use crate::planner::{Belief, MeasuredSoFar, Policy, plan};
+use crate::random::{Purpose, random};
+use crate::selection::SmallestCondition;
 use crate::triangle::Triangle;
 use crate::{
-    Candidates, Constraint, CurriculumError, EndCriterion, Estimate, Estimator, Evidence, Experiment, Growth,
-    IterationRecord, Measured, MotionDataset, NoneAllowed, Plan, Relaxation, Rivalry, Robot, RobotModel, Run,
-    Selection,
+    Candidates, ConditionRelaxation, Constraint, CurriculumError, EndCriterion, Estimate, Estimator,
+    Evidence, Experiment, FixedCount, Growth, IterationRecord, Measured, MotionDataset, NoneAllowed, Plan,
+    Relaxation, Rivalry, Robot, RobotModel, Run, Selection,
 };
 use phiw_identification::EffectSpec;
 use rand::SeedableRng;
@@ -63,19 +65,6 @@ impl Default for CurriculumSettings {
     }
 }
 
-/// What a stream of random numbers is for. Each iteration has its own, so that nothing has to be remembered.
-#[derive(Clone, Copy)]
-pub(crate) enum Purpose {
-    Selection = 1,
-    Experiment = 2,
-}
-
-pub(crate) fn random(seed: u64, iteration: usize, purpose: Purpose) -> ChaCha8Rng {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(16 * (iteration as u64 + 1) + purpose as u64);
-    random
-}
-
 /// A belief with what was measured, and how sure it is.
 #[derive(Clone)]
 struct Learning {
@@ -84,7 +73,34 @@ struct Learning {
     estimate: Estimate,
 }
 
-impl Curriculum<'_> {
+impl<'a> Curriculum<'a> {
+    /// A curriculum with the paper's choices in everything that is not asked for here: the smallest cond (11), relaxed with cond (20), five iterations, no growth. Set what should be
+    /// otherwise.
+    ///
+    /// A plan is refused where no motion keeps the robot standing; the paper's experiments run the least violation instead ([`CurriculumSettings::none_allowed`]).
+    pub fn new(
+        robot: &'a Robot,
+        (dataset, candidates): (&'a MotionDataset, &'a Candidates),
+        experiment: &'a dyn Experiment,
+        constraint: &'a dyn Constraint,
+        estimator: &'a dyn Estimator,
+    ) -> Self {
+        Curriculum {
+            robot,
+            dataset,
+            candidates,
+            experiment,
+            selection: &SmallestCondition,
+            constraint,
+            relaxation: &ConditionRelaxation::OF_THE_PAPER,
+            estimator,
+            growth: None,
+            end: &FixedCount(5),
+            rows_at: RowsAt::default(),
+            settings: CurriculumSettings::default(),
+        }
+    }
+
     /// Goes on with a run until it ends. `saved` is called after each iteration, with the run as it is then.
     ///
     /// # Errors
@@ -314,6 +330,7 @@ impl Curriculum<'_> {
             torque_uncertainties: &torque_uncertainties,
             first_alpha: run.first_alpha,
             excluded: &run.excluded,
+            history: &run.history,
         };
         plan(&belief, &measured, &self.policy(run.seed)).map(Some)
     }

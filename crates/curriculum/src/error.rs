@@ -2,7 +2,6 @@
 
 use phiw_dynamics::DimensionError;
 use phiw_identification::{EffectError, IdentificationError};
-use phiw_plant::PlantError;
 use phiw_regressor::RegressorError;
 use phiw_telemetry::LogError;
 
@@ -86,13 +85,20 @@ pub enum CurriculumError {
     /// The estimate failed.
     #[error(transparent)]
     Identification(#[from] IdentificationError),
-    /// The plant failed.
+    /// The robot cannot be run.
     #[error(transparent)]
-    Plant(#[from] PlantError),
+    Experiment(Box<dyn std::error::Error + Send + Sync>),
     /// A log can not be conditioned.
     #[error(transparent)]
     Log(#[from] LogError),
     /// The linear algebra failed.
     #[error(transparent)]
     Regressor(#[from] RegressorError),
+}
+
+impl CurriculumError {
+    /// Why an [`crate::Experiment`] could not be done.
+    pub fn of_experiment(error: impl std::error::Error + Send + Sync + 'static) -> Self {
+        CurriculumError::Experiment(Box::new(error))
+    }
 }

@@ -17,14 +17,6 @@ pub struct Found {
     pub rivals: Vec<[EffectSpec; 2]>,
 }
 
-/// −log L that an effect must save to be believed, where the estimator knows a likelihood: more than six standard deviations, since one candidate of
-/// a thousand was picked.
-///
-/// What looks for effects may judge by least squares. Noise that moves the robot and is not in the log bends these, and an effect that looks like the bend (a
-/// delay of some milliseconds: the command answers to noise that has already moved the robot) can be named for it. The likelihood knows
-/// better.
-pub(crate) const LEAST_GAIN: f64 = 20.0;
-
 /// Looks for what the model lacks.
 pub trait Growth: Send + Sync {
     /// Its name, for reports: `trace`.
@@ -45,9 +37,10 @@ pub trait Growth: Send + Sync {
     ) -> Result<Found, CurriculumError>;
 
     /// −log L that an effect must save to be believed, where the estimator knows a likelihood.
-    fn least_gain(&self) -> f64 {
-        LEAST_GAIN
-    }
+    ///
+    /// What looks for effects may judge by least squares. Noise that moves the robot and is not in the log bends these, and an effect that looks like the bend (a delay of some milliseconds: the
+    /// command answers to noise that has already moved the robot) can be named for it. The likelihood knows better.
+    fn least_gain(&self) -> f64;
 }
 
 /// Traces the residual with `phiw-residual`, where one is not white; effects that act on no such torque are not asked for.
@@ -63,6 +56,8 @@ pub struct TraceResidual {
     pub least_s: f64,
     /// A rival counts if it has at least this probability. Default: 0.1.
     pub least_rival: f64,
+    /// −log L that an effect must save to be believed. Default: 20, more than six standard deviations, since one candidate of a thousand was picked.
+    pub least_gain: f64,
     /// Which torques are traced.
     pub whiteness: WhitenessSettings,
     /// How logs are put together.
@@ -112,6 +107,7 @@ impl Default for TraceResidual {
             },
             least_s: 12.0,
             least_rival: 0.1,
+            least_gain: 20.0,
             whiteness: WhitenessSettings::default(),
             session: SessionSettings::default(),
         }
@@ -121,6 +117,10 @@ impl Default for TraceResidual {
 impl Growth for TraceResidual {
     fn name(&self) -> &'static str {
         "trace"
+    }
+
+    fn least_gain(&self) -> f64 {
+        self.least_gain
     }
 
     fn look(

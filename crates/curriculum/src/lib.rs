@@ -4,7 +4,6 @@
 mod candidates;
 mod constraint;
 mod contest;
-mod controller;
 mod curriculum;
 mod end;
 mod error;
@@ -16,6 +15,7 @@ mod measured;
 mod motion;
 mod motion_limits;
 mod planner;
+mod random;
 mod record;
 mod relaxation;
 mod rivalry;
@@ -31,7 +31,6 @@ mod whiteness;
 pub use candidates::{Candidate, Candidates};
 pub use constraint::{Constraint, Safety, Unconstrained, ZmpConstraint};
 pub use contest::{Contender, ScoreTestSettings, Winner, rivals_to_separate, unconfirmed};
-pub use controller::{Controller, FeedForward};
 pub use curriculum::{Curriculum, CurriculumSettings, unreliable_model};
 pub use end::{Certain, Converged, EndCriterion, FixedCount};
 pub use error::CurriculumError;
@@ -39,7 +38,7 @@ pub use estimation::{
     BayesianLeastSquares, Estimate, Estimator, Evidence, EvidenceSettings, Gain, Instant, LeastSquares,
     LogNoise, MotionLikelihood, NewtonSettings, Prior, RowsAt, ScoreSettings, WeightedLeastSquares,
 };
-pub use experiment::{BuildBackend, Experiment, SimulatedRobot, Stillness, Trial};
+pub use experiment::{Experiment, Trial};
 pub use growth::{Found, Growth, SessionSettings, TraceResidual};
 pub use margin::MotionMargin;
 pub use measured::Measured;

@@ -1,7 +1,6 @@
 //! Motions to choose from: the robot's motion dataset (Q₁ʳ, …, Q_Kʳ).
 
 use crate::{CurriculumError, StepTolerance};
-use phiw_plant::Reference;
 use phiw_telemetry::{Block, Recording};
 
 /// When the signals of a motion are taken for signals of one motion.
@@ -69,7 +68,7 @@ impl Motion {
         Ok(Motion { name: name.to_owned(), task: task.to_owned(), period_s, joints, signals })
     }
 
-    /// The first `samples` samples of a reference, one every `period_s` \[s\].
+    /// The first `samples` samples of a reference, one every `period_s` \[s\]. `reference` writes positions \[rad, m\], velocities and accelerations of all joints at a time \[s\].
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -78,14 +77,14 @@ impl Motion {
         task: &str,
         joints: usize,
         (samples, period_s): (usize, f64),
-        reference: &dyn Reference,
+        reference: impl Fn(f64, &mut [f64], &mut [f64], &mut [f64]),
     ) -> Result<Self, CurriculumError> {
         let mut signals = [0; 3].map(|_| vec![0.0; samples * joints]);
         let [q, v, a] = &mut signals;
         for sample in 0..samples {
             let row = sample * joints..(sample + 1) * joints;
             let (q, v, a) = (&mut q[row.clone()], &mut v[row.clone()], &mut a[row]);
-            reference.at(sample as f64 * period_s, q, v, a);
+            reference(sample as f64 * period_s, q, v, a);
         }
         Self::new(name, task, joints, period_s, signals)
     }
@@ -194,9 +193,10 @@ impl Motion {
     }
 }
 
-impl Reference for Motion {
-    /// Linear between samples, each signal by itself; at rest in the last posture after the end.
-    fn at(&self, t_s: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]) {
+impl Motion {
+    /// Writes positions \[rad, m\], velocities and accelerations of all joints `t_s` seconds after the motion's start: linear between samples, each signal by itself; at
+    /// rest in the last posture after the end.
+    pub fn at(&self, t_s: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]) {
         let last = self.samples() - 1;
         let place = (t_s / self.period_s).clamp(0.0, last as f64);
         // A control period that divides evenly must hit the samples, whatever rounding says.

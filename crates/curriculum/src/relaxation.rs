@@ -103,10 +103,16 @@ pub struct ConditionRelaxation {
     pub bias: f64,
 }
 
+impl ConditionRelaxation {
+    /// 5 % of the motions at first and b = 1, as in the paper; a by [`Scale::Share`] of 0.8, since the paper's a suits its own robot alone.
+    pub const OF_THE_PAPER: Self =
+        ConditionRelaxation { maximum: Maximum::Share(0.05), scale: Scale::Share(0.8), bias: 1.0 };
+}
+
 impl Default for ConditionRelaxation {
-    /// 5 % of the motions at first and b = 1, as in the paper; a by [`Scale::Share`] of 0.8.
+    /// [`Self::OF_THE_PAPER`].
     fn default() -> Self {
-        ConditionRelaxation { maximum: Maximum::Share(0.05), scale: Scale::Share(0.8), bias: 1.0 }
+        Self::OF_THE_PAPER
     }
 }
 

@@ -16,7 +16,8 @@ fn permission_is_decided_by_alpha_falls_and_policy() {
     use Permission::{Allowed, Forced, Refused};
     let (nan, never) = (f64::NAN, f64::NEG_INFINITY);
     // Largest reductions, motions on which the robot fell, α, policy, decision.
-    let cases: &[(&[f64], &[usize], f64, NoneAllowed, Permission)] = &[
+    type Case<'a> = (&'a [f64], &'a [usize], f64, NoneAllowed, Permission);
+    let cases: &[Case<'_>] = &[
         (&[0.5, 0.2, 0.7], &[], 0.4, Refuse, Allowed(vec![0, 2])),
         (&[0.5, 0.2, 0.7], &[], 0.5, Refuse, Allowed(vec![0, 2])),
         (&[0.5, 0.2, 0.7], &[2], 0.4, Refuse, Allowed(vec![0])),
@@ -56,7 +57,8 @@ fn alpha_follows_what_has_been_learnt() {
     let paper = ConditionRelaxation { maximum: Maximum::Fixed(0.74), scale: Scale::Fixed(2.5e-4), bias: 1.0 };
     let infinite = Some(f64::INFINITY);
     // Relaxation, α of the first iteration, cond after each iteration, torque uncertainty after each, α.
-    let cases: &[(&dyn Relaxation, f64, &[Option<f64>], &[Option<f64>], f64)] = &[
+    type Case<'a> = (&'a dyn Relaxation, f64, &'a [Option<f64>], &'a [Option<f64>], f64);
+    let cases: &[Case<'_>] = &[
         // Nothing has been learnt.
         (&condition, 0.7, &[], &[], 0.7),
         (&condition, 0.7, &[None], &[None], 0.7),
@@ -259,7 +261,8 @@ fn an_effect_that_the_likelihood_does_not_confirm_is_left_out() {
 fn rivals_have_one_motion_and_then_the_parameters_have_one() {
     let pair = |one: &str, other: &str| [one.to_owned(), other.to_owned()];
     let (ab, ba, ac) = (pair("a", "b"), pair("b", "a"), pair("a", "c"));
-    let cases: Vec<(Vec<[String; 2]>, Vec<Option<[String; 2]>>, Option<usize>)> = vec![
+    type Case = (Vec<[String; 2]>, Vec<Option<[String; 2]>>, Option<usize>);
+    let cases: Vec<Case> = vec![
         (vec![], vec![], None),
         (vec![ab.clone()], vec![], Some(0)),
         (vec![ab.clone()], vec![None], Some(0)),

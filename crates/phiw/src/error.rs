@@ -188,7 +188,7 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
-        source: phiw_plant::SupportError,
+        source: phiw_zmp::FeetError,
     },
     /// Feet that give no support.
     #[error("{}: {source}", path.display())]
@@ -196,7 +196,7 @@ pub enum Error {
         /// The support file.
         path: PathBuf,
         /// What is wrong with it.
-        source: phiw_curriculum::StanceError,
+        source: Box<phiw_curriculum::StanceError>,
     },
     /// Every motion would topple the robot.
     #[error("{0} (--model takes one)")]
@@ -213,7 +213,7 @@ pub enum Error {
         /// Their names.
         logs: String,
         /// What is wrong with them.
-        source: InputError,
+        source: Box<InputError>,
     },
     /// The logs, the effects or the fit.
     #[error(transparent)]

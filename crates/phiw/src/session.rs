@@ -115,7 +115,7 @@ pub(crate) fn of_training_logs(error: IdentificationError, logs: &[PathBuf]) -> 
                 logs.iter().take(LOGS_NAMED).map(|log| log.display().to_string()).collect();
             let more = logs.len().saturating_sub(LOGS_NAMED);
             let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-            Error::TrainingLogs { logs: names.join(", ") + &more, source }
+            Error::TrainingLogs { logs: names.join(", ") + &more, source: Box::new(source) }
         }
         error => error.into(),
     }

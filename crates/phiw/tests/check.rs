@@ -69,14 +69,16 @@ fn findings_name_the_column_and_go_into_the_file() {
         |log| log.qd = Some(velocities(log, 20)),
         &[("late_velocity", "qd.joint_1"), ("late_velocity", "qd.joint_2"), ("late_velocity", "qd.joint_3")],
     );
-    let torque = |change: fn(&mut f64)| {
+    let torque = |change: fn(f64, f64) -> f64| {
         move |log: &mut Recording| {
-            log.tau.iter_mut().skip(1).step_by(3).for_each(change);
+            let largest = log.tau.iter().step_by(3).fold(0.0, |largest: f64, torque| largest.max(*torque));
+            log.tau.iter_mut().step_by(3).for_each(|torque| *torque = change(*torque, largest));
         }
     };
-    check(torque(|torque| *torque = torque.abs()), &[("unsigned_torque", "tau.joint_2")]);
-    check(torque(|torque| *torque = torque.min(8.0)), &[("flat_top", "tau.joint_2")]);
-    check(torque(|torque| *torque *= 1000.0), &[("torque_unit", "tau.joint_2")]);
+    // The first joint carries no weight: its torque goes to both sides.
+    check(torque(|torque, _| torque.abs()), &[("unsigned_torque", "tau.joint_1")]);
+    check(torque(|torque, largest| torque.min(0.4 * largest)), &[("flat_top", "tau.joint_1")]);
+    check(torque(|torque, _| 1000.0 * torque), &[("torque_unit", "tau.joint_1")]);
 }
 
 #[test]

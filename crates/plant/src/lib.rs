@@ -19,7 +19,6 @@ mod run;
 mod sensors;
 mod standing;
 mod step_solver;
-mod support;
 
 pub use controller::{
     ComputedTorque, GainSettings, Gains, RigidBodyModel, TorqueModel, apparent_inertia,
@@ -35,4 +34,3 @@ pub use presliding::Presliding;
 pub use reference::{FadedSines, MultiSine, Reference};
 pub use run::{PlantRun, Reaction};
 pub use sensors::{Clock, Derivatives, Sensors};
-pub use support::{SupportError, feet_from_toml};

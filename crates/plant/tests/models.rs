@@ -3,7 +3,7 @@
 mod plants;
 
 use phiw_dynamics::Placement;
-use phiw_plant::{SupportError, feet_from_toml};
+use phiw_zmp::{FeetError, feet_from_toml};
 use plants::model;
 
 #[test]
@@ -77,5 +77,5 @@ fn a_bad_support_file_says_what_is_wrong() {
     );
     let fixed = model("upper_body18", false);
     let text = "[[foot]]\nlink = \"base\"\nsole = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]";
-    assert!(matches!(feet_from_toml(text, &fixed), Err(SupportError::NoSuchLink { .. })));
+    assert!(matches!(feet_from_toml(text, &fixed), Err(FeetError::NoSuchLink { .. })));
 }

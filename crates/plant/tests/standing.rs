@@ -3,10 +3,9 @@
 mod plants;
 
 use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
-use phiw_plant::{
-    ComputedTorque, Gains, Plant, PlantRun, PlantSetup, Reference, RigidBodyModel, Timing, feet_from_toml,
-};
+use phiw_plant::{ComputedTorque, Gains, Plant, PlantRun, PlantSetup, Reference, RigidBodyModel, Timing};
 use phiw_sim_rapier::RapierBackend;
+use phiw_zmp::feet_from_toml;
 use plants::{model, random};
 
 fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {

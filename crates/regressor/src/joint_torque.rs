@@ -1,7 +1,8 @@
 //! The joint torque regressor φ(q, q̇, q̈): τ = φ · π with π the standard parameters of all bodies (paper, equation 2).
 
 use phiw_dynamics::{
-    BodyKinematics, BodyMotion, DimensionError, Lanes, PARAMETERS_PER_BODY, Scalar, Spatial, check_size,
+    BodyJoint, BodyKinematics, BodyMotion, DimensionError, Lanes, PARAMETERS_PER_BODY, Scalar, Spatial,
+    check_size,
 };
 
 /// Which bodies act on which torque, and the kernel that fills in their numbers.
@@ -10,7 +11,8 @@ use phiw_dynamics::{
 /// for each such body in order, ten numbers. [`JointTorqueRegressor::scatter`] makes the dense matrix of it.
 #[derive(Clone, Debug)]
 pub struct JointTorqueRegressor {
-    bodies: usize,
+    /// The joint before each body.
+    joints: Vec<BodyJoint>,
     velocity_size: usize,
     /// `row_bodies[row]`: the bodies that coordinate `row` moves, ascending.
     row_bodies: Vec<Vec<usize>>,
@@ -41,11 +43,10 @@ impl JointTorqueRegressor {
     /// # Panics
     /// A body comes before its parent, which [`BodyKinematics`] rules out.
     pub fn new(robot: impl BodyKinematics) -> Self {
-        let bodies = robot.body_count();
+        let joints: Vec<BodyJoint> = (0..robot.body_count()).map(|body| robot.body_joint(body)).collect();
         // Coordinates of each body's chain, from the root down.
-        let mut coordinates: Vec<Vec<usize>> = Vec::with_capacity(bodies);
-        for body in 0..bodies {
-            let joint = robot.body_joint(body);
+        let mut coordinates: Vec<Vec<usize>> = Vec::with_capacity(joints.len());
+        for joint in &joints {
             let mut chain = joint.parent.map(|parent| coordinates[parent].clone()).unwrap_or_default();
             chain.extend(joint.velocity_index..joint.velocity_index + joint.motion_subspace.dimension());
             coordinates.push(chain);
@@ -74,7 +75,7 @@ impl JointTorqueRegressor {
                 chain.iter().enumerate().map(axis).collect()
             })
             .collect();
-        JointTorqueRegressor { bodies, velocity_size, row_bodies, row_offsets, chains }
+        JointTorqueRegressor { joints, velocity_size, row_bodies, row_offsets, chains }
     }
 
     /// Number of rows: one for each velocity coordinate (a floating base's wrench first).
@@ -84,7 +85,7 @@ impl JointTorqueRegressor {
 
     /// Number of columns: ten for each body.
     pub fn columns(&self) -> usize {
-        PARAMETERS_PER_BODY * self.bodies
+        PARAMETERS_PER_BODY * self.joints.len()
     }
 
     /// The bodies whose parameters act on `row`, ascending.
@@ -110,7 +111,7 @@ impl JointTorqueRegressor {
     /// Working memory for scalars of type `T`.
     pub fn scratch<T: Scalar>(&self) -> RegressorScratch<T> {
         RegressorScratch {
-            motions: vec![BodyMotion::rest(); self.bodies],
+            motions: vec![BodyMotion::rest(); self.joints.len()],
             axes: self.chains.iter().map(|chain| vec![Spatial::zero(); chain.len()]).collect(),
         }
     }
@@ -125,16 +126,18 @@ impl JointTorqueRegressor {
     /// A slice of the wrong length, or the robot's motion can not be computed.
     pub fn compute<T: Scalar, K: BodyKinematics<T>>(
         &self,
-        robot: K,
+        mut robot: K,
         q: &[T],
         v: &[T],
         a: &[T],
         scratch: &mut RegressorScratch<T>,
         pairs: &mut [T],
     ) -> Result<(), K::Error> {
-        check_size("bodies of the robot", robot.body_count(), self.bodies)?;
+        check_size("bodies of the robot", robot.body_count(), self.joints.len())?;
         check_size("regressor buffer", pairs.len(), self.buffer_size())?;
-        self.kernel(robot, q, v, a, scratch, pairs)
+        robot.body_motions(q, v, a, &mut scratch.motions)?;
+        self.kernel(scratch, pairs);
+        Ok(())
     }
 
     /// φ for `N` states at once, with the widest vector instructions that the processor has.
@@ -180,18 +183,8 @@ impl JointTorqueRegressor {
     /// Each axis is pushed down to the bodies that it moves and multiplied there with the body's own 6×10 regressor: one
     /// product for each (axis, body) pair and none for the zeros.
     #[inline(always)]
-    fn kernel<T: Scalar, K: BodyKinematics<T>>(
-        &self,
-        mut robot: K,
-        q: &[T],
-        v: &[T],
-        a: &[T],
-        scratch: &mut RegressorScratch<T>,
-        pairs: &mut [T],
-    ) -> Result<(), K::Error> {
-        robot.body_motions(q, v, a, &mut scratch.motions)?;
-        for index in 0..self.bodies {
-            let joint = robot.body_joint(index);
+    fn kernel<T: Scalar>(&self, scratch: &mut RegressorScratch<T>, pairs: &mut [T]) {
+        for (index, joint) in self.joints.iter().enumerate() {
             let motion = scratch.motions[index];
             let (before, rest) = scratch.axes.split_at_mut(index);
             let axes = &mut rest[0];
@@ -215,7 +208,6 @@ impl JointTorqueRegressor {
                 }
             }
         }
-        Ok(())
     }
 }
 

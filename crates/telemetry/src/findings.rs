@@ -1,70 +1,7 @@
 //! What should be known of a log before anything is fitted to it: what sensors, drives and loggers did to it, what follows, and how to mend it.
 
-use crate::{Alignment, JointSurvey, SignalShape, Survey, TorqueSurvey};
+use crate::{Alignment, CheckSettings, JointSurvey, SignalShape, Survey, TorqueSurvey};
 use std::fmt;
-
-/// From where on something is worth saying. What the real logs of the tests show lies below each of these unless it is truly there.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CheckSettings {
-    /// Share of the velocity's power that a lag costs; 0.0025 is an error of 5 % of its root mean square, which is that of good frictions.
-    pub lag_cost: f64,
-    /// Distance of a velocity's scale from 1; gear ratios and radii are known better than this.
-    pub scale_error: f64,
-    /// Share of a velocity's power that may be unexplained for its scale to be judged.
-    pub scale_unexplained: f64,
-    /// Share of time in which a velocity or a torque is exactly 0; zero crossings alone are below it.
-    pub zero_share: f64,
-    /// Root mean square of motion while a velocity is 0, as a share of that of all.
-    pub motion_at_zero: f64,
-    /// Smallest torque besides 0 in steps of the torque: 1 without a dead band, and 2 where one step is never met.
-    pub steps_across_zero: f64,
-    /// The same as a share of the torque's root mean square: values that come in no steps lie as near to 0 as there are rows.
-    pub dead_band: f64,
-    /// Steps of a torque over its root mean square: at 0.1 they add noise of 3 %.
-    pub torque_step: f64,
-    /// Steps of a position over its travel: at 1/500 a turn has 9 bits.
-    pub position_step: f64,
-    /// Length of a stretch of one value in mean lengths of such stretches: more than torque in steps brings about.
-    pub still_runs: f64,
-    /// Share of the rows near the top that are at exactly the top.
-    pub flat_share: f64,
-    /// Rows at exactly the top.
-    pub flat_rows: u64,
-    /// How often a torque of one sign must come near 0 to be taken for a magnitude; gravity alone may keep one sign, but does not bounce.
-    pub touches: u64,
-    /// Jitter of the stamps as a share of the period.
-    pub jitter: f64,
-    /// Slowest sampling \[Hz\]: five samples for a motion of 4 Hz.
-    pub slowest_hz: f64,
-    /// Travel in standard deviations of the position's noise below which a joint stands still.
-    pub travel_to_noise: f64,
-    /// Travel below which a joint stands still \[rad, m\].
-    pub least_travel: f64,
-}
-
-impl Default for CheckSettings {
-    fn default() -> Self {
-        CheckSettings {
-            lag_cost: 0.0025,
-            scale_error: 0.05,
-            scale_unexplained: 0.05,
-            zero_share: 0.02,
-            motion_at_zero: 0.03,
-            steps_across_zero: 3.0,
-            dead_band: 0.01,
-            torque_step: 0.1,
-            position_step: 0.002,
-            still_runs: 20.0,
-            flat_share: 0.5,
-            flat_rows: 20,
-            touches: 3,
-            jitter: 0.3,
-            slowest_hz: 20.0,
-            travel_to_noise: 20.0,
-            least_travel: 1e-3,
-        }
-    }
-}
 
 /// What is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -233,30 +170,22 @@ fn of_joint(joint: &JointSurvey, settings: &CheckSettings) -> Vec<Finding> {
 type Found = Vec<(FindingKind, String)>;
 
 impl CheckSettings {
-    /// Whether a velocity is not the positions' derivative.
-    pub fn contradicts(&self, alignment: &Alignment) -> bool {
-        !self.velocity(alignment).is_empty()
-    }
-
     fn velocity(&self, alignment: &Alignment) -> Found {
         let mut found = Vec::new();
-        let cost = alignment.unexplained - alignment.unexplained_at_lag;
-        let mended = alignment.unexplained_at_lag < 0.5 * alignment.unexplained;
-        if cost > self.lag_cost && mended && alignment.lag.abs() > 0.5 * alignment.resolution {
+        if self.is_late(alignment) {
             let which = if alignment.lag > 0.0 { "lags" } else { "leads" };
             found.push((
                 FindingKind::LateVelocity,
                 format!("{which} the positions by {:.3} s", alignment.lag.abs()),
             ));
         }
-        let judged = alignment.unexplained_at_lag < self.scale_unexplained;
-        if judged && (alignment.scale - 1.0).abs() > self.scale_error {
+        if self.is_scaled(alignment) {
             found.push((
                 FindingKind::VelocityScale,
                 format!("is off: the positions' derivative is {:.4} times as large", alignment.scale),
             ));
         }
-        if alignment.zero_share > self.zero_share && alignment.motion_at_zero > self.motion_at_zero {
+        if self.has_dead_band(alignment) {
             found.push((
                 FindingKind::VelocityDeadBand,
                 format!(
@@ -286,8 +215,11 @@ impl CheckSettings {
     fn torque(&self, torque: &TorqueSurvey) -> Found {
         let shape = &torque.shape;
         let mut found = Vec::new();
+        let flat_top = self.flat_top(torque, shape);
+        // What stands still at a flat top is the flat top.
+        let at_top = |value: f64| flat_top.is_some() && (value == torque.max || value == torque.min);
         let still = shape.still.filter(|still| still.rows as f64 > self.still_runs * shape.mean_run);
-        if let Some(still) = still {
+        if let Some(still) = still.filter(|still| !at_top(still.value)) {
             let (kind, value) = match still.value {
                 0.0 => (FindingKind::ZeroTorque, "exactly 0".to_owned()),
                 value => (FindingKind::StillTorque, format!("{value:.4} throughout")),
@@ -316,7 +248,7 @@ impl CheckSettings {
                 format!("comes in steps of {:.3}, 1/{:.0} of its RMS", shape.step, torque.rms / shape.step),
             ));
         }
-        if let Some(measured) = self.flat_top(torque, shape) {
+        if let Some(measured) = flat_top {
             found.push((FindingKind::FlatTop, measured));
         }
         let across = shape.smallest > (self.steps_across_zero * shape.step).max(self.dead_band * torque.rms);

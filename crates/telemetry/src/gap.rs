@@ -13,6 +13,8 @@ pub enum GapReason {
     Huge,
     /// A position, velocity or torque that leaves where the signal is and comes back within a few samples.
     Spike,
+    /// No torque changes for a while though the robot moves: the drives had stopped logging.
+    StillTorques,
     /// The time stamp of the row before, once more.
     DuplicateStamp,
     /// The last row is cut short, or may be since its line feed is missing.
@@ -22,11 +24,12 @@ pub enum GapReason {
 }
 
 impl GapReason {
-    pub(crate) const ALL: [GapReason; 7] = [
+    pub(crate) const ALL: [GapReason; 8] = [
         GapReason::EmptyCell,
         GapReason::NotFinite,
         GapReason::Huge,
         GapReason::Spike,
+        GapReason::StillTorques,
         GapReason::DuplicateStamp,
         GapReason::TruncatedLastRow,
         GapReason::TimeJump,
@@ -40,6 +43,7 @@ impl fmt::Display for GapReason {
             GapReason::NotFinite => "NaN or infinity",
             GapReason::Huge => "value beyond 1e100",
             GapReason::Spike => "spike",
+            GapReason::StillTorques => "no torque changes while the robot moves",
             GapReason::DuplicateStamp => "duplicate time stamp",
             GapReason::TruncatedLastRow => "truncated last row",
             GapReason::TimeJump => "jump in time",

@@ -1,8 +1,8 @@
 //! What a log shows of one joint.
 
 use crate::alignment::{Alignment, AlignmentCollector};
+use crate::check_settings::CheckSettings;
 use crate::clock::{stamped_misfit, uniform_misfit};
-use crate::findings::CheckSettings;
 use crate::histogram::Histogram;
 use crate::signal_shape::{ShapeCollector, SignalShape};
 

@@ -3,9 +3,9 @@
 use crate::histogram::Histogram;
 
 /// Stretches of one value from this length on are counted \[s\].
-const LONG: f64 = 0.5;
+pub(crate) const LONG: f64 = 0.5;
 /// Share of a joint's travel that it must move on meanwhile.
-const MOVED: f64 = 0.05;
+pub(crate) const MOVED: f64 = 0.05;
 /// Level below which a signal counts as near 0, as a share of its largest magnitude so far.
 const NEAR_ZERO: f64 = 0.05;
 /// Where the band below the top begins, as a share of the top.

@@ -5,6 +5,7 @@ use crate::clock::Resampler;
 use crate::reader::{LogReader, Rows};
 use crate::segments::{SegmentSink, split};
 use crate::spike::WithoutSpikes;
+use crate::still::WithoutStill;
 use crate::{Block, Conditioning, LogError, LogPlan, Segment, Survey};
 use std::ops::ControlFlow;
 
@@ -65,9 +66,13 @@ pub(crate) fn stream_rows(
         progress,
         longest: 0,
     };
-    let counts = match survey.spike_bounds.as_slice() {
-        [] => split(rows, survey.longest_step, &mut streamer)?,
-        bounds => split(&mut WithoutSpikes::new(rows, bounds.to_vec()), survey.longest_step, &mut streamer)?,
+    let (bounds, still) = (survey.spike_bounds.clone(), survey.still.clone());
+    let counts = if bounds.is_empty() && still.is_empty() {
+        split(rows, survey.longest_step, &mut streamer)?
+    } else {
+        let bounds = if bounds.is_empty() { vec![f64::INFINITY; rows.layout().width] } else { bounds };
+        let mut without = WithoutStill::new(WithoutSpikes::new(rows, bounds), still);
+        split(&mut without, survey.longest_step, &mut streamer)?
     };
     if !streamer.outlet.summary.stopped && (counts.rows, counts.used) != (survey.rows, survey.used_rows) {
         return Err(LogError::Changed { path: survey.path.clone() });

@@ -8,7 +8,8 @@ use crate::reader::{LogReader, Row, Rows};
 use crate::segments::{RowCounts, SegmentSink, SpikeCount, split};
 use crate::spectrum::SpectrumEstimator;
 use crate::spike::{SpikeFinder, WithoutSpikes};
-use crate::{GapCount, GapReason, JointSurvey, LogError, Segment, Spectrum};
+use crate::still::{StillFinder, WithoutStill};
+use crate::{CheckSettings, GapCount, GapReason, JointSurvey, LogError, Segment, Spectrum};
 use phiw_spikes::{SpikeSettings, WINDOW};
 use std::path::{Path, PathBuf};
 
@@ -38,6 +39,8 @@ pub struct Survey {
     pub excursions: Vec<f64>,
     /// What an excursion must exceed to be a spike, by place in a row; empty where the log has none.
     pub(crate) spike_bounds: Vec<f64>,
+    /// First and last stamp of stretches in which no torque changes though the robot moves, in seconds: their rows are counted as gaps.
+    pub still: Vec<[f64; 2]>,
     /// Columns in the header that are not used.
     pub ignored_columns: Vec<String>,
     /// Median distance of consecutive stamps, in seconds; exact over the first 65536, checked against a
@@ -166,6 +169,19 @@ pub(crate) fn survey_rows<R: Rows>(
         spike_bounds = bounds;
         rows = without.into_inner();
     }
+    let still = collector.still.stretches(&CheckSettings::default());
+    if !still.is_empty() {
+        // They pull all parameters towards less: once more, without them.
+        let steps = collector.steps;
+        let bounds = spike_bounds.clone();
+        let bounds = if bounds.is_empty() { vec![f64::INFINITY; rows.layout().width] } else { bounds };
+        let mut without = WithoutStill::new(WithoutSpikes::new(open()?, bounds), still.clone());
+        collector = Collector::new(without.layout(), steps, progress);
+        counts = split(&mut without, steps.longest(), &mut collector)?;
+        let without = without.into_inner();
+        spikes = without.counts(joints);
+        rows = without.into_inner();
+    }
     let stands_still =
         |gap: &GapCount| gap.reason == GapReason::DuplicateStamp && gap.count + 1 == counts.rows;
     if counts.used == 1 && counts.gaps.iter().any(stands_still) {
@@ -179,7 +195,7 @@ pub(crate) fn survey_rows<R: Rows>(
         });
     }
     let survey = collector.finish(rows.path(), joints, counts);
-    Ok((Survey { spikes, spike_bounds, ..survey }, rows))
+    Ok((Survey { spikes, spike_bounds, still, ..survey }, rows))
 }
 
 /// How far apart the stamps are.
@@ -235,6 +251,7 @@ struct Collector<'a> {
     joints: Vec<JointCollector>,
     spectrum: SpectrumEstimator,
     spikes: SpikeFinder,
+    still: StillFinder,
     segments: Vec<Segment>,
     short_segments: u64,
     /// The [`WINDOW`] latest samples of the segment, oldest first, flat.
@@ -259,6 +276,7 @@ impl<'a> Collector<'a> {
             joints: (0..layout.joints).map(joint).collect(),
             spectrum: SpectrumEstimator::new(layout, steps.median),
             spikes: SpikeFinder::new(layout),
+            still: StillFinder::new(layout),
             steps,
             segments: Vec::new(),
             short_segments: 0,
@@ -316,6 +334,7 @@ impl<'a> Collector<'a> {
             gaps: counts.gaps,
             spikes: Vec::new(),
             spike_bounds: Vec::new(),
+            still: Vec::new(),
             excursions: self.spikes.multiples(SpikeSettings::default()),
             ignored_columns: Vec::new(),
             median_period: self.steps.median,
@@ -353,6 +372,9 @@ impl SegmentSink for Collector<'_> {
         let (q, tau) = (self.layout.q(), self.layout.tau());
         let torques = if self.layout.torque { &values[tau..tau + n] } else { &[] };
         self.spectrum.push(&values[q..q + n], torques);
+        if self.layout.torque {
+            self.still.push(values[0], &values[q..q + n], torques);
+        }
         let optional = |place: Option<usize>| place.map_or(f64::NAN, |place| values[place]);
         for (i, joint) in self.joints.iter_mut().enumerate() {
             let torque = torques.get(i).copied().unwrap_or(f64::NAN);
@@ -390,6 +412,7 @@ impl SegmentSink for Collector<'_> {
             }
         }
         self.in_segment = 0;
+        self.still.end();
         self.joints.iter_mut().for_each(JointCollector::end_segment);
         self.spectrum.end_segment();
         true

@@ -1,7 +1,11 @@
 //! Each class of what sensors, drives and loggers do to a log is found, and nothing is found where there is nothing.
 
-use phiw_telemetry::{CheckSettings, FindingKind, TorqueColumns, findings, survey};
+use phiw_telemetry::{
+    CheckSettings, Conditioning, ConditioningOptions, FindingKind, GapReason, TorqueColumns, findings,
+    stream, survey,
+};
 use std::fmt::Write;
+use std::ops::ControlFlow;
 
 const RATE: f64 = 200.0;
 
@@ -20,14 +24,15 @@ fn clean(k: usize) -> [f64; 4] {
 fn found(change: impl Fn(usize, [f64; 4]) -> [f64; 4]) -> Vec<FindingKind> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("log.csv");
-    let mut text = String::from("t,q.a,qd.a,tau.a\n");
+    let mut text = String::from("t,q.a,qd.a,tau.a,q.b,tau.b\n");
     for k in 0..(20.0 * RATE) as usize {
         let [t, q, qd, tau] = change(k, clean(k));
-        let _ = writeln!(text, "{t:.6},{q:.9},{qd:.7},{tau:.6}");
+        let [_, other, _, torque] = clean(k + 77);
+        let _ = writeln!(text, "{t:.6},{q:.9},{qd:.7},{tau:.6},{other:.9},{torque:.6}");
     }
     std::fs::write(&path, text).expect("written");
-    let survey =
-        survey(&path, &["a".to_owned()], TorqueColumns::Required, &mut |_, _| {}).expect("a log that reads");
+    let survey = survey(&path, &["a".to_owned(), "b".to_owned()], TorqueColumns::Required, &mut |_, _| {})
+        .expect("a log that reads");
     findings(&survey, &CheckSettings::default()).into_iter().map(|finding| finding.kind).collect()
 }
 
@@ -67,7 +72,7 @@ fn every_class_is_found() {
     );
     check(|_, [t, _, _, tau]| [t, 0.3, 0.0, tau], &[StandsStill]);
     check(|_, [t, q, qd, tau]| [20.0 * t, q, qd / 20.0, tau], &[Sampling]);
-    let late_stamp = |k: usize| if k % 2 == 0 { 0.4 / RATE } else { 0.0 };
+    let late_stamp = |k: usize| if k.is_multiple_of(2) { 0.4 / RATE } else { 0.0 };
     check(move |k, [t, q, qd, tau]| [t + late_stamp(k), q, qd, tau], &[Clock]);
 }
 
@@ -89,5 +94,37 @@ fn a_velocity_that_lags_is_not_used() {
         assert_eq!(velocity.plausible(), plausible, "{late}: {velocity:?}");
         let lag = velocity.alignment.expect("enough to tell by").lag;
         assert!((lag - late as f64 / RATE).abs() < 0.003, "{late}: {lag}");
+    }
+}
+
+/// Where the drives of all joints stop logging, the rows say nothing: they are left out of both passes, and counted.
+#[test]
+fn rows_in_which_no_torque_changes_are_left_out_and_counted() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("log.csv");
+    let joints = ["a".to_owned(), "b".to_owned()];
+    for (pause, expected) in [(0..0, 0), (900..1200, 300), (900..960, 0), (100..3900, 0)] {
+        let mut text = String::from("t,q.a,tau.a,q.b,tau.b\n");
+        for k in 0..4000 {
+            let ([t, q, _, tau], [_, other, _, torque]) = (clean(k), clean(k + 77));
+            let [tau, torque] = if pause.contains(&k) { [0.0, 1.5] } else { [tau, torque] };
+            let _ = writeln!(text, "{t:.6},{q:.9},{tau:.6},{other:.9},{torque:.6}");
+        }
+        std::fs::write(&path, text).expect("written");
+        let survey = survey(&path, &joints, TorqueColumns::Required, &mut |_, _| {}).expect("it reads");
+        let gap = survey.gaps.iter().find(|gap| gap.reason == GapReason::StillTorques);
+        assert_eq!(gap.map_or(0, |gap| gap.count), expected, "{pause:?}");
+        assert_eq!(survey.used_rows, 4000 - expected, "{pause:?}");
+        assert_eq!(gap.map_or(pause.start as u64 + 2, |gap| gap.first_line), pause.start as u64 + 2);
+        let conditioning =
+            Conditioning::choose(std::slice::from_ref(&survey), &ConditioningOptions::default())
+                .expect("a cut-off");
+        let mut left = 0;
+        let inside = |t: f64| expected > 0 && (901..1199).contains(&((t * RATE).round() as usize));
+        let streamed = stream(&survey, &conditioning, &mut |_, _| {}, &mut |block| {
+            left += block.t.iter().filter(|t| inside(**t)).count();
+            ControlFlow::Continue(())
+        });
+        assert!(streamed.is_ok() && left == 0, "{pause:?}: {left} rows, {streamed:?}");
     }
 }

@@ -55,11 +55,17 @@ impl BalanceRows {
         workspace: &mut ZmpWorkspace,
     ) -> Result<(), K::Error> {
         workspace.check(&robot)?;
-        check_size("the balance rows", self.parameters, parameter_count(&robot))?;
+        check_size("the balance rows", self.parameters, workspace.parameter_count())?;
         workspace.place(&mut robot, q, v, a)?;
         self.gravity = robot.gravity();
+        self.fill(workspace);
+        Ok(())
+    }
+
+    /// The rows of the motion that is in the workspace.
+    fn fill(&mut self, workspace: &ZmpWorkspace) {
         let mut start = 0;
-        if !robot.has_floating_base() {
+        if !workspace.has_floating_base() {
             self.body(start, Placement::identity(), &base_motion(self.gravity));
             start += PARAMETERS_PER_BODY;
         }
@@ -67,7 +73,6 @@ impl BalanceRows {
             self.body(start, *placement, motion);
             start += PARAMETERS_PER_BODY;
         }
-        Ok(())
     }
 
     /// The ten columns of a body: in its frame force = m a + α × mc + ω × (ω × mc), moment = mc × a + I α + ω × I ω.

@@ -22,6 +22,8 @@ pub struct ZmpWorkspace {
     pub(crate) motions: Vec<BodyMotion<f64>>,
     pub(crate) placements: Vec<Placement<f64>>,
     loads: Vec<Load>,
+    parents: Vec<Option<usize>>,
+    floating: bool,
 }
 
 /// What a body and all that it carries add up to, in the body's frame.
@@ -77,6 +79,8 @@ impl ZmpWorkspace {
             motions: vec![BodyMotion::rest(); bodies],
             placements: vec![Placement::identity(); bodies],
             loads: vec![Load::NONE; bodies],
+            parents: (0..bodies).map(|body| robot.body_joint(body).parent).collect(),
+            floating: robot.has_floating_base(),
         }
     }
 
@@ -99,10 +103,14 @@ impl ZmpWorkspace {
         a: &[f64],
     ) -> Result<Balance, K::Error> {
         self.check(&robot)?;
-        check_size("the standing parameters", parameters.len(), parameter_count(&robot))?;
+        check_size("the standing parameters", parameters.len(), self.parameter_count())?;
         robot.body_motions(q, v, a, &mut self.motions)?;
-        let gravity = robot.gravity();
-        let (mut total, bodies) = if robot.has_floating_base() {
+        Ok(self.sum(parameters, robot.gravity()))
+    }
+
+    /// The balance of the motions that are in the scratch.
+    fn sum(&mut self, parameters: &[f64], gravity: [f64; 3]) -> Balance {
+        let (mut total, bodies) = if self.floating {
             (Load::NONE, parameters)
         } else {
             let (base, bodies) = parameters.split_at(PARAMETERS_PER_BODY);
@@ -114,14 +122,23 @@ impl ZmpWorkspace {
         }
         for index in (0..self.loads.len()).rev() {
             let carried = self.loads[index];
-            let outer = match robot.body_joint(index).parent {
+            let outer = match self.parents[index] {
                 Some(parent) => &mut self.loads[parent],
                 None => &mut total,
             };
             outer.add(self.motions[index].placement, carried);
         }
         let ([fx, fy, fz], [mx, my, mz]) = (total.wrench.linear.0, total.wrench.angular.0);
-        Ok(Balance::of_sums(total.mass, total.moment.0, [fx, fy, fz, mx, my, mz], gravity))
+        Balance::of_sums(total.mass, total.moment.0, [fx, fy, fz, mx, my, mz], gravity)
+    }
+
+    /// How many parameters the balance takes, as [`parameter_count`].
+    pub(crate) fn parameter_count(&self) -> usize {
+        PARAMETERS_PER_BODY * (self.motions.len() + usize::from(!self.floating))
+    }
+
+    pub(crate) fn has_floating_base(&self) -> bool {
+        self.floating
     }
 
     pub(crate) fn check(&self, robot: &impl BodyKinematics) -> Result<(), DimensionError> {
@@ -137,13 +154,14 @@ impl ZmpWorkspace {
         a: &[f64],
     ) -> Result<(), K::Error> {
         robot.body_motions(q, v, a, &mut self.motions)?;
-        for index in 0..self.motions.len() {
-            let local = self.motions[index].placement;
-            self.placements[index] = match robot.body_joint(index).parent {
-                Some(parent) => self.placements[parent].compose(local),
-                None => local,
-            };
-        }
+        self.place_in_world();
         Ok(())
+    }
+
+    fn place_in_world(&mut self) {
+        for (index, parent) in self.parents.iter().enumerate() {
+            let local = self.motions[index].placement;
+            self.placements[index] = parent.map_or(local, |parent| self.placements[parent].compose(local));
+        }
     }
 }

@@ -3,10 +3,9 @@
 mod robots;
 
 use phiw_dynamics::{BackendError, Placement, SimulationBackend, Tree, Vec3, World};
-use phiw_plant::{
-    ComputedTorque, Gains, Plant, PlantRun, PlantSetup, RigidBodyModel, Timing, feet_from_toml,
-};
+use phiw_plant::{ComputedTorque, Gains, Plant, PlantRun, PlantSetup, RigidBodyModel, Timing};
 use phiw_sim_rapier::RapierBackend;
+use phiw_zmp::feet_from_toml;
 use phiw_zmp::{MotionBalance, Stance, SupportPolygon, ZmpModel, ZmpWorkspace};
 use robots::{model, upper_body};
 use std::f64::consts::TAU;

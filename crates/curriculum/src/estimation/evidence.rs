@@ -2,9 +2,8 @@
 
 use super::foresight;
 use super::stored::StoredFactor;
-use crate::candidates::grouped_factor;
 use crate::{CurriculumError, Measured};
-use phiw_identification::{Design, IdentificationError};
+use phiw_identification::{Design, Fold, IdentificationError, accumulate};
 use phiw_regressor::factor::Factor;
 use phiw_regressor::least_squares::{Group, GroupedFactor};
 use phiw_telemetry::Block;
@@ -181,4 +180,11 @@ fn instants(block: &Block, period_s: f64, every_s: f64) -> Vec<Instant> {
         Instant { weight: (end - index * stride) as f64, period_s, state }
     };
     (0..stretches).map(stretch).collect()
+}
+
+/// The factors of a block's rows, one for each torque.
+pub(crate) fn grouped_factor(design: &Design, block: Block) -> Result<GroupedFactor, CurriculumError> {
+    let everything = Fold { log: block.log, start: f64::NEG_INFINITY, end: f64::INFINITY };
+    let mut factors = accumulate(design, &[everything], &[&vec![block]])?;
+    Ok(factors.swap_remove(0))
 }

@@ -13,6 +13,7 @@ mod settings;
 mod stored;
 
 pub use bayesian::{BayesianLeastSquares, LogNoise};
+pub(crate) use evidence::grouped_factor;
 pub use evidence::{Evidence, EvidenceSettings, Instant, RowsAt};
 pub use least_squares::{LeastSquares, WeightedLeastSquares};
 pub use likelihood::MotionLikelihood;

@@ -4,12 +4,12 @@ mod permission;
 
 pub use permission::{NoneAllowed, Permission, permission};
 
-use crate::curriculum::{Purpose, random};
+use crate::random::{Purpose, random};
 use crate::selection::{Best, Choice, Question, Scored, decide};
 use crate::triangle::Triangle;
 use crate::{
-    Candidates, Constraint, CurriculumError, Learnt, MotionDataset, Relaxation, Rivalry, Robot, RobotModel,
-    Safety, Selection,
+    Candidates, Constraint, CurriculumError, IterationRecord, Learnt, MotionDataset, Relaxation, Rivalry,
+    Robot, RobotModel, Safety, Selection,
 };
 
 /// What is believed of a robot, and the motions that it may do.
@@ -42,6 +42,8 @@ pub struct MeasuredSoFar<'a> {
     pub first_alpha: Option<f64>,
     /// Motions on which the robot fell.
     pub excluded: &'a [usize],
+    /// The iterations so far, for selections that ask for them; may be empty.
+    pub history: &'a [IterationRecord],
 }
 
 /// Who decides what in a plan.
@@ -108,8 +110,13 @@ pub fn plan(
     let (choice, separates) = match belief.rivalry {
         Some(rivalry) => (separating(belief, rivalry, &allowed, policy)?, Some(rivalry.names())),
         None => {
-            let question =
-                Question { candidates: belief.candidates, allowed: &allowed, measured: measured.triangle };
+            let question = Question {
+                dataset,
+                candidates: belief.candidates,
+                allowed: &allowed,
+                measured: measured.triangle,
+                history: measured.history,
+            };
             let mut random = random(policy.seed, measured.condition_numbers.len(), Purpose::Selection);
             (policy.selection.choose(&question, &mut random), None)
         }

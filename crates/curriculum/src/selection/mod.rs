@@ -8,20 +8,24 @@ pub use optimal::{AOptimal, DOptimal, TorqueOptimal};
 pub use random::RandomMotion;
 pub use smallest_condition::SmallestCondition;
 
-use crate::Candidates;
 use crate::triangle::Triangle;
+use crate::{Candidates, IterationRecord, MotionDataset};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 /// What a selection chooses from.
 #[derive(Clone, Copy, Debug)]
 pub struct Question<'a> {
-    /// All motions.
+    /// All motions: their names, tasks and durations.
+    pub dataset: &'a MotionDataset,
+    /// What each would tell, in the same order.
     pub candidates: &'a Candidates,
     /// Those that the constraint allows, as indices; never empty.
     pub allowed: &'a [usize],
     /// R of all that has been measured; none in the first iteration.
     pub measured: Option<&'a Triangle>,
+    /// The iterations so far; empty if nothing has been done, or if who asks keeps no record.
+    pub history: &'a [IterationRecord],
 }
 
 /// What a selection chose, and why.

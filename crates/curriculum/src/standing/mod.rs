@@ -1,13 +1,9 @@
 //! A robot on its feet: its base is six more joints that nothing drives, and what the floor gives to its feet is measured.
 
-mod controller;
-mod experiment;
 mod feet;
 mod legs;
 mod virtual_base;
 
-pub use controller::StandingFeedForward;
-pub use experiment::{StandingRobot, WrenchNoise};
 pub(crate) use feet::free_directions;
 pub use feet::{Feet, StandingFoot};
 pub use legs::{Legs, StandingStates};

@@ -101,9 +101,11 @@ impl Setup {
         let Some(plan) = curriculum.plan(run)? else { return Ok(None) };
         let measured = curriculum.measured(run)?;
         let question = Question {
+            dataset: curriculum.dataset,
             candidates: curriculum.candidates,
             allowed: &plan.allowed,
             measured: measured.as_ref(),
+            history: &run.history,
         };
         let condition_numbers =
             (0..self.dataset.len()).map(|motion| question.stack(motion).condition_number()).collect();

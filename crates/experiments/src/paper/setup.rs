@@ -12,14 +12,15 @@ use crate::plant::secret::SecretKind;
 use anyhow::{Context, ensure};
 use phiw::console::Console;
 use phiw_curriculum::{
-    Candidates, ConditionRelaxation, Estimator, Evidence, Experiment, FeedForward, Growth, LeastSquares,
-    Measured, Motion, MotionDataset, MotionLikelihood, Prior, Relaxation, Robot, RobotModel, RowsAt,
-    ScoreTest, SimulatedRobot, TraceResidual, UncertaintyRelaxation, WeightedLeastSquares, ZmpConstraint,
+    Candidates, ConditionRelaxation, Estimator, Evidence, Experiment, Growth, LeastSquares, Measured, Motion,
+    MotionDataset, MotionLikelihood, Prior, Relaxation, Robot, RobotModel, RowsAt, ScoreTest, TraceResidual,
+    UncertaintyRelaxation, WeightedLeastSquares, ZmpConstraint,
 };
 use phiw_dynamics::{PARAMETERS_PER_BODY, Workspace, World};
 use phiw_identification::{parameter_name, standard_unit};
 use phiw_plant::{Effect, Sensors, Timing};
 use phiw_regressor::factor::Factor;
+use phiw_simulated_robot::{FeedForward, SimulatedRobot};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 /// A report of the tracer.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Report {
-    /// `sufficient`, `explained`, `partly_explained` or `unexplained`.
+    /// `sufficient`, `explained`, `partly_explained` or `unexplained`; empty where `identify` gives none.
+    #[serde(deserialize_with = "text_or_nothing")]
     pub verdict: String,
     /// Joint by joint.
     pub noise_floor: BTreeMap<String, f64>,
@@ -19,6 +20,10 @@ pub struct Report {
     pub refinements: Vec<Effect>,
     /// Errors with all that was named.
     pub after: Errors,
+}
+
+fn text_or_nothing<'de, D: serde::Deserializer<'de>>(value: D) -> Result<String, D::Error> {
+    Ok(Option::<String>::deserialize(value)?.unwrap_or_default())
 }
 
 /// Errors on training and validation logs.

@@ -47,9 +47,9 @@ impl Robot {
 #[cfg(test)]
 mod tests {
     use super::robots;
-    use phiw_dynamics::Workspace;
     use phiw_dynamics::random_tree::{RandomNumbers, RandomState, random_state};
     use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+    use phiw_dynamics::{Body, Inertia, Workspace};
     use phiw_regressor::{BaseParameters, BaseParametersOptions};
 
     /// `irregular`: links whose published inertia is no body's.
@@ -62,7 +62,7 @@ mod tests {
         let base = BaseParameters::of_tree(&robot.tree, BaseParametersOptions::default()).expect(name);
         assert_eq!(base.count(), base_parameters, "{name}");
         for body in robot.tree.bodies() {
-            let is_physical = smallest_pivot(pseudo_inertia(&body.inertial)) > 0.0;
+            let is_physical = Inertia::<f64>::from_parameters(&body.inertial).is_physical();
             assert_eq!(is_physical, !irregular.contains(&body.link.as_str()), "{name}: {}", body.link);
             assert!(
                 body.limits.effort.is_finite() && body.limits.velocity.is_finite(),
@@ -70,28 +70,6 @@ mod tests {
                 body.joint
             );
         }
-    }
-
-    /// The 4×4 pseudo-inertia (Wensing, Kim & Slotine 2018): positive definite for every real body.
-    fn pseudo_inertia(parameters: &[f64; 10]) -> [[f64; 4]; 4] {
-        let [m, x, y, z, xx, xy, yy, xz, yz, zz] = *parameters;
-        let half = 0.5 * (xx + yy + zz);
-        [[half - xx, -xy, -xz, x], [-xy, half - yy, -yz, y], [-xz, -yz, half - zz, z], [x, y, z, m]]
-    }
-
-    /// The smallest pivot of an elimination: positive for a positive definite matrix only.
-    fn smallest_pivot(mut matrix: [[f64; 4]; 4]) -> f64 {
-        let mut smallest = f64::INFINITY;
-        for pivot in 0..4 {
-            smallest = smallest.min(matrix[pivot][pivot]);
-            for row in pivot + 1..4 {
-                let factor = matrix[row][pivot] / matrix[pivot][pivot];
-                for column in pivot..4 {
-                    matrix[row][column] -= factor * matrix[pivot][column];
-                }
-            }
-        }
-        smallest
     }
 
     /// The figures measured for the PUMA's link 3 miss the triangle inequality by a tenth, and no torque tells: what lies along
@@ -107,7 +85,8 @@ mod tests {
         }
         let mut mended = puma.clone();
         mended.set_inertial_parameters(&moved).expect("sizes fit");
-        assert!(mended.bodies().iter().all(|body| smallest_pivot(pseudo_inertia(&body.inertial)) > 0.0));
+        let is_physical = |body: &Body| Inertia::<f64>::from_parameters(&body.inertial).is_physical();
+        assert!(mended.bodies().iter().all(is_physical));
         let (mut random, mut workspace) = (RandomNumbers::new(1), Workspace::new(puma));
         let [mut as_published, mut as_mended] = [[0.0; 6]; 2];
         for _ in 0..20 {

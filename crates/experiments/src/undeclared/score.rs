@@ -397,6 +397,14 @@ mod tests {
         assert_eq!(score(&truth, &refined, None).outcomes, [Refined]);
     }
 
+    /// `identify` gives no verdict on a model that leaves more than noise: the floor of such a case was lost without a word.
+    #[test]
+    fn a_report_without_a_verdict_is_read() {
+        let text = r#"{"verdict": null, "noise_floor": {}, "before": {}, "effects": [], "after": {}}"#;
+        let report: Report = serde_json::from_str(text).expect("the test's own JSON");
+        assert_eq!(report.verdict, "");
+    }
+
     #[test]
     fn error_closed_is_the_share_above_the_floor() {
         let score = score(&truth(&[]), &report(VISCOUS), None);

@@ -5,8 +5,8 @@ use crate::arguments::NextArguments;
 use phiw_curriculum::{StanceError, StanceSettings};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{InertialParameters, Tree};
-use phiw_plant::feet_from_toml;
 use phiw_zmp::Stance;
+use phiw_zmp::feet_from_toml;
 use std::path::Path;
 
 /// The link that no joint moves, and the floor under it.
@@ -41,6 +41,6 @@ fn stance(path: &Path, whole: &Tree, held: &[(String, f64)]) -> Result<Stance, E
         feet_from_toml(&text, whole).map_err(|source| Error::Support { path: path.to_owned(), source })?;
     StanceSettings::default().stance(whole, &feet, held).map_err(|source| match source {
         StanceError::Curriculum(source) => source.into(),
-        source => Error::Stance { path: path.to_owned(), source },
+        source => Error::Stance { path: path.to_owned(), source: Box::new(source) },
     })
 }

@@ -4,8 +4,10 @@ use phiw_curriculum::standing::*;
 use phiw_curriculum::*;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{BackendError, Foot, SimulationBackend, Tree, Workspace, World};
-use phiw_plant::{Gains, Timing, feet_from_toml};
+use phiw_plant::{Gains, Timing};
 use phiw_regressor::BaseParameters;
+use phiw_simulated_robot::*;
+use phiw_zmp::feet_from_toml;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

@@ -10,11 +10,14 @@ use phiw_curriculum::{Candidates, MotionDataset, Robot, Triangle};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+fn dataset(count: usize) -> MotionDataset {
+    MotionDataset::new(7, motions(&tree(), count)).unwrap()
+}
+
 fn candidates(count: usize) -> Candidates {
     let tree = tree();
-    let robot = Robot::with_viscous_friction(tree.clone(), [0.0; 10]).unwrap();
-    let dataset = MotionDataset::new(7, motions(&tree, count)).unwrap();
-    Candidates::new(&robot, robot.declared(), &dataset, &[1.0; 7]).unwrap()
+    let robot = Robot::with_viscous_friction(tree, [0.0; 10]).unwrap();
+    Candidates::new(&robot, robot.declared(), &dataset(count), &[1.0; 7]).unwrap()
 }
 
 fn random() -> ChaCha8Rng {
@@ -45,12 +48,18 @@ fn ranked(candidates: &Candidates, allowed: &[usize], measured: Option<&Triangle
 
 #[test]
 fn pruning_loses_neither_the_best_nor_the_next() {
-    let candidates = candidates(12);
+    let (dataset, candidates) = (dataset(12), candidates(12));
     let all: Vec<usize> = (0..12).collect();
     for allowed in [&all[..], &all[3..9], &all[5..6]] {
         let mut measured: Option<Triangle> = None;
         for _ in 0..5 {
-            let question = Question { candidates: &candidates, allowed, measured: measured.as_ref() };
+            let question = Question {
+                dataset: &dataset,
+                candidates: &candidates,
+                allowed,
+                measured: measured.as_ref(),
+                history: &[],
+            };
             let choice = SmallestCondition.choose(&question, &mut random());
             let order = ranked(&candidates, allowed, measured.as_ref());
             assert_eq!(choice.motion, order[0]);
@@ -62,10 +71,16 @@ fn pruning_loses_neither_the_best_nor_the_next() {
 
 #[test]
 fn optimal_designs_are_best_by_their_own_measure() {
-    let candidates = candidates(8);
+    let (dataset, candidates) = (dataset(8), candidates(8));
     let allowed: Vec<usize> = (1..8).collect();
     let measured = candidates.all()[0].triangle.clone();
-    let question = Question { candidates: &candidates, allowed: &allowed, measured: Some(&measured) };
+    let question = Question {
+        dataset: &dataset,
+        candidates: &candidates,
+        allowed: &allowed,
+        measured: Some(&measured),
+        history: &[],
+    };
     let best = DOptimal.choose(&question, &mut random());
     let determinant = |motion: usize| question.stack(motion).log_determinant();
     assert!(allowed.iter().all(|&motion| determinant(motion) <= determinant(best.motion)));
@@ -91,8 +106,14 @@ fn doing_a_motion_again_is_worth_something_to_the_torques_alone() {
 
 #[test]
 fn random_choice_takes_all_that_is_allowed_and_nothing_else() {
-    let candidates = candidates(6);
-    let question = Question { candidates: &candidates, allowed: &[1, 4, 5], measured: None };
+    let (dataset, candidates) = (dataset(6), candidates(6));
+    let question = Question {
+        dataset: &dataset,
+        candidates: &candidates,
+        allowed: &[1, 4, 5],
+        measured: None,
+        history: &[],
+    };
     let mut random = random();
     let mut seen = [0; 6];
     (0..300).for_each(|_| seen[RandomMotion.choose(&question, &mut random).motion] += 1);

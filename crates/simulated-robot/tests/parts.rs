@@ -6,7 +6,7 @@ use arm::{Arm, tree};
 use phiw_curriculum::*;
 use phiw_dynamics::Workspace;
 use phiw_identification::EffectSpec;
-use phiw_plant::Reference;
+use phiw_simulated_robot::*;
 use phiw_telemetry::Recording;
 use proptest::prelude::*;
 

@@ -1,7 +1,8 @@
 //! A simulated robot on its feet, and what is measured of it.
 
-use super::{Feet, VIRTUAL_JOINTS, base_coordinates};
-use crate::{CurriculumError, Experiment, Measured, Motion, Robot, RobotModel, SimulatedRobot, Trial};
+use crate::SimulatedRobot;
+use phiw_curriculum::standing::{Feet, VIRTUAL_JOINTS, base_coordinates};
+use phiw_curriculum::{CurriculumError, Experiment, Measured, Motion, Robot, RobotModel, Trial};
 use phiw_plant::{History, Sensors};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -63,7 +64,6 @@ impl Experiment for StandingRobot {
             measured: self.measured(&run.history, motion.duration_s(), &mut noise)?,
             fell_at_s: run.fell_at_s,
             tracking_error: run.tracking_error,
-            reactions: run.reactions,
         })
     }
 }

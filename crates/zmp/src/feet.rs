@@ -22,7 +22,7 @@ struct FootEntry {
 /// Why a support file does not fit a robot.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum SupportError {
+pub enum FeetError {
     /// It is not TOML, or not of this form.
     #[error("not a support file ([[foot]] with `link` and `sole`): {0}")]
     Syntax(String),
@@ -56,11 +56,11 @@ pub enum SupportError {
 ///
 /// # Errors
 /// The text is not of this form, a link is not there, or a sole has fewer than three corners, is not flat or has no area.
-pub fn feet_from_toml(text: &str, tree: &Tree) -> Result<Vec<Foot>, SupportError> {
+pub fn feet_from_toml(text: &str, tree: &Tree) -> Result<Vec<Foot>, FeetError> {
     let syntax = |error: toml::de::Error| {
         let before = error.span().map_or("", |span| text.get(..span.start).unwrap_or_default());
         let line = 1 + before.matches('\n').count();
-        SupportError::Syntax(format!("line {line}: {}", error.message()))
+        FeetError::Syntax(format!("line {line}: {}", error.message()))
     };
     let file: SupportFile = toml::from_str(text).map_err(syntax)?;
     file.foot
@@ -68,10 +68,10 @@ pub fn feet_from_toml(text: &str, tree: &Tree) -> Result<Vec<Foot>, SupportError
         .map(|FootEntry { link, sole }| {
             let Some(body) = tree.bodies().iter().position(|body| body.link == link) else {
                 let known: Vec<&str> = tree.bodies().iter().map(|body| body.link.as_str()).collect();
-                return Err(SupportError::NoSuchLink { link, known: known.join(", ") });
+                return Err(FeetError::NoSuchLink { link, known: known.join(", ") });
             };
             match flaw(&sole) {
-                Some(problem) => Err(SupportError::Sole { link, problem }),
+                Some(problem) => Err(FeetError::Sole { link, problem }),
                 None => Ok(Foot { body, sole }),
             }
         })

@@ -1,6 +1,6 @@
 //! From a belief to the controller that follows a motion: equation (13).
 
-use crate::{CurriculumError, Robot, RobotModel};
+use phiw_curriculum::{CurriculumError, Robot, RobotModel};
 use phiw_dynamics::DimensionError;
 use phiw_effects::JointProperty;
 use phiw_identification::Design;

@@ -1,13 +1,14 @@
 //! Equation (13) for a robot on its feet.
 
-use super::Feet;
-use crate::{Controller, CurriculumError, Robot, RobotModel};
+use crate::Controller;
+use phiw_curriculum::standing::{Feet, VIRTUAL_JOINTS};
+use phiw_curriculum::{CurriculumError, Robot, RobotModel};
 use phiw_dynamics::{DimensionError, Tree, Workspace, check_size};
 use phiw_effects::JointProperty;
 use phiw_plant::{ComputedTorque, Gains, TorqueModel};
 
 /// The joints of a virtual base come first.
-const BASE: usize = super::VIRTUAL_JOINTS.len();
+const BASE: usize = VIRTUAL_JOINTS.len();
 
 /// The belief's torque for the reference, what the feet carry taken off, and a PD on all motors.
 ///

@@ -11,6 +11,7 @@ use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{AnalyticBackend, BackendError, SimulationBackend, Tree, World};
 use phiw_identification::EffectSpec;
 use phiw_plant::{Derivatives, Effect, Friction, Gains, Sensors, Timing};
+use phiw_simulated_robot::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -133,9 +134,9 @@ fn a_reference_is_sampled_where_it_is_asked() {
         v.copy_from_slice(&[1.0, -2.0]);
         a.fill(0.0);
     };
-    let motion = Motion::of_reference("line", "", 2, (5, 0.1), &line).unwrap();
+    let motion = Motion::of_reference("line", "", 2, (5, 0.1), line).unwrap();
     assert_eq!((motion.samples(), motion.joints()), (5, 2));
     assert_eq!(motion.sample(3), [&[0.1 * 3.0, -0.2 * 3.0][..], &[1.0, -2.0], &[0.0, 0.0]]);
-    assert!(Motion::of_reference("line", "", 2, (1, 0.1), &line).is_err());
+    assert!(Motion::of_reference("line", "", 2, (1, 0.1), line).is_err());
     assert_eq!(Timing::default().control_period_s, 0.01, "what the tests above take for the control period");
 }

@@ -5,6 +5,7 @@ mod arm;
 use arm::Arm;
 use phiw_curriculum::selection::{Choice, Question};
 use phiw_curriculum::*;
+use phiw_simulated_robot::*;
 use rand_chacha::ChaCha8Rng;
 
 fn rms(left: &[f64], right: &[f64]) -> f64 {

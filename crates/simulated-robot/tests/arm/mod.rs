@@ -2,11 +2,11 @@
 
 #![allow(dead_code, reason = "each test file uses a part")]
 
-use phiw_curriculum::selection::SmallestCondition;
 use phiw_curriculum::*;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{AnalyticBackend, Tree, World};
 use phiw_plant::{Effect, Friction, Gains, MultiSine, Reference, Sensors, Timing};
+use phiw_simulated_robot::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -91,22 +91,7 @@ impl Arm {
         estimator: &'a dyn Estimator,
         end: &'a dyn EndCriterion,
     ) -> Curriculum<'a> {
-        Curriculum {
-            robot: &self.robot,
-            dataset: &self.dataset,
-            candidates: &self.candidates,
-            experiment,
-            selection: &SmallestCondition,
-            constraint: &Unconstrained,
-            relaxation: &RELAXATION,
-            estimator,
-            growth: None,
-            end,
-            rows_at: RowsAt::Periods,
-            settings: CurriculumSettings::default(),
-        }
+        let motions = (&self.dataset, &self.candidates);
+        Curriculum { end, ..Curriculum::new(&self.robot, motions, experiment, &Unconstrained, estimator) }
     }
 }
-
-static RELAXATION: ConditionRelaxation =
-    ConditionRelaxation { maximum: Maximum::Share(0.05), scale: Scale::Share(0.8), bias: 1.0 };
