@@ -417,3 +417,15 @@ fn a_candidate_that_cannot_be_judged_does_not_end_the_trace() {
     accumulate(&design, &train, &[&blocks]).unwrap();
     assert_eq!(design.not_finite(), [0]);
 }
+
+/// One joint at a time, the friction of all joints came out one by one, and beside those that were not in yet it was taken for other kinds.
+#[test]
+fn friction_of_all_joints_is_found_with_nothing_declared() {
+    let tracing = traced_on(folds().0, &[], 11, &|_, _| (), false);
+    let expected: Vec<(String, Vec<String>)> = ["coulomb_friction", "viscous_friction"]
+        .iter()
+        .flat_map(|kind| ["elbow", "shoulder"].map(|joint| ((*kind).to_owned(), vec![joint.to_owned()])))
+        .collect();
+    assert_eq!(named(&tracing), expected, "{:?}", tracing.verdict);
+    assert!(tracing.model.held_out.relative < 0.1 * tracing.before.1.relative);
+}

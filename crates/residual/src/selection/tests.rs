@@ -128,3 +128,22 @@ fn nothing_is_named_in_noise_of_any_colour() {
         assert!(named <= 2, "{named} names in noise of correlation {colour}");
     }
 }
+
+/// A residual of a thousandth of the torque once drew in a dozen effects that polished the form of a sign.
+#[test]
+fn nothing_is_sought_in_a_residual_that_is_as_good_as_none() {
+    let mut random = RandomNumbers::new(5);
+    let mut problem = problem(&mut random, 2, 6, &[(0, 2, 0.8)], 0.0);
+    problem.torques.iter_mut().for_each(|torque| torque.least = 4.0);
+    assert_eq!(chosen(&problem, Vec::new()), []);
+}
+
+/// Stribeck friction stood in a model without the Coulomb friction on top of which it acts.
+#[test]
+fn a_form_comes_with_what_it_is_a_form_of() {
+    let mut random = RandomNumbers::new(6);
+    let mut problem = problem(&mut random, 2, 6, &[(0, 4, 1.0)], 0.0);
+    // Hypotheses are numbered kind by kind, torque by torque: kind 4 is a form of kind 1.
+    problem.hypotheses[8].requires = vec![2];
+    assert_eq!(chosen(&problem, Vec::new()), [(0, 1), (0, 4)]);
+}
