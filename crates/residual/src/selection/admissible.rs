@@ -6,21 +6,46 @@ use super::problem::Member;
 use super::screening::screen;
 use super::search::{Model, Search};
 use super::wald::squares_of;
+use rayon::prelude::*;
 
 /// Squared standard deviations beyond its bounds up to which a member that is required may be there by chance.
 const BY_CHANCE: f64 = 9.0;
+/// Models of one step that are fitted with their own weights, after all have been fitted with those of the present model.
+const FITTED_IN_FULL: usize = 3;
 
 impl Search<'_> {
     /// A model fitted, with what its members require; members that break their bounds, or say nothing, are left out.
     pub(super) fn evaluate(&self, mut members: Vec<Member>, start: &Fit) -> Model {
         self.add_required(&mut members, start);
-        self.within_bounds(members, start)
+        self.within_bounds(members, start, true)
     }
 
-    /// The same with nothing added.
-    fn within_bounds(&self, mut members: Vec<Member>, start: &Fit) -> Model {
+    /// The best first of models with these members. All are fitted with the weights of the present model; the best few, which may be taken, are then fitted with their own. What
+    /// belongs to each is handed through.
+    pub(super) fn ranked<T: Send>(&self, candidates: Vec<(Vec<Member>, T)>) -> Vec<(Model, T)> {
+        let quickly = |(mut members, belongs): (Vec<Member>, T)| {
+            self.add_required(&mut members, &self.model.fit);
+            (self.within_bounds(members, &self.model.fit, false), belongs)
+        };
+        let mut models: Vec<(Model, T)> = candidates.into_par_iter().map(quickly).collect();
+        models.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
+        let best = models.len().min(FITTED_IN_FULL);
+        models[..best].par_iter_mut().for_each(|(model, _)| {
+            let members = std::mem::take(&mut model.members);
+            *model = self.within_bounds(members, &self.model.fit, true);
+        });
+        models.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
+        models
+    }
+
+    /// The same with nothing added; `own_weights` are those of the model itself, otherwise those of `start`.
+    fn within_bounds(&self, mut members: Vec<Member>, start: &Fit, own_weights: bool) -> Model {
         loop {
-            let fit = Fit::new(self.problem, self.problem.active(&members), &self.rows, Some(start));
+            let active = self.problem.active(&members);
+            let fit = match own_weights {
+                true => Fit::new(self.problem, active, &self.rows, Some(start)),
+                false => Fit::beside(self.problem, active, &self.rows, start),
+            };
             let breaks = |member: &Member| !self.is_declared(member) && !self.is_within_bounds(&fit, member);
             let broken: Vec<Member> = members.iter().filter(|member| breaks(member)).copied().collect();
             if broken.is_empty() {
@@ -45,7 +70,8 @@ impl Search<'_> {
                 members = without_forms;
                 continue;
             }
-            let options = [without_forms, without_broken].map(|members| self.within_bounds(members, &fit));
+            let options =
+                [without_forms, without_broken].map(|members| self.within_bounds(members, &fit, own_weights));
             let [without_forms, without_broken] = options;
             return if without_forms.value <= without_broken.value { without_forms } else { without_broken };
         }

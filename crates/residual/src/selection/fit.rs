@@ -41,6 +41,35 @@ pub(crate) struct Fit {
 impl Fit {
     /// Fits `active` parameters, of which the first `model` are the model's; the others may be absorbed. `rows` are the effective rows of each torque.
     pub fn new(problem: &Problem, active: Vec<usize>, rows: &[f64], start: Option<&Fit>) -> Self {
+        let mut fit = Fit::prepared(problem, active, rows, start);
+        for _ in 0..ITERATIONS {
+            fit.weights =
+                rows.iter().zip(&fit.rss).map(|(rows, rss)| rows / rss.max(f64::MIN_POSITIVE)).collect();
+            fit.solve(problem, None);
+            let rss: Vec<f64> =
+                (0..problem.torques.len()).map(|torque| fit.residual(problem, torque)).collect();
+            let change =
+                rss.iter().zip(&fit.rss).map(|(new, old)| (new / old - 1.0).abs()).fold(0.0, f64::max);
+            fit.rss = rss;
+            if change < SETTLED {
+                break;
+            }
+        }
+        fit
+    }
+
+    /// The same with the weights of `start`, which was fitted to the same `rows`: the triangle of the parameters that both begin with is taken over, so that a few parameters more
+    /// or less cost the square of their number and not the cube.
+    pub fn beside(problem: &Problem, active: Vec<usize>, rows: &[f64], start: &Fit) -> Self {
+        let mut fit = Fit::prepared(problem, active, rows, Some(start));
+        fit.weights.clone_from(&start.weights);
+        fit.solve(problem, Some(start));
+        fit.rss = (0..problem.torques.len()).map(|torque| fit.residual(problem, torque)).collect();
+        fit
+    }
+
+    /// Everything but the solution.
+    fn prepared(problem: &Problem, active: Vec<usize>, rows: &[f64], start: Option<&Fit>) -> Self {
         let mut place = vec![None; problem.parameters];
         active.iter().enumerate().for_each(|(at, &parameter)| place[parameter] = Some(at));
         let all_rows: f64 = problem.torques.iter().map(|torque| torque.whole.rows()).sum();
@@ -56,7 +85,7 @@ impl Fit {
                 .filter(|(_, value)| *value != 0.0)
                 .collect()
         };
-        let mut fit = Fit {
+        Fit {
             own: problem.torques.iter().map(of_torque).collect(),
             absent: problem.torques.iter().map(absent_of).collect(),
             heard: vec![true; active.len()],
@@ -71,21 +100,7 @@ impl Fit {
             },
             weights: Vec::new(),
             prior_weight: rows.iter().sum::<f64>() / all_rows.max(1.0),
-        };
-        for _ in 0..ITERATIONS {
-            fit.weights =
-                rows.iter().zip(&fit.rss).map(|(rows, rss)| rows / rss.max(f64::MIN_POSITIVE)).collect();
-            fit.solve(problem);
-            let rss: Vec<f64> =
-                (0..problem.torques.len()).map(|torque| fit.residual(problem, torque)).collect();
-            let change =
-                rss.iter().zip(&fit.rss).map(|(new, old)| (new / old - 1.0).abs()).fold(0.0, f64::max);
-            fit.rss = rss;
-            if change < SETTLED {
-                break;
-            }
         }
-        fit
     }
 
     /// (column, value) of all parameters with a value in a torque.
@@ -124,16 +139,33 @@ impl Fit {
         (own, right)
     }
 
-    fn solve(&mut self, problem: &Problem) {
+    /// Takes the rows of the triangle that are those of `start` from there; the weights must be the same.
+    fn solve(&mut self, problem: &Problem, start: Option<&Fit>) {
         let size = self.active.len();
+        let same = |start: &Fit| {
+            self.active.iter().zip(&start.active).take_while(|(own, other)| own == other).count()
+        };
+        let kept = start.map_or(0, same);
         let mut system = vec![0.0; size * size];
+        if let Some(start) = start {
+            let other = start.active.len();
+            for row in 0..kept {
+                system[row * size..row * size + row + 1]
+                    .copy_from_slice(&start.triangle[row * other..row * other + row + 1]);
+            }
+            self.heard[..kept].copy_from_slice(&start.heard[..kept]);
+        }
         let mut right = vec![0.0; size];
         for (torque, rows) in problem.torques.iter().enumerate() {
             let weight = self.weights[torque];
             for &(column, place) in &self.own[torque] {
                 let products = rows.whole.column(column);
-                let row = &mut system[place * size..(place + 1) * size];
-                self.own[torque].iter().for_each(|&(other, at)| row[at] += weight * products[other]);
+                if place >= kept {
+                    // What is above the diagonal is not looked at.
+                    let row = &mut system[place * size..place * size + place + 1];
+                    let below = self.own[torque].iter().filter(|(_, at)| *at <= place);
+                    below.for_each(|&(other, at)| row[at] += weight * products[other]);
+                }
                 let absent: f64 =
                     self.absent[torque].iter().map(|&(other, value)| products[other] * value).sum();
                 right[place] += weight * (products[rows.parameters.len()] - absent);
@@ -145,14 +177,14 @@ impl Fit {
                 let Some(at) = self.place[parameter] else { continue };
                 let products = prior.products.column(a);
                 right[at] += self.prior_weight * products[last];
-                for (b, other) in prior.parameters.iter().enumerate() {
+                for (b, other) in prior.parameters.iter().enumerate().filter(|_| at >= kept) {
                     if let Some(other) = self.place[*other] {
                         system[at * size + other] += self.prior_weight * products[b];
                     }
                 }
             }
         }
-        self.factor(system, problem.model.len());
+        self.factor(system, kept, problem.model.len());
         self.half = self.forward(&right);
         let solution = self.backward(self.half.clone());
         self.values.clone_from(&problem.absent);
@@ -161,10 +193,10 @@ impl Fit {
         }
     }
 
-    /// Cholesky's factor of the system; columns of which nothing is left are passed over.
-    fn factor(&mut self, mut system: Vec<f64>, model: usize) {
+    /// Cholesky's factor of the system, whose first `kept` rows have it already; columns of which nothing is left are passed over.
+    fn factor(&mut self, mut system: Vec<f64>, kept: usize, model: usize) {
         let size = self.active.len();
-        for row in 0..size {
+        for row in kept..size {
             let (before, rest) = system.split_at_mut(row * size);
             let own = &mut rest[..size];
             let norm = own[row];

@@ -169,16 +169,10 @@ impl<'a> Search<'a> {
         open.retain(|&hypothesis| !textbook || self.problem.hypotheses[hypothesis].textbook);
         let screened = screen(self.problem, &self.model.fit, &self.rows, &open);
         let moves = self.moves(&screened);
-        let models: Vec<Model> = moves
-            .into_par_iter()
-            .map(|added| {
-                let members = self.model.members.iter().copied().chain(added).collect();
-                self.evaluate(members, &self.model.fit)
-            })
-            .collect();
-        let best = models.into_iter().min_by(|a, b| a.value.total_cmp(&b.value));
-        match best {
-            Some(best)
+        let larger = |added: Vec<Member>| (self.model.members.iter().copied().chain(added).collect(), ());
+        let models = self.ranked(moves.into_iter().map(larger).collect());
+        match models.into_iter().next() {
+            Some((best, ()))
                 if best.value < self.model.value - LEAST_STEP && best.members != self.model.members =>
             {
                 self.accept(best);
@@ -216,16 +210,13 @@ impl<'a> Search<'a> {
         let singles =
             singles.into_iter().take_while(|(loss, _)| *loss < worst).take(self.policy.finalists / 2);
         let moves: Vec<Vec<Member>> = singles.map(|(_, member)| vec![member]).chain(families).collect();
-        let models: Vec<Model> = moves
-            .into_par_iter()
-            .map(|removed| {
-                let members =
-                    self.model.members.iter().filter(|member| !removed.contains(member)).copied().collect();
-                self.evaluate(members, &self.model.fit)
-            })
-            .collect();
-        match models.into_iter().min_by(|a, b| a.value.total_cmp(&b.value)) {
-            Some(best) if best.value <= self.model.value && best.members != self.model.members => {
+        let smaller = |removed: Vec<Member>| {
+            let stays = self.model.members.iter().filter(|member| !removed.contains(member));
+            (stays.copied().collect(), ())
+        };
+        let models = self.ranked(moves.into_iter().map(smaller).collect());
+        match models.into_iter().next() {
+            Some((best, ())) if best.value <= self.model.value && best.members != self.model.members => {
                 self.accept(best);
                 true
             }
@@ -259,7 +250,7 @@ impl<'a> Search<'a> {
         }
         let others: Vec<Member> =
             self.model.members.iter().filter(|other| **other != member).copied().collect();
-        let without = Fit::new(self.problem, self.problem.active(&others), &self.rows, Some(&self.model.fit));
+        let without = Fit::beside(self.problem, self.problem.active(&others), &self.rows, &self.model.fit);
         let mut open: Vec<usize> = match own.declared {
             true => Vec::new(),
             false => self.open(),
@@ -288,16 +279,13 @@ impl<'a> Search<'a> {
         let singles = singles.take(self.policy.finalists / 2);
         let pairs = pairs.iter().map(|(_, pair)| pair.to_vec()).take(self.policy.finalists / 4);
         let moves: Vec<Vec<Member>> = singles.chain(pairs).collect();
-        let mut models: Vec<(Model, Vec<Member>)> = moves
-            .into_par_iter()
-            .map(|entering| {
-                let mut members = self.model.members.clone();
-                members.splice(place..=place, entering.iter().copied());
-                (self.evaluate(members, &self.model.fit), entering)
-            })
-            .collect();
+        let swapped = |entering: Vec<Member>| {
+            let mut members = self.model.members.clone();
+            members.splice(place..=place, entering.iter().copied());
+            (members, entering)
+        };
+        let mut models = self.ranked(moves.into_iter().map(swapped).collect());
         models.retain(|(model, entering)| entering.iter().all(|member| model.members.contains(member)));
-        models.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
         models
     }
 
