@@ -70,10 +70,12 @@ impl Search<'_> {
                 members = without_forms;
                 continue;
             }
-            let options =
-                [without_forms, without_broken].map(|members| self.within_bounds(members, &fit, own_weights));
-            let [without_forms, without_broken] = options;
-            return if without_forms.value <= without_broken.value { without_forms } else { without_broken };
+            let value = |members: &Vec<Member>| {
+                let fit = Fit::beside(self.problem, self.problem.active(members), &self.rows, &fit);
+                criterion(self.problem, members, &fit, &self.rows)
+            };
+            members =
+                if value(&without_forms) <= value(&without_broken) { without_forms } else { without_broken };
         }
     }
 
