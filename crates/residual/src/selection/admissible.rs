@@ -8,20 +8,23 @@ use super::search::{Model, Search};
 use super::wald::squares_of;
 use rayon::prelude::*;
 
-/// Squared standard deviations beyond its bounds up to which a member that is required may be there by chance.
+/// Squared standard deviations beyond its bounds up to which a member that is required may be there by
+/// chance.
 const BY_CHANCE: f64 = 9.0;
-/// Models of one step that are fitted with their own weights, after all have been fitted with those of the present model.
+/// Models of one step that are fitted with their own weights, after all have been fitted with those of the
+/// present model.
 const FITTED_IN_FULL: usize = 3;
 
 impl Search<'_> {
-    /// A model fitted, with what its members require; members that break their bounds, or say nothing, are left out.
+    /// A model fitted, with what its members require; members that break their bounds, or say nothing, are
+    /// left out.
     pub(super) fn evaluate(&self, mut members: Vec<Member>, start: &Fit) -> Model {
         self.add_required(&mut members, start);
         self.within_bounds(members, start, true)
     }
 
-    /// The best first of models with these members. All are fitted with the weights of the present model; the best few, which may be taken, are then fitted with their own. What
-    /// belongs to each is handed through.
+    /// The best first of models with these members. All are fitted with the weights of the present model; the
+    /// best few, which may be taken, are then fitted with their own. What belongs to each is handed through.
     pub(super) fn ranked<T: Send>(&self, candidates: Vec<(Vec<Member>, T)>) -> Vec<(Model, T)> {
         let quickly = |(mut members, belongs): (Vec<Member>, T)| {
             self.add_required(&mut members, &self.model.fit);
@@ -65,7 +68,8 @@ impl Search<'_> {
             };
             let without_forms: Vec<Member> =
                 members.iter().filter(|member| !depends(member, required)).copied().collect();
-            // What requires something that cannot be goes; where that may be by chance, what the criterion is smaller without.
+            // What requires something that cannot be goes; where that may be by chance, what the criterion is
+            // smaller without.
             if squares_of(self.problem, &fit, *required) > BY_CHANCE {
                 members = without_forms;
                 continue;
@@ -107,7 +111,8 @@ impl Search<'_> {
         }
     }
 
-    /// What is known to first order only must not be larger than the torque itself: there the first order says nothing.
+    /// What is known to first order only must not be larger than the torque itself: there the first order
+    /// says nothing.
     fn is_small_enough(&self, fit: &Fit, member: &Member) -> bool {
         let hypothesis = &self.problem.hypotheses[member.hypothesis];
         let parameters = &self.problem.variant(*member).parameters;

@@ -3,10 +3,12 @@
 use super::fit::Fit;
 use super::problem::{Member, Problem};
 
-/// Σ n_e·log(rss/n) + Σ log n_e over columns and scanned constants + 2·log K for each choice, the smaller the better; twice a negative log-likelihood.
+/// Σ n_e·log(rss/n) + Σ log n_e over columns and scanned constants + 2·log K for each choice, the smaller the
+/// better; twice a negative log-likelihood.
 ///
-/// A residual that is as good as none counts as that, however small it is. n_e are the effective rows of each torque. K hypotheses are chosen from. A kind on all joints but some is one choice and as many as there are exceptions, if
-/// that is less than one for each of its joints.
+/// A residual that is as good as none counts as that, however small it is. n_e are the effective rows of each
+/// torque. K hypotheses are chosen from. A kind on all joints but some is one choice and as many as there are
+/// exceptions, if that is less than one for each of its joints.
 pub(super) fn criterion(problem: &Problem, members: &[Member], fit: &Fit, rows: &[f64]) -> f64 {
     let likelihood: f64 = (0..problem.torques.len())
         .map(|torque| {

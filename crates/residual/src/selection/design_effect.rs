@@ -10,11 +10,11 @@ const LEAST_FOLDS: usize = 4;
 /// Squared share of a column that must be left beside the model for it to be asked.
 const HEARD: f64 = 1e-3;
 
-/// Effective rows of each torque: its rows over the median, over the columns that could act on it, of what the scores' spread from fold to fold is against that of
-/// independent rows.
+/// Effective rows of each torque: its rows over the median, over the columns that could act on it, of what
+/// the scores' spread from fold to fold is against that of independent rows.
 ///
-/// A fold's score is the product of a column with the residual. Noise of any colour that is short against a fold makes the scores of the folds independent, and
-/// their spread says how much of the noise a column sees.
+/// A fold's score is the product of a column with the residual. Noise of any colour that is short against a
+/// fold makes the scores of the folds independent, and their spread says how much of the noise a column sees.
 pub(super) fn effective_rows(problem: &Problem, fit: &Fit) -> Vec<f64> {
     let of_torque = |torque: usize| {
         let rows = problem.torques[torque].whole.rows();
@@ -33,7 +33,8 @@ fn design_effect(problem: &Problem, fit: &Fit, torque: usize) -> f64 {
     }
     let values = fit.columns(torque);
     let variance = fit.rss[torque] / rows.whole.rows().max(1.0);
-    // The scores of the model's own columns, fold by fold: what a column beside them shares with them goes out.
+    // The scores of the model's own columns, fold by fold: what a column beside them shares with them goes
+    // out.
     let active: Vec<(usize, usize)> =
         fit.own[torque].iter().filter(|(_, place)| fit.heard[*place]).copied().collect();
     let of_model: Vec<Vec<f64>> = rows

@@ -8,7 +8,8 @@ pub(super) fn fisher_tail(value: f64, numerator: f64, denominator: f64) -> f64 {
     incomplete_beta(denominator / (denominator + numerator * value), 0.5 * denominator, 0.5 * numerator)
 }
 
-/// The regularised incomplete beta function I_x(a, b), by Lentz's continued fraction (Press et al., Numerical Recipes, 6.4).
+/// The regularised incomplete beta function I_x(a, b), by Lentz's continued fraction (Press et al., Numerical
+/// Recipes, 6.4).
 fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
     if x <= 0.0 {
         return 0.0;
@@ -69,7 +70,8 @@ mod tests {
 
     #[test]
     fn tails_are_those_of_the_tables() {
-        // value, degrees of freedom, tail: quantiles of published tables; Student's t with d is Fisher's with (1, d) of its square, two-sided.
+        // value, degrees of freedom, tail: quantiles of published tables; Student's t with d is Fisher's with
+        // (1, d) of its square, two-sided.
         let table = [
             (4.964_6, 1.0, 10.0, 0.05),
             (10.044_3, 1.0, 10.0, 0.01),

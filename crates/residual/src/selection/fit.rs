@@ -2,7 +2,8 @@
 
 use super::problem::{Problem, Torque};
 
-/// A column of the model with less than this share of its squared norm left beside those before it is undetermined.
+/// A column of the model with less than this share of its squared norm left beside those before it is
+/// undetermined.
 const DEPENDENT: f64 = 1e-10;
 /// The same for a candidate's column: what is left of it is rounding, or the model's own error.
 pub(super) const ABSORBED: f64 = 4e-6;
@@ -11,7 +12,8 @@ const ITERATIONS: usize = 4;
 /// Weights that change by less are settled.
 const SETTLED: f64 = 1e-3;
 
-/// The least-squares fit with each torque weighted by its effective rows over its residual: the smallest Σ n_e·log(rss).
+/// The least-squares fit with each torque weighted by its effective rows over its residual: the smallest Σ
+/// n_e·log(rss).
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
     /// The parameters that are fitted, in the order of the system.
@@ -39,7 +41,8 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// Fits `active` parameters, of which the first `model` are the model's; the others may be absorbed. `rows` are the effective rows of each torque.
+    /// Fits `active` parameters, of which the first `model` are the model's; the others may be absorbed.
+    /// `rows` are the effective rows of each torque.
     pub fn new(problem: &Problem, active: Vec<usize>, rows: &[f64], start: Option<&Fit>) -> Self {
         let mut fit = Fit::prepared(problem, active, rows, start);
         for _ in 0..ITERATIONS {
@@ -58,8 +61,9 @@ impl Fit {
         fit
     }
 
-    /// The same with the weights of `start`, which was fitted to the same `rows`: the triangle of the parameters that both begin with is taken over, so that a few parameters more
-    /// or less cost the square of their number and not the cube.
+    /// The same with the weights of `start`, which was fitted to the same `rows`: the triangle of the
+    /// parameters that both begin with is taken over, so that a few parameters more or less cost the square
+    /// of their number and not the cube.
     pub fn beside(problem: &Problem, active: Vec<usize>, rows: &[f64], start: &Fit) -> Self {
         let mut fit = Fit::prepared(problem, active, rows, Some(start));
         fit.weights.clone_from(&start.weights);
@@ -115,7 +119,8 @@ impl Fit {
         problem.torques[torque].whole.residual(&self.columns(torque))
     }
 
-    /// Products of a parameter's columns with those of the active ones, and with the right-hand side less what is absent.
+    /// Products of a parameter's columns with those of the active ones, and with the right-hand side less
+    /// what is absent.
     pub fn products(
         &self,
         problem: &Problem,
@@ -193,7 +198,8 @@ impl Fit {
         }
     }
 
-    /// Cholesky's factor of the system, whose first `kept` rows have it already; columns of which nothing is left are passed over.
+    /// Cholesky's factor of the system, whose first `kept` rows have it already; columns of which nothing is
+    /// left are passed over.
     fn factor(&mut self, mut system: Vec<f64>, kept: usize, model: usize) {
         let size = self.active.len();
         for row in kept..size {

@@ -12,7 +12,8 @@ use std::collections::BTreeMap;
 const PAIRED: usize = 6;
 
 impl Search<'_> {
-    /// What may be added in one step: one hypothesis, two that act on one torque, and either on all torques where it says something.
+    /// What may be added in one step: one hypothesis, two that act on one torque, and either on all torques
+    /// where it says something.
     pub(super) fn moves(&self, screened: &[Screened]) -> Vec<Vec<Member>> {
         let now = choices(self.problem, &self.model.members);
         let worth = |added: &[Member], gain: f64| {
@@ -54,7 +55,8 @@ impl Search<'_> {
         moves.into_iter().chain(families).map(|(_, members)| members).collect()
     }
 
-    /// On each torque the best pair of each two kinds among the best few hypotheses, where the two say more than either.
+    /// On each torque the best pair of each two kinds among the best few hypotheses, where the two say more
+    /// than either.
     pub(super) fn pairs(&self, fit: &Fit, screened: &[Screened]) -> Vec<(f64, [Member; 2])> {
         let of_torque = |torque: usize| -> Vec<(f64, [Member; 2])> {
             let hypothesis = |screened: &&Screened| &self.problem.hypotheses[screened.member.hypothesis];

@@ -15,7 +15,8 @@ pub(crate) struct Torque {
 }
 
 impl Torque {
-    /// From the products of its folds; a residual of less than this share of the torque (RMS) is as good as none.
+    /// From the products of its folds; a residual of less than this share of the torque (RMS) is as good as
+    /// none.
     pub fn new(parameters: Vec<usize>, folds: Vec<Products>, least_share: f64) -> Self {
         let mut whole = Products::zero(parameters.len() + 1);
         folds.iter().for_each(|fold| whole.add(fold));
@@ -48,7 +49,8 @@ pub(crate) struct Variant {
 /// Something that may be missing: a kind of effect on a joint or a group of joints.
 #[derive(Clone, Debug)]
 pub(crate) struct Hypothesis {
-    /// Its kind, which makes it one of a family with those of the same number. Of two that explain alike, the smaller number is the simpler.
+    /// Its kind, which makes it one of a family with those of the same number. Of two that explain alike, the
+    /// smaller number is the simpler.
     pub kind: usize,
     /// Whether it is one of the forms that others are forms of: these enter first.
     pub textbook: bool,
@@ -60,9 +62,11 @@ pub(crate) struct Hypothesis {
     pub variants: Vec<Variant>,
     /// Hypotheses that come with it: what it is a form of, or stands on top of.
     pub requires: Vec<usize>,
-    /// Whether its columns are what it does to first order only: what it can explain is seen once it is in force.
+    /// Whether its columns are what it does to first order only: what it can explain is seen once it is in
+    /// force.
     pub linearised: bool,
-    /// Whether its columns are made of the model's own effects: it says nothing in a contest with one of them.
+    /// Whether its columns are made of the model's own effects: it says nothing in a contest with one of
+    /// them.
     pub made_of_model: bool,
     /// Whether it was declared: it stays in the model, only its variant is open.
     pub declared: bool,
@@ -75,7 +79,8 @@ pub(crate) struct Member {
     pub variant: usize,
 }
 
-/// What was known before the rows: products over some parameters and a right-hand side, in units of the noise.
+/// What was known before the rows: products over some parameters and a right-hand side, in units of the
+/// noise.
 pub(crate) struct Prior {
     pub parameters: Vec<usize>,
     pub products: Products,
@@ -90,7 +95,8 @@ pub(crate) struct Problem {
     pub model: Vec<usize>,
     pub hypotheses: Vec<Hypothesis>,
     pub prior: Option<Prior>,
-    /// For each parameter the value that stands for "not there": zero, but for an effect that is in force in the signals themselves, whose absence is less of it.
+    /// For each parameter the value that stands for "not there": zero, but for an effect that is in force in
+    /// the signals themselves, whose absence is less of it.
     pub absent: Vec<f64>,
     /// Rows of each torque that the conditioning alone makes one independent row.
     pub rows_per_independent: f64,

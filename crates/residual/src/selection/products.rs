@@ -4,7 +4,8 @@ use phiw_regressor::factor::Factor;
 
 /// ΦᵀΦ of some columns, the right-hand side as the last of them.
 ///
-/// Half the digits of a triangular factor are lost. To tell candidates apart the other half is enough; the model that is chosen is fitted from factors.
+/// Half the digits of a triangular factor are lost. To tell candidates apart the other half is enough; the
+/// model that is chosen is fitted from factors.
 #[derive(Clone, Debug)]
 pub(crate) struct Products {
     size: usize,
@@ -51,7 +52,8 @@ impl Products {
         self.values.last().copied().unwrap_or_default()
     }
 
-    /// ‖Φw − f‖² for `w` as (column, value) pairs. What rounding leaves of an exact fit counts as 1e-12 of ‖f‖².
+    /// ‖Φw − f‖² for `w` as (column, value) pairs. What rounding leaves of an exact fit counts as 1e-12 of
+    /// ‖f‖².
     pub fn residual(&self, w: &[(usize, f64)]) -> f64 {
         let last = self.size - 1;
         let mut sum = self.right_hand_side();

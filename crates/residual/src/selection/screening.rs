@@ -1,4 +1,5 @@
-//! A quick look at every hypothesis: what would be gained if its columns stood beside the model's (Schur's complement).
+//! A quick look at every hypothesis: what would be gained if its columns stood beside the model's (Schur's
+//! complement).
 
 use super::criterion::price;
 use super::fit::{ABSORBED, Fit, dot};
@@ -58,7 +59,8 @@ impl Beside {
         self.parts.into_iter().next().unwrap_or_default()
     }
 
-    /// The weighted squares that the columns take away, and their values (nothing for a column that is absorbed).
+    /// The weighted squares that the columns take away, and their values (nothing for a column that is
+    /// absorbed).
     pub fn solve(&self, fit: &Fit) -> (f64, Vec<Option<f64>>) {
         let count = self.right.len();
         let mut triangle: Vec<Vec<f64>> = Vec::new();
@@ -92,7 +94,8 @@ impl Beside {
     }
 }
 
-/// What the criterion gains, to first order, where `squares` weighted squares are taken from torques of `rows` effective rows.
+/// What the criterion gains, to first order, where `squares` weighted squares are taken from torques of
+/// `rows` effective rows.
 pub(super) fn gain_of(squares: f64, rows: f64) -> f64 {
     -rows * (-(squares / rows.max(1.0)).min(1.0 - 1e-9)).ln_1p()
 }
@@ -110,7 +113,8 @@ pub(super) fn most_of(problem: &Problem, fit: &Fit, rows: &[f64], torques: &[usi
     torques.iter().map(of_torque).sum()
 }
 
-/// For every hypothesis of `open` the variant that gains most within its bounds, where one gains anything; best first.
+/// For every hypothesis of `open` the variant that gains most within its bounds, where one gains anything;
+/// best first.
 pub(super) fn screen(problem: &Problem, fit: &Fit, rows: &[f64], open: &[usize]) -> Vec<Screened> {
     let of_hypothesis = |&hypothesis: &usize| -> Option<Screened> {
         let own = &problem.hypotheses[hypothesis];

@@ -6,7 +6,8 @@ use phiw_regressor::factor::Factor;
 
 const POLICY: Policy = Policy { finalists: 12, keep_tail: 0.01, most_members: 40 };
 
-/// Torques of 400 rows in 10 folds. Columns of each: one of the model, then `kinds` candidates of one column each; all smooth random motion. `truth` names (torque, kind, value).
+/// Torques of 400 rows in 10 folds. Columns of each: one of the model, then `kinds` candidates of one column
+/// each; all smooth random motion. `truth` names (torque, kind, value).
 fn problem(
     random: &mut RandomNumbers,
     torques: usize,

@@ -15,9 +15,10 @@ pub(crate) struct Certainty {
 
 /// Wald's test of a member of the fitted model, by the larger of two tails.
 ///
-/// One takes the spread of the folds' scores, whole folds as clusters (Liang & Zeger 1986), with Student's distribution of as many degrees of freedom as there are
-/// folds but one; since several columns would need more folds than there are, it tests the scale of the fitted combination. The other takes the
-/// residual's variance with the effective rows that are in the weights, with Fisher's distribution of all columns.
+/// One takes the spread of the folds' scores, whole folds as clusters (Liang & Zeger 1986), with Student's
+/// distribution of as many degrees of freedom as there are folds but one; since several columns would need
+/// more folds than there are, it tests the scale of the fitted combination. The other takes the residual's
+/// variance with the effective rows that are in the weights, with Fisher's distribution of all columns.
 pub(crate) fn certainty(problem: &Problem, fit: &Fit, member: Member) -> Certainty {
     let nothing = Certainty { significance: 0.0, tail: 1.0 };
     let (own, inverse, values) = block(problem, fit, member);
@@ -49,7 +50,8 @@ pub(super) fn squares_of(problem: &Problem, fit: &Fit, member: Member) -> f64 {
     if own.is_empty() { 0.0 } else { model_squares(&own, &inverse, &values).unwrap_or(0.0) }
 }
 
-/// The places of a member's columns that are heard, their columns of the system's inverse, and their values less those that stand for absence.
+/// The places of a member's columns that are heard, their columns of the system's inverse, and their values
+/// less those that stand for absence.
 fn block(problem: &Problem, fit: &Fit, member: Member) -> (Vec<usize>, Vec<Vec<f64>>, Vec<f64>) {
     let parameters = problem.variant(member).parameters.iter().copied();
     let own: Vec<usize> =
@@ -70,7 +72,8 @@ fn model_squares(own: &[usize], inverse: &[Vec<f64>], values: &[f64]) -> Option<
     Some(dot(&solved, values).max(0.0))
 }
 
-/// The linear function of the member's values that is one at the fitted ones, and has the smallest variance: (Z_oo)⁻¹·v over vᵀ·(Z_oo)⁻¹·v.
+/// The linear function of the member's values that is one at the fitted ones, and has the smallest variance:
+/// (Z_oo)⁻¹·v over vᵀ·(Z_oo)⁻¹·v.
 fn weights_of_scale(own: &[usize], inverse: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
     let Some(solved) = solve_block(own, inverse, values) else { return vec![0.0; values.len()] };
     let total = dot(&solved, values);

@@ -9,8 +9,9 @@ use phiw_identification::{EffectSpec, IdentificationError};
 const REFINEMENTS: usize = 3;
 
 impl Search<'_> {
-    /// Refines the constants of all effects of the model that are not held, linearises anew what is linearised, and makes columns again that are made of the
-    /// model's torque: one pass a step, for all of them.
+    /// Refines the constants of all effects of the model that are not held, linearises anew what is
+    /// linearised, and makes columns again that are made of the model's torque: one pass a step, for all of
+    /// them.
     pub(super) fn refine(&mut self) -> Result<(), IdentificationError> {
         for step in 0..REFINEMENTS {
             let mut candidates = self.near(step)?;

@@ -36,7 +36,8 @@ pub(super) struct Present<'a> {
 }
 
 impl Candidates {
-    /// The effects of the model, each as it is. Declared effects of a held model are no candidates but part of what is held.
+    /// The effects of the model, each as it is. Declared effects of a held model are no candidates but part
+    /// of what is held.
     pub fn of_model(fixed: &Fixed<'_>, present: Present<'_>) -> Self {
         let mut candidates = Candidates { list: Vec::new(), effects: Vec::new(), present: Vec::new() };
         for (place, spec) in present.specs.iter().enumerate() {

@@ -7,21 +7,25 @@ use phiw_regressor::factor::Factor;
 
 /// When an effect is believed: the policy of a trace.
 ///
-/// `cargo xtask undeclared` is what each of these numbers is held against: how often a name is wrong on a right model, and what is missed.
+/// `cargo xtask undeclared` is what each of these numbers is held against: how often a name is wrong on a
+/// right model, and what is missed.
 #[derive(Clone, Debug)]
 pub struct TraceOptions {
-    /// Effects at most, refinements included: a bound for time and memory, far above what any robot has been found to lack.
+    /// Effects at most, refinements included: a bound for time and memory, far above what any robot has been
+    /// found to lack.
     pub most_effects: usize,
     /// Probability of naming anything on a right model, for all candidates of a run together.
     pub false_name_probability: f64,
     /// Probability at which a refinement is in the model, if it were not there.
     pub false_refinement_probability: f64,
-    /// Share of a torque's residual variance on motion held out that an effect on it must take away to have a name.
+    /// Share of a torque's residual variance on motion held out that an effect on it must take away to have a
+    /// name.
     pub least_share: f64,
-    /// The same for an effect whose torque follows the same signal of the same joint as a simpler one of the model.
+    /// The same for an effect whose torque follows the same signal of the same joint as a simpler one of the
+    /// model.
     pub least_share_of_kin: f64,
-    /// Share of what the other effects took from the same torque that it must take: the form of an effect is never quite the catalogue's, and
-    /// what mends it is no effect of its own.
+    /// Share of what the other effects took from the same torque that it must take: the form of an effect is
+    /// never quite the catalogue's, and what mends it is no effect of its own.
     pub least_of_others: f64,
     /// RMS of what an effect takes over the RMS of its torque, at least, to have a name.
     pub least_size: f64,
@@ -29,10 +33,12 @@ pub struct TraceOptions {
     pub negligible_share: f64,
     /// A residual over the noise floor by less than this factor is noise.
     pub floor_margin: f64,
-    /// A residual below this share of its torque (RMS) is no structure: filters and encoders leave as much of a right model.
+    /// A residual below this share of its torque (RMS) is no structure: filters and encoders leave as much of
+    /// a right model.
     pub structured_share: f64,
-    /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which it is structure whatever it follows: the noise of a robot's
-    /// sensors is of one colour, and raises all residuals over their floors alike.
+    /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which it
+    /// is structure whatever it follows: the noise of a robot's sensors is of one colour, and raises all
+    /// residuals over their floors alike.
     pub structured_ratio: f64,
     /// Torques whose residual is to be explained: what acts on none of them is no candidate. `None`: all.
     pub torques: Option<Vec<usize>>,

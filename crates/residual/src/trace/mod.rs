@@ -1,8 +1,9 @@
 //! Tracing a residual to the physical effects that the model lacks.
 //!
-//! All candidates' columns stand beside the model's in one pass over the logs; which of them enter is decided on what is left of the rows (`selection`). Then the
-//! constants of what was chosen are refined, columns that are made of the model's torque are made again, and all is chosen anew, until nothing changes. In
-//! the end, motion held out says what has a name.
+//! All candidates' columns stand beside the model's in one pass over the logs; which of them enter is decided
+//! on what is left of the rows (`selection`). Then the constants of what was chosen are refined, columns that
+//! are made of the model's torque are made again, and all is chosen anew, until nothing changes. In the end,
+//! motion held out says what has a name.
 
 mod constants;
 mod floor;

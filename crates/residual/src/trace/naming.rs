@@ -1,4 +1,5 @@
-//! What of the chosen effects has a name, what only refines the model, and what motion held out speaks against.
+//! What of the chosen effects has a name, what only refines the model, and what motion held out speaks
+//! against.
 
 use super::hypotheses::{Candidates, Present};
 use super::search::Search;
@@ -11,9 +12,11 @@ use std::collections::BTreeMap;
 
 /// A rival that is less probable is none.
 pub const LEAST_RIVAL: f64 = 0.05;
-/// Share of its torque that an effect must be where the other parameters have taken up most of it, over the least size.
+/// Share of its torque that an effect must be where the other parameters have taken up most of it, over the
+/// least size.
 const ABSORBED_SIZE: f64 = 3.0;
-/// RMS of what an effect takes over the RMS of its torque below which it is asked whether constants of another could do its work.
+/// RMS of what an effect takes over the RMS of its torque below which it is asked whether constants of
+/// another could do its work.
 const SMALL: f64 = 0.05;
 /// Times the residual that a held model left when it was fitted.
 const AS_IT_WAS: f64 = 1.25;
@@ -62,7 +65,8 @@ struct Judged {
 }
 
 impl Search<'_> {
-    /// The effects that were found, in the order in which they count: those that have a name, then those that refine. `self.specs` are put in that order.
+    /// The effects that were found, in the order in which they count: those that have a name, then those that
+    /// refine. `self.specs` are put in that order.
     ///
     /// What makes the error on motion held out larger is left out.
     pub(super) fn name(&mut self) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
@@ -85,8 +89,8 @@ impl Search<'_> {
         }
     }
 
-    /// The model without all that is a form of something simpler, constants refined; `None` if nothing is. A sign that turns over another speed is no effect of
-    /// its own.
+    /// The model without all that is a form of something simpler, constants refined; `None` if nothing is. A
+    /// sign that turns over another speed is no effect of its own.
     fn simple(&self, trial: &Trial) -> Result<Option<Simple>, IdentificationError> {
         let is_form = |member: &Member| {
             let hypothesis = &trial.problem.hypotheses[member.hypothesis];
@@ -107,8 +111,8 @@ impl Search<'_> {
         Ok(Some(Simple { squares: trial.held_out_squares(&trial.fit), trial, forms }))
     }
 
-    /// Asks again of small effects on joints where another effect has constants, now that these are refined without it: a sign that turns over another speed looks like
-    /// some viscous friction.
+    /// Asks again of small effects on joints where another effect has constants, now that these are refined
+    /// without it: a sign that turns over another speed looks like some viscous friction.
     fn judge_small(&self, trial: &Trial, judged: &mut [Judged]) -> Result<(), IdentificationError> {
         let all = trial.held_out_squares(&trial.fit);
         let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
@@ -237,7 +241,8 @@ impl Search<'_> {
         Ok([with, without])
     }
 
-    /// Whether a form of something simpler is worth a name of its own: it must take away most of what that leaves, and all the forms together must be a share of the torque.
+    /// Whether a form of something simpler is worth a name of its own: it must take away most of what that
+    /// leaves, and all the forms together must be a share of the torque.
     fn is_form_material(
         &self,
         trial: &Trial,
@@ -256,15 +261,17 @@ impl Search<'_> {
         })
     }
 
-    /// Whether a torque's residual is no larger than it was when the held model was fitted: then nothing has changed there since.
+    /// Whether a torque's residual is no larger than it was when the held model was fitted: then nothing has
+    /// changed there since.
     pub(super) fn is_as_it_was(&self, torque: usize, rmse: f64) -> bool {
         self.input.held.as_ref().is_some_and(|held| rmse <= AS_IT_WAS * held.residual_std[torque])
     }
 
     /// Whether what an effect takes away on motion held out is worth a name.
     ///
-    /// It must take away a share of the residual of a torque that it acts on, and be a share of that torque. Where the other parameters have taken up most of it,
-    /// it is to be seen on any torque, and must be a share of its torque by itself.
+    /// It must take away a share of the residual of a torque that it acts on, and be a share of that torque.
+    /// Where the other parameters have taken up most of it, it is to be seen on any torque, and must be a
+    /// share of its torque by itself.
     fn is_material(&self, trial: &Trial, member: Member, [initial, without, with]: [&[f64]; 3]) -> bool {
         let options = self.options;
         let hypothesis = &trial.problem.hypotheses[member.hypothesis];
@@ -367,7 +374,8 @@ impl Search<'_> {
 }
 
 impl Trial {
-    /// The fit with the declared members and those found that `stays` keeps, by their place among the model's effects.
+    /// The fit with the declared members and those found that `stays` keeps, by their place among the model's
+    /// effects.
     fn fit_with(&self, stays: impl Fn(usize) -> bool) -> Fit {
         let members: Vec<Member> = self
             .members
@@ -421,7 +429,8 @@ fn products(stage: &Stage, folds: &[GroupedFactor]) -> Vec<Products> {
     (0..stage.design.rows().len()).map(of_torque).collect()
 }
 
-/// The probability of the chosen one, and the rivals with theirs: e^(−excess/2), the criterion being twice a negative log-likelihood.
+/// The probability of the chosen one, and the rivals with theirs: e^(−excess/2), the criterion being twice a
+/// negative log-likelihood.
 fn odds(alternatives: &[(EffectSpec, f64)]) -> (f64, Vec<RivalEffect>) {
     let weigh = |excess: f64| (-0.5 * excess.max(0.0)).exp();
     let sum: f64 = 1.0 + alternatives.iter().map(|(_, excess)| weigh(*excess)).sum::<f64>();

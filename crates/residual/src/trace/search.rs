@@ -13,7 +13,8 @@ use phiw_identification::{
 
 /// Conditioned samples that are kept between passes; longer logs are read again \[bytes\].
 const KEPT_BYTES: usize = 64 << 20;
-/// Times that all is chosen anew: columns that are made of the model's torque need a second, what they bring about a third.
+/// Times that all is chosen anew: columns that are made of the model's torque need a second, what they bring
+/// about a third.
 const ROUNDS: usize = 4;
 /// Stretches that the training motion is cut into: enough for a tail probability of one in ten thousand.
 const FOLDS: usize = 20;
@@ -67,7 +68,8 @@ pub(super) struct Chosen {
     pub rows: Vec<f64>,
     /// Number of hypotheses that there were.
     pub hypotheses: usize,
-    /// For each effect that was found, what could stand in its place, and by how much the criterion is larger with it.
+    /// For each effect that was found, what could stand in its place, and by how much the criterion is larger
+    /// with it.
     pub alternatives: Vec<Vec<(EffectSpec, f64)>>,
     /// Hypotheses of which the model leaves nothing.
     pub silent: Vec<EffectSpec>,
@@ -147,7 +149,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Puts in the place of an effect what is known to first order only and, once it is in force, explains more. Whether anything was.
+    /// Puts in the place of an effect what is known to first order only and, once it is in force, explains
+    /// more. Whether anything was.
     fn contest(&mut self) -> Result<bool, IdentificationError> {
         let mut own = None;
         let mut tried = 0;

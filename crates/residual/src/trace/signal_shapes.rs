@@ -15,11 +15,13 @@ const OTHER_NODES: usize = 6;
 pub(super) const SWINGS: &str = "swings";
 /// Swings over the time that are tried.
 const LINES: usize = 2;
-/// Speeds and torques bend most near nothing: nodes stand evenly over asinh of the signal over this share of its RMS, up to this many times its RMS.
+/// Speeds and torques bend most near nothing: nodes stand evenly over asinh of the signal over this share of
+/// its RMS, up to this many times its RMS.
 const FINE: f64 = 0.05;
 const FAR: f64 = 3.0;
 
-/// Shapes over the own signals of the joint `row`; `lines` are the angular frequencies \[rad/s\] at which its residual swings.
+/// Shapes over the own signals of the joint `row`; `lines` are the angular frequencies \[rad/s\] at which its
+/// residual swings.
 pub(super) fn own_shapes(fixed: &Fixed<'_>, row: usize, ranges: &SignalRanges, lines: &[f64]) -> Vec<Shape> {
     let lines: Vec<f64> = lines.iter().copied().take(LINES).collect();
     let range = &ranges.joints[row];

@@ -74,7 +74,8 @@ impl<'a> Fixed<'a> {
         Ok(specs.iter().map(|spec| self.catalogue.build(spec, self.tree)).collect::<Result<_, _>>()?)
     }
 
-    /// For an effect that is in force through its point of linearisation, the values of its parameters that take it out of force again.
+    /// For an effect that is in force through its point of linearisation, the values of its parameters that
+    /// take it out of force again.
     pub fn absent(&self, spec: &EffectSpec) -> Result<Option<Vec<f64>>, IdentificationError> {
         let effect = self.catalogue.build(spec, self.tree)?;
         let parameters = effect.parameters();
@@ -142,7 +143,8 @@ impl<'a> Fixed<'a> {
             .collect())
     }
 
-    /// What is to be chosen from, as plain data; hypotheses and their variants are those of `candidates`, in their order.
+    /// What is to be chosen from, as plain data; hypotheses and their variants are those of `candidates`, in
+    /// their order.
     pub fn problem(
         &self,
         stage: &Stage,
@@ -207,8 +209,8 @@ impl<'a> Fixed<'a> {
         })
     }
 
-    /// Candidates that a URDF has a place for, on the same joint and followed by the same signal: of these another is a form. Nothing where the model is held: they
-    /// are in what is held.
+    /// Candidates that a URDF has a place for, on the same joint and followed by the same signal: of these
+    /// another is a form. Nothing where the model is held: they are in what is held.
     fn required(
         &self,
         candidates: &Candidates,

@@ -49,7 +49,8 @@ pub struct FoundEffect {
     pub explains: f64,
     /// Its probability against its rivals.
     pub confidence: f64,
-    /// Share of the stretches of training motion whose error is smaller with it; after bootstrap draws, the share of draws that name it.
+    /// Share of the stretches of training motion whose error is smaller with it; after bootstrap draws, the
+    /// share of draws that name it.
     pub stability: f64,
     /// Standard deviations from nothing.
     pub significance: f64,
@@ -68,7 +69,8 @@ pub struct Remaining {
     pub depends_on: Vec<Dependence>,
     /// The best candidates that were not good enough.
     pub ranking: Vec<Ranked>,
-    /// What these logs cannot tell: candidates of which the motion leaves nothing beside the model's own columns.
+    /// What these logs cannot tell: candidates of which the motion leaves nothing beside the model's own
+    /// columns.
     pub silent: Vec<EffectSpec>,
 }
 
@@ -84,10 +86,12 @@ pub struct Tracing {
     pub before: (TorqueError, TorqueError),
     /// The effects that were added and have a name, in order.
     pub effects: Vec<FoundEffect>,
-    /// Effects that were added behind them: certain, but they only polish the form of others or are too small for a name.
+    /// Effects that were added behind them: certain, but they only polish the form of others or are too small
+    /// for a name.
     pub refinements: Vec<FoundEffect>,
     /// What is left.
     pub remaining: Remaining,
-    /// Kinds and joints of which some constants could not be judged, since their columns are not finite on these logs.
+    /// Kinds and joints of which some constants could not be judged, since their columns are not finite on
+    /// these logs.
     pub not_judged: Vec<(String, Vec<String>)>,
 }

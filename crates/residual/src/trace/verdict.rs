@@ -51,7 +51,8 @@ impl Search<'_> {
         Ok(Tracing { verdict, specs: self.specs, model, before, effects, refinements, remaining, not_judged })
     }
 
-    /// Whether other constants of the declared effects make the error on motion held out larger than it was with those that were declared.
+    /// Whether other constants of the declared effects make the error on motion held out larger than it was
+    /// with those that were declared.
     fn is_worse_than(&self, declared: &TorqueError) -> Result<bool, IdentificationError> {
         let design = self.design()?;
         let data = self.fixed.data;
@@ -70,7 +71,8 @@ impl Search<'_> {
         errors(&train, &held_out, parameters)
     }
 
-    /// Which residuals have structure, and what they follow: what motion foretells on data that were not fitted.
+    /// Which residuals have structure, and what they follow: what motion foretells on data that were not
+    /// fitted.
     fn remaining(
         &self,
         held_out: &[GroupedFactor],
