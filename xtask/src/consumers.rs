@@ -1,12 +1,14 @@
-//! Published crates as a new user meets them: the examples of each `README.md`, compiled and run in a workspace outside of this one.
+//! Published crates as a new user meets them: the examples of each `README.md`, compiled and run in a
+//! workspace outside of this one.
 
 use anyhow::Context;
 use phiw_experiments::environment;
 use serde_json::Value;
 use std::{collections::BTreeSet, fs, path::Path};
 
-/// Writes a workspace into `folder`, with a crate for each published crate that uses it as its README does. What is returned are published crates without an example
-/// that can be run, or with metadata that are not complete: one line each.
+/// Writes a workspace into `folder`, with a crate for each published crate that uses it as its README does.
+/// What is returned are published crates without an example that can be run, or with metadata that are not
+/// complete: one line each.
 pub fn generate(folder: &Path) -> anyhow::Result<Vec<String>> {
     let mut problems = Vec::new();
     let metadata = ["metadata", "--no-deps", "--offline", "--format-version", "1"];
@@ -24,7 +26,8 @@ pub fn generate(folder: &Path) -> anyhow::Result<Vec<String>> {
             Err(problem) => problems.push(format!("README.md of {name}: {problem}")),
         }
     }
-    // The same versions and profiles, so that what others wrote is compiled once. Ours need no optimisation for an example.
+    // The same versions and profiles, so that what others wrote is compiled once. Ours need no optimisation
+    // for an example.
     let root = environment::workspace_root()?;
     let manifest = fs::read_to_string(root.join("Cargo.toml"))?;
     let shared = |section: &&str| {
@@ -40,7 +43,8 @@ pub fn generate(folder: &Path) -> anyhow::Result<Vec<String>> {
     Ok(problems)
 }
 
-/// The call of cargo that compiles and runs the examples. All that they depend on has been fetched for this workspace: no network.
+/// The call of cargo that compiles and runs the examples. All that they depend on has been fetched for this
+/// workspace: no network.
 pub fn arguments(folder: &Path) -> anyhow::Result<Vec<String>> {
     let manifest = folder.join("Cargo.toml").display().to_string();
     let target = environment::target_directory()?.display().to_string();
@@ -49,7 +53,8 @@ pub fn arguments(folder: &Path) -> anyhow::Result<Vec<String>> {
     Ok(before.into_iter().chain(after).map(str::to_owned).collect())
 }
 
-/// A crate whose only target is the test `tests`. It depends on what the examples name, of the crate itself and what that uses or is tested with.
+/// A crate whose only target is the test `tests`. It depends on what the examples name, of the crate itself
+/// and what that uses or is tested with.
 fn write_crate(folder: &Path, name: &str, package: &Value, tests: &str) -> anyhow::Result<()> {
     let all = package["dependencies"].as_array().into_iter().flatten();
     let named = |other: &&str| tests.contains(&format!("{}::", other.replace('-', "_")));
@@ -67,8 +72,9 @@ fn write_crate(folder: &Path, name: &str, package: &Value, tests: &str) -> anyho
     Ok(fs::write(folder.join("README.rs"), tests)?)
 }
 
-/// Each block of Rust as a test of its own, every line where it is in the README, so that what rustc and a panic say of a line is true of the README.
-/// A README without any, or with one that would not be run, is an error.
+/// Each block of Rust as a test of its own, every line where it is in the README, so that what rustc and a
+/// panic say of a line is true of the README. A README without any, or with one that would not be run, is an
+/// error.
 fn examples(readme: &str, name: &str) -> Result<String, String> {
     let (mut tests, mut start) = (String::new(), None);
     for (number, line) in (1..).zip(readme.lines()) {

@@ -18,11 +18,13 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// The main job: a curriculum with the loop closed, then `phiw explain`, on motions and logs that are made on the spot; with reports.
+    /// The main job: a curriculum with the loop closed, then `phiw explain`, on motions and logs that are
+    /// made on the spot; with reports.
     Run(run::Arguments),
     /// A log as long as wanted, to see that memory does not grow with it.
     SyntheticLog(synthetic_log::Arguments),
-    /// Retargeting on one page: whole databases, a film of person and robot, mink on the same markers, figure 9 of the paper.
+    /// Retargeting on one page: whole databases, a film of person and robot, mink on the same markers, figure
+    /// 9 of the paper.
     Retarget(retarget::Arguments),
     /// All checks of the workspace, and the count of tests.
     Test(test::Arguments),
@@ -30,7 +32,8 @@ enum Task {
     Torture(torture::Arguments),
     /// Fetch MuJoCo's library into the user's cache folder, with Python's pip.
     Mujoco(mujoco::Arguments),
-    /// Compare dynamics with Pinocchio and C3D files with ezc3d, installed from PyPI into a private environment.
+    /// Compare dynamics with Pinocchio and C3D files with ezc3d, installed from PyPI into a private
+    /// environment.
     Oracle(oracle::Arguments),
     /// Robot logs with effects that nobody declared: generate, trace with `phiw explain`, score.
     Undeclared(undeclared::Arguments),

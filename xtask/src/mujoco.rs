@@ -1,4 +1,5 @@
-//! `cargo xtask mujoco`: fetches MuJoCo's library from PyPI, pinned and checked, into the user's cache folder.
+//! `cargo xtask mujoco`: fetches MuJoCo's library from PyPI, pinned and checked, into the user's cache
+//! folder.
 
 use anyhow::{Context, bail, ensure};
 use phiw_sim_mujoco::{LIBRARY_FILE_NAME, MujocoError, VERSION, find_library, library_cache_path};
@@ -57,7 +58,8 @@ const WHEELS: [Wheel; 4] = [
 /// Fetches the library unless it is there, and says where it is.
 ///
 /// # Errors
-/// There is no wheel for this platform, pip can not fetch it, it is not the pinned one, or the library in it does not load.
+/// There is no wheel for this platform, pip can not fetch it, it is not the pinned one, or the library in it
+/// does not load.
 pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let path = fetch(&arguments.python)?;
     println!("MuJoCo {VERSION} is in {}", path.display());

@@ -35,7 +35,8 @@ const CHECKS: [Check; 3] = [
     },
 ];
 
-/// Licences, duplicates and sources of what is linked, by `deny.toml`. Advisories are left out: they need a network.
+/// Licences, duplicates and sources of what is linked, by `deny.toml`. Advisories are left out: they need a
+/// network.
 const DEPENDENCIES: Check =
     Check { arguments: &["deny", "check", "licenses", "bans", "sources"], environment: &[] };
 

@@ -1,4 +1,5 @@
-//! `cargo xtask torture`: hostile inputs, kills and concurrent runs on the release binary, and tables of what came of them.
+//! `cargo xtask torture`: hostile inputs, kills and concurrent runs on the release binary, and tables of what
+//! came of them.
 
 use anyhow::{Context, ensure};
 use phiw_experiments::environment;

@@ -42,7 +42,8 @@ impl fmt::Display for Artefact {
 }
 
 impl MarkerRecording {
-    /// Takes samples of these markers that are no measurements for missing ones, and says which; markers are indices of labels.
+    /// Takes samples of these markers that are no measurements for missing ones, and says which; markers are
+    /// indices of labels.
     ///
     /// Frozen markers stay where they are [most](MarkerSettings::still_share) of all.
     pub fn remove_artefacts(&mut self, markers: &[usize], settings: &MarkerSettings) -> Vec<Artefact> {
@@ -85,8 +86,8 @@ impl MarkerRecording {
         markers.iter().copied().filter(is_frozen).collect()
     }
 
-    /// In how many frames a marker is at one and the same place, if it is there in more than half of the frames that show it; else a number
-    /// that is no more than half.
+    /// In how many frames a marker is at one and the same place, if it is there in more than half of the
+    /// frames that show it; else a number that is no more than half.
     fn frames_at_one_place(&self, marker: usize) -> usize {
         // Boyer and Moore's vote: the place of the majority, if there is one.
         let (mut place, mut votes) = ([f64::NAN; 3], 0_usize);
@@ -132,8 +133,8 @@ impl MarkerRecording {
         Some(Artefact { marker, kind, samples: frames.len(), first_frame: first + 1 })
     }
 
-    /// The diagonal of the box around those of these markers that a frame shows, at least four: the median over the frames \[m\]. None without
-    /// such a frame.
+    /// The diagonal of the box around those of these markers that a frame shows, at least four: the median
+    /// over the frames \[m\]. None without such a frame.
     pub fn extent_m(&self, markers: &[usize]) -> Option<f64> {
         let diagonal = |frame: &[[f64; 3]]| {
             let seen =

@@ -1,10 +1,11 @@
 //! Derivatives of sampled trajectories by backward differences, equation (16).
 
-/// Velocities and accelerations of a sampled trajectory as the paper takes them (16): zero at the first sample, then
-/// differences with the sample before.
+/// Velocities and accelerations of a sampled trajectory as the paper takes them (16): zero at the first
+/// sample, then differences with the sample before.
 ///
-/// `positions`, `velocities`, `accelerations`: sample by sample, `dimension` values each; units are those of the positions, per
-/// s and s². For smooth results take the analytic derivatives of a [`Curve`](crate::bspline::Curve) instead.
+/// `positions`, `velocities`, `accelerations`: sample by sample, `dimension` values each; units are those of
+/// the positions, per s and s². For smooth results take the analytic derivatives of a
+/// [`Curve`](crate::bspline::Curve) instead.
 ///
 /// # Errors
 /// A slice's length is not that of the positions, or the positions are not a whole number of samples.

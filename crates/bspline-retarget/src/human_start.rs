@@ -1,9 +1,10 @@
 //! Where the human starts: the markers followed pose by pose, one control point after the other.
 //!
-//! Lengths and markers' places are held at what is known of them, which is rough: a shoulder may be centimetres off. How a segment
-//! is turned its markers tell all the same, from where they are to each other. So that counts fully here, and where they are as a
-//! whole counts little. Joints stay inside anatomical ranges, since a wrist that is turned once around fits a hand's markers, too.
-//! Thus the solver starts in the right valley; it mends the rest.
+//! Lengths and markers' places are held at what is known of them, which is rough: a shoulder may be
+//! centimetres off. How a segment is turned its markers tell all the same, from where they are to each other.
+//! So that counts fully here, and where they are as a whole counts little. Joints stay inside anatomical
+//! ranges, since a wrist that is turned once around fits a hand's markers, too. Thus the solver starts in the
+//! right valley; it mends the rest.
 
 use crate::human::HumanScratch;
 use crate::pose_search::PoseSearch;
@@ -18,7 +19,8 @@ const STAY: f64 = 1e-4;
 /// Weight of where the markers of a segment are as a whole, against where they are to each other.
 const WHOLE: f64 = 0.05;
 
-/// The variables with the human's part replaced. The first pose moves joints that keep still over the recording, too.
+/// The variables with the human's part replaced. The first pose moves joints that keep still over the
+/// recording, too.
 pub(crate) fn human_start(problem: &Problem<'_>, mut variables: Vec<f64>) -> Vec<f64> {
     let (n, points) = (problem.coordinates(), problem.basis().control_points());
     let body = problem.body;

@@ -6,23 +6,25 @@ use std::ops::RangeInclusive;
 /// What tells samples that are no measurements from a person's motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MarkerSettings {
-    /// What is far off for a coordinate of a marker \[m\]. Where markers rest, cameras' glitches of a few millimetres are many times what is usual
-    /// there, and do no harm: only what is off by more than 50 mm counts.
+    /// What is far off for a coordinate of a marker \[m\]. Where markers rest, cameras' glitches of a few
+    /// millimetres are many times what is usual there, and do no harm: only what is off by more than 50 mm
+    /// counts.
     pub spikes: SpikeSettings,
-    /// A marker is frozen if it is at one and the same place, to the last bit, in more than this share of the frames that show it (0.5 to 1). The
-    /// rest may be spikes. No marker of 148 real recordings is at one place in half of its frames.
+    /// A marker is frozen if it is at one and the same place, to the last bit, in more than this share of the
+    /// frames that show it (0.5 to 1). The rest may be spikes. No marker of 148 real recordings is at one
+    /// place in half of its frames.
     pub frozen_share: f64,
-    /// Where this share of the markers or more is frozen (0 to 1), nothing tells a recording that hangs from a person who stands still:
-    /// they are left in, and such a recording is no motion.
+    /// Where this share of the markers or more is frozen (0 to 1), nothing tells a recording that hangs from
+    /// a person who stands still: they are left in, and such a recording is no motion.
     pub still_share: f64,
-    /// How large the box around a person's markers is, from corner to corner \[m\]: those of one arm alone, and those of the tallest with arms
-    /// stretched.
+    /// How large the box around a person's markers is, from corner to corner \[m\]: those of one arm alone,
+    /// and those of the tallest with arms stretched.
     pub person_m: RangeInclusive<f64>,
 }
 
 impl Default for MarkerSettings {
-    /// Of 144 recordings of `ue_adl` and four with gaps these take out two samples of one, where two markers change places (`cargo test -p
-    /// phiw-bspline-retarget --test artefacts`).
+    /// Of 144 recordings of `ue_adl` and four with gaps these take out two samples of one, where two markers
+    /// change places (`cargo test -p phiw-bspline-retarget --test artefacts`).
     fn default() -> Self {
         MarkerSettings {
             spikes: SpikeSettings { smallest: 0.05, ..SpikeSettings::default() },

@@ -1,4 +1,5 @@
-//! CSV of named points: `t` \[s\] and for each point `<name>.x`, `<name>.y`, `<name>.z`, in metres if nothing else is said.
+//! CSV of named points: `t` \[s\] and for each point `<name>.x`, `<name>.y`, `<name>.z`, in metres if nothing
+//! else is said.
 
 use crate::recording::{MarkerRecording, RATES_HZ, RecordingError, metres};
 use std::path::Path;
@@ -6,10 +7,12 @@ use std::path::Path;
 /// Largest deviation of a time step from their mean, as a share of it.
 const STEP_TOLERANCE: f64 = 0.02;
 
-/// Reads a table of points at a constant rate, in `units` or else in metres; an empty or NaN cell is a missing point.
+/// Reads a table of points at a constant rate, in `units` or else in metres; an empty or NaN cell is a
+/// missing point.
 ///
 /// # Errors
-/// The file cannot be read, a column or a cell is wrong, the times are not equally spaced or no camera's, or the unit is not known.
+/// The file cannot be read, a column or a cell is wrong, the times are not equally spaced or no camera's, or
+/// the unit is not known.
 pub fn read_point_csv(path: &Path, units: Option<&str>) -> Result<MarkerRecording, RecordingError> {
     let file = std::fs::File::open(path)
         .map_err(|source| RecordingError::Unreadable { path: path.into(), source })?;

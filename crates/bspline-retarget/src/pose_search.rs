@@ -49,7 +49,8 @@ impl PoseSearch {
         &self.bounds
     }
 
-    /// Improves a pose by at most so many steps; returns its cost. `evaluate` gives the cost of a pose and, if asked, its slopes.
+    /// Improves a pose by at most so many steps; returns its cost. `evaluate` gives the cost of a pose and,
+    /// if asked, its slopes.
     pub fn run(
         &mut self,
         pose: &mut [f64],

@@ -11,7 +11,8 @@ pub struct Quality {
     pub marker_rms_m: f64,
     /// The same for each marker by itself; NaN for one that was never seen.
     pub each_marker_rms_m: Vec<(String, f64)>,
-    /// RMS distance of the robot's elbows from the human's, at the robot's size and seen from the shoulder \[m\].
+    /// RMS distance of the robot's elbows from the human's, at the robot's size and seen from the shoulder
+    /// \[m\].
     pub elbow_rms_m: f64,
     /// The same for the hands \[m\].
     pub hand_rms_m: f64,

@@ -1,7 +1,8 @@
 //! Torso and head for recordings that hold neither: gaze-and-reach coordination.
 //!
-//! The trunk turns and leans towards what the hand reaches for, the more the further it is from the shoulder, and the head looks at the hand that works.
-//! Which hand does, its speed tells. The constants below are plausible, not measured: what they make is named as theirs in the output.
+//! The trunk turns and leans towards what the hand reaches for, the more the further it is from the shoulder,
+//! and the head looks at the hand that works. Which hand does, its speed tells. The constants below are
+//! plausible, not measured: what they make is named as theirs in the output.
 
 use crate::problem::Problem;
 use crate::robot::{RobotModel, norm};
@@ -20,7 +21,8 @@ const ATTENTION_S: f64 = 0.5;
 /// Speed of a hand that is at rest \[m/s\].
 const IDLE_SPEED: f64 = 0.05;
 
-/// For the torso's and the head's correspondence, if the robot has them, the vectors that they should have in each sample.
+/// For the torso's and the head's correspondence, if the robot has them, the vectors that they should have in
+/// each sample.
 pub(crate) fn targets(
     problem: &Problem<'_>,
     robot: &RobotModel,

@@ -4,8 +4,8 @@ use crate::{MarkerRecording, RecordingError};
 use phiw_limits::Limits;
 use std::path::Path;
 
-/// Reads a recording as it is: C3D, or CSV of named points if the name ends so. `units` replaces what the file says of its unit; a CSV says
-/// nothing and is in metres.
+/// Reads a recording as it is: C3D, or CSV of named points if the name ends so. `units` replaces what the
+/// file says of its unit; a CSV says nothing and is in metres.
 ///
 /// [`crate::Retargeter::read`] looks at the numbers, too.
 ///

@@ -29,7 +29,8 @@ impl MarkerRecording {
         self.positions_m[frame * self.labels.len() + marker]
     }
 
-    /// The marker of this name: as it is, or behind a subject's prefix (`Anna:LSHO`) that no two markers share.
+    /// The marker of this name: as it is, or behind a subject's prefix (`Anna:LSHO`) that no two markers
+    /// share.
     pub fn marker(&self, name: &str) -> Option<usize> {
         if let Some(index) = self.labels.iter().position(|label| label == name) {
             return Some(index);
@@ -55,7 +56,8 @@ impl MarkerRecording {
     }
 }
 
-/// Rates that cameras have \[Hz\]. Any other is a mistake of whoever wrote the file, and would stretch the motion with it.
+/// Rates that cameras have \[Hz\]. Any other is a mistake of whoever wrote the file, and would stretch the
+/// motion with it.
 pub(crate) const RATES_HZ: RangeInclusive<f64> = 1.0..=100_000.0;
 
 /// Length of a unit \[m\].

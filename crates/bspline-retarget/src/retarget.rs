@@ -31,11 +31,11 @@ pub struct RetargetOptions {
     pub weights: Weights,
     /// When the solver stops.
     pub iterations: Iterations,
-    /// Whether torso and head of the robot follow the reach and gaze of the hands instead of the person's: for recordings
-    /// that hold none of them.
+    /// Whether torso and head of the robot follow the reach and gaze of the hands instead of the person's:
+    /// for recordings that hold none of them.
     pub torso_from_reach: bool,
-    /// The largest RMS distance \[m\] of the markers from the person that is still a fit. The worst of 302 recordings has 0.0098
-    /// (`cargo xtask retarget databases`).
+    /// The largest RMS distance \[m\] of the markers from the person that is still a fit. The worst of 302
+    /// recordings has 0.0098 (`cargo xtask retarget databases`).
     pub largest_marker_rms_m: f64,
     /// What tells samples that are no measurements.
     pub markers: MarkerSettings,
@@ -127,8 +127,8 @@ impl Retargeted {
         1.0 / self.rate_hz
     }
 
-    /// Positions \[rad, m\], velocities and accelerations of the robot at the recording's frames, row-major `[frame × joint]`: what a log of the motion, or a
-    /// motion to choose from, is made of.
+    /// Positions \[rad, m\], velocities and accelerations of the robot at the recording's frames, row-major
+    /// `[frame × joint]`: what a log of the motion, or a motion to choose from, is made of.
     pub fn signals(&self) -> [Vec<f64>; 3] {
         let joints = self.robot.dimension();
         let mut scratch = vec![0.0; self.robot.basis().degree() + 1];
@@ -164,10 +164,12 @@ impl Retargeter {
         &self.options
     }
 
-    /// Reads a recording, a motion or a static trial, in the map's unit; what is no measurement is taken out, and comes back as a list.
+    /// Reads a recording, a motion or a static trial, in the map's unit; what is no measurement is taken out,
+    /// and comes back as a list.
     ///
     /// # Errors
-    /// [`RecordingError`]: the file cannot be read, or the map's markers are no person's by [`MarkerSettings::person_m`].
+    /// [`RecordingError`]: the file cannot be read, or the map's markers are no person's by
+    /// [`MarkerSettings::person_m`].
     pub fn read(&self, path: &Path) -> Result<(MarkerRecording, Vec<Artefact>), RecordingError> {
         let mut recording = read_recording(path, self.map.units.as_deref())?;
         let (markers, settings) = (self.map.markers(&recording), &self.options.markers);
@@ -191,8 +193,8 @@ impl Retargeter {
         Err(RetargetError::Frozen { frozen: recording.frozen(&markers, settings).len(), seen })
     }
 
-    /// What a static trial tells: the lengths and the pose that fit the markers whose place the map gives, and from them the
-    /// places of all.
+    /// What a static trial tells: the lengths and the pose that fit the markers whose place the map gives,
+    /// and from them the places of all.
     ///
     /// # Errors
     /// The map does not fit the recording.
@@ -250,7 +252,8 @@ impl Retargeter {
         Ok(Basis::uniform(self.options.degree, spans + self.options.degree, 0.0, duration)?)
     }
 
-    /// The person of a recording, by the markers alone: places of markers that shift are told here, and held from then on.
+    /// The person of a recording, by the markers alone: places of markers that shift are told here, and held
+    /// from then on.
     ///
     /// # Errors
     /// The map does not fit the recording, or this is too short.
@@ -288,7 +291,8 @@ impl Retargeter {
         })
     }
 
-    /// Variables of a person's problem with the markers followed pose by pose, as if they sat where they are known to.
+    /// Variables of a person's problem with the markers followed pose by pose, as if they sat where they are
+    /// known to.
     fn followed(
         &self,
         recording: &MarkerRecording,
@@ -323,7 +327,8 @@ impl Retargeter {
         robot_start(problem, &self.robot, person.variables(problem))
     }
 
-    /// Everything at rest, or the human in the static trial's pose, where the markers are: a start that knows nothing of the motion.
+    /// Everything at rest, or the human in the static trial's pose, where the markers are: a start that knows
+    /// nothing of the motion.
     pub fn placed_at_rest(&self, problem: &Problem<'_>, calibration: Option<&Calibration>) -> Vec<f64> {
         start(problem, calibration)
     }

@@ -64,7 +64,8 @@ pub enum RetargetError {
     NoFit(f64),
 }
 
-/// A motion from which the markers are further than `largest_rms_m` \[m\] is none. What is not a number is not near, either.
+/// A motion from which the markers are further than `largest_rms_m` \[m\] is none. What is not a number is
+/// not near, either.
 pub(crate) fn check_near(quality: &Quality, largest_rms_m: f64) -> Result<(), RetargetError> {
     let rms_m = quality.marker_rms_m;
     let near = rms_m <= largest_rms_m;

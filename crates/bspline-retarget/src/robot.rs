@@ -72,7 +72,8 @@ pub enum RobotError {
     Joint(String),
 }
 
-/// One line of the correspondence: a vector between two points of the robot, and the human's that it should equal.
+/// One line of the correspondence: a vector between two points of the robot, and the human's that it should
+/// equal.
 #[derive(Clone, Debug)]
 pub(crate) struct Correspondence {
     pub from: BodyPoint,
@@ -95,8 +96,9 @@ pub struct RobotModel {
     pub(crate) head: Option<usize>,
 }
 
-/// Weight of torso and head against a hand. With w_g = 100 it is about that of a marker, so small enough that markers say how the person
-/// sits and looks where the robot can not follow, and large enough that it follows where it can.
+/// Weight of torso and head against a hand. With w_g = 100 it is about that of a marker, so small enough that
+/// markers say how the person sits and looks where the robot can not follow, and large enough that it follows
+/// where it can.
 const DIRECTION_WEIGHT: f64 = 0.001;
 
 impl RobotModel {
@@ -254,8 +256,8 @@ impl Chains {
         Chains { trunk, arms, head: head.unwrap_or_default() }
     }
 
-    /// Shoulder at the second joint, elbow at the fourth, wrist at the last but one (the last, if the arm has few), hand at the last
-    /// link's centre of mass or a hand's breadth further.
+    /// Shoulder at the second joint, elbow at the fourth, wrist at the last but one (the last, if the arm has
+    /// few), hand at the last link's centre of mass or a hand's breadth further.
     fn arm(&self, tree: &Tree, placements: &[Placement<f64>], side: Side) -> Option<Arm> {
         let chain = &self.arms[usize::from(side == Side::Right)];
         let &last = chain.last()?;

@@ -14,7 +14,8 @@ const STEPS: (usize, usize) = (40, 8);
 const STAY: f64 = 1e-4;
 const REST: f64 = 1e-4;
 
-/// The variables with the robot's part replaced: at each control point it follows the human as well as it can.
+/// The variables with the robot's part replaced: at each control point it follows the human as well as it
+/// can.
 pub(crate) fn robot_start(problem: &Problem<'_>, robot: &RobotModel, mut variables: Vec<f64>) -> Vec<f64> {
     let (n, joints) = (problem.coordinates(), robot.tree().joint_count());
     let mut scratch = problem.pose_scratch();

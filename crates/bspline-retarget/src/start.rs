@@ -29,8 +29,8 @@ pub(crate) fn start(problem: &Problem<'_>, calibration: Option<&Calibration>) ->
 /// Weight of a control point to be at the pose itself, against the curve's going through it.
 const AT_POSE: f64 = 0.02;
 
-/// Replaces coordinates from `first` on by those of a curve that goes through poses, one for each control point, near where that pulls
-/// most.
+/// Replaces coordinates from `first` on by those of a curve that goes through poses, one for each control
+/// point, near where that pulls most.
 pub(crate) fn through(problem: &Problem<'_>, poses: &[Vec<f64>], variables: &mut [f64], first: usize) {
     let (n, basis) = (problem.coordinates(), problem.basis());
     let order = basis.degree() + 1;
@@ -67,8 +67,8 @@ pub(crate) fn through(problem: &Problem<'_>, poses: &[Vec<f64>], variables: &mut
     }
 }
 
-/// Turns the body about the vertical and moves it so that its markers at rest lie on those that are seen: for each control point of
-/// its own if the pelvis moves.
+/// Turns the body about the vertical and moves it so that its markers at rest lie on those that are seen: for
+/// each control point of its own if the pelvis moves.
 pub(crate) fn align(problem: &Problem<'_>, variables: &mut [f64]) {
     let (n, points) = (problem.coordinates(), problem.basis().control_points());
     let body = problem.body;
@@ -107,7 +107,8 @@ pub(crate) fn align(problem: &Problem<'_>, variables: &mut [f64]) {
     }
 }
 
-/// x, y, z and yaw that bring points at rest to those measured (least squares about the vertical); `None` if they are fewer than two.
+/// x, y, z and yaw that bring points at rest to those measured (least squares about the vertical); `None` if
+/// they are fewer than two.
 fn pose(seen: &[(Vec3<f64>, Vec3<f64>)]) -> Option<[f64; 4]> {
     if seen.len() < 2 {
         return None;

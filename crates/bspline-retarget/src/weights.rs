@@ -9,8 +9,8 @@ pub struct Weights {
     pub limits: f64,
     /// As `limits`, for velocities beyond theirs \[rad²/s²\]; zero leaves them out.
     pub velocity_limits: f64,
-    /// Standard deviation of a marker \[m\], against which what is known beforehand is weighed: lengths ξ^h against those of adults,
-    /// joints of the human against their rest.
+    /// Standard deviation of a marker \[m\], against which what is known beforehand is weighed: lengths ξ^h
+    /// against those of adults, joints of the human against their rest.
     pub marker_deviation_m: f64,
     /// Robot joints away from zero \[rad²\], for each sample: decides where points leave a joint free.
     pub robot_posture: f64,

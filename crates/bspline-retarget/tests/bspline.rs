@@ -63,7 +63,8 @@ proptest! {
     fn every_derivative_is_the_slope_of_the_one_below(basis in basis(), share in 0.0f64..1.0) {
         let (start, end) = basis.domain();
         let t = start + share * (end - start);
-        // A piece is a polynomial: its central difference is exact to the third derivative, if no knot is between.
+        // A piece is a polynomial: its central difference is exact to the third derivative, if no knot is
+        // between.
         let step = 1e-4;
         prop_assume!(basis.first(t - step) == basis.first(t + step));
         for order in 1..=basis.degree() {

@@ -114,7 +114,8 @@ fn wrong_files_get_an_error_that_says_what_is_wrong() {
     assert!(matches!(spoiled(&[(515, &[9])]), Err(C3dError::Processor { found: 9, at: 515 })));
     assert!(matches!(spoiled(&[(0, &[1])]), Err(C3dError::ParameterSection { .. })));
     assert!(matches!(spoiled(&[(0, &[200])]), Err(C3dError::Truncated { .. })));
-    // The section lies about its length: an entry that points behind the file, and one that points into itself.
+    // The section lies about its length: an entry that points behind the file, and one that points into
+    // itself.
     assert!(matches!(spoiled(&[(523, &[0xff, 0xff])]), Err(C3dError::Truncated { .. })));
     assert!(matches!(spoiled(&[(523, &[1, 0])]), Err(C3dError::ParameterSection { at: 523, .. })));
     assert!(matches!(spoiled(&[(data_of("USED"), &[0, 0])]), Err(C3dError::Empty { what: "points" })));

@@ -1,4 +1,5 @@
-//! The regressor and the ZMP over a backend's own kinematics: what they say must be what the backend's own dynamics says.
+//! The regressor and the ZMP over a backend's own kinematics: what they say must be what the backend's own
+//! dynamics says.
 
 use crate::dynamics::{over_states, predicted_force};
 use crate::measured::{relative_difference, worse};
@@ -52,7 +53,8 @@ where
     Measured::check("axes of joints against the tree's", largest, AGREEMENT, "")
 }
 
-/// The motion of every body at random states is that of [`Tree`]: its placement in its parent, velocity and acceleration.
+/// The motion of every body at random states is that of [`Tree`]: its placement in its parent, velocity and
+/// acceleration.
 ///
 /// # Errors
 /// The largest difference, over the largest number of its kind over all bodies, is above 1e-9.
@@ -93,8 +95,8 @@ fn numbers_by_kind(motions: &[BodyMotion<f64>]) -> [Vec<f64>; 5] {
     kinds
 }
 
-/// Φw = τ over the backend's own kinematics: the joint torque regressor of the motion that the backend computes, times the tree's
-/// parameters, is the backend's own inverse dynamics.
+/// Φw = τ over the backend's own kinematics: the joint torque regressor of the motion that the backend
+/// computes, times the tree's parameters, is the backend's own inverse dynamics.
 ///
 /// # Errors
 /// The largest difference, over the largest force of its state, is above 1e-9.
@@ -121,8 +123,8 @@ where
     Measured::check("Φw over the backend's kinematics against inverse dynamics", largest, AGREEMENT, "")
 }
 
-/// The wrench that the ZMP comes from, over the backend's own kinematics: summed over the bodies, and as the linear map of the
-/// parameters, it is the backend's own base wrench.
+/// The wrench that the ZMP comes from, over the backend's own kinematics: summed over the bodies, and as the
+/// linear map of the parameters, it is the backend's own base wrench.
 ///
 /// # Errors
 /// The largest difference, over the largest component of its state, is above 1e-9.

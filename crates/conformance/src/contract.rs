@@ -65,7 +65,8 @@ pub fn inverse_dynamics_keeps_state(build: &Builder, tree: &Tree) -> Result<Meas
     Measured::check("change of the state by inverse and forward dynamics", change, 0.0, "")
 }
 
-/// Motions and forces of the wrong length are the errors that [`DynamicsBackend`] names, and do not disturb what comes after.
+/// Motions and forces of the wrong length are the errors that [`DynamicsBackend`] names, and do not disturb
+/// what comes after.
 ///
 /// # Errors
 /// What was accepted, or refused with another error.
@@ -89,8 +90,8 @@ pub fn wrong_motion_is_refused<B: DynamicsBackend + ?Sized>(
     Measured::check("change of inverse dynamics by what is refused", change, 0.0, "")
 }
 
-/// States of the wrong length, NaN, a quaternion that is not unit and a time step that is not positive are the errors that
-/// [`SimulationBackend`] names, and change nothing.
+/// States of the wrong length, NaN, a quaternion that is not unit and a time step that is not positive are
+/// the errors that [`SimulationBackend`] names, and change nothing.
 ///
 /// # Errors
 /// What was accepted, or refused with another error.

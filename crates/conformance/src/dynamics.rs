@@ -6,7 +6,8 @@ use phiw_dynamics::random_tree::{RandomNumbers, RandomState, random_state};
 use phiw_dynamics::{AnalyticBackend, DimensionError, DynamicsBackend, Tree, World};
 use phiw_regressor::JointTorqueRegressor;
 
-/// Largest difference between two ways to compute the same force or acceleration, relative to its largest element.
+/// Largest difference between two ways to compute the same force or acceleration, relative to its largest
+/// element.
 const AGREEMENT: f64 = 1e-8;
 
 /// Inverse dynamics at random states inside the joint limits is that of [`AnalyticBackend`].
@@ -103,8 +104,8 @@ pub(crate) fn predicted_force(
     Ok(rows.map(|row| row.iter().zip(parameters).map(|(x, w)| x * w).sum()).collect())
 }
 
-/// A rotor's inertia stands on the diagonal of the mass matrix, in inverse and in forward dynamics, and gives the base no
-/// wrench.
+/// A rotor's inertia stands on the diagonal of the mass matrix, in inverse and in forward dynamics, and gives
+/// the base no wrench.
 ///
 /// # Errors
 /// The largest difference, over the largest force or acceleration of its state, is above 1e-8.

@@ -36,7 +36,8 @@ use phiw_dynamics::{
     AnalyticBackend, BackendError, BodyKinematics, DynamicsBackend, SimulationBackend, Tree, World,
 };
 
-/// What makes the backend under test: a robot in a world. `B` is the backend, or the trait of it that is tested.
+/// What makes the backend under test: a robot in a world. `B` is the backend, or the trait of it that is
+/// tested.
 pub type Builder<'a, B = dyn SimulationBackend> = dyn Fn(&Tree, &World) -> Result<Box<B>, BackendError> + 'a;
 
 /// The builder of [`AnalyticBackend`], which knows no world with contacts.
@@ -47,8 +48,8 @@ pub fn analytic(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>
     Ok(Box::new(AnalyticBackend::in_world(tree.clone(), world)?))
 }
 
-/// Everything about the robot's own equation that holds for any [`DynamicsBackend`]: the contract, then inverse and forward dynamics at
-/// `states` random states.
+/// Everything about the robot's own equation that holds for any [`DynamicsBackend`]: the contract, then
+/// inverse and forward dynamics at `states` random states.
 ///
 /// # Errors
 /// The first check that fails.
@@ -67,8 +68,8 @@ pub fn equation_of_motion<B: DynamicsBackend + ?Sized>(
     ])
 }
 
-/// What any [`SimulationBackend`] promises about its state. Steps and floors, whose accuracy is the backend's own, have checks of their
-/// own.
+/// What any [`SimulationBackend`] promises about its state. Steps and floors, whose accuracy is the backend's
+/// own, have checks of their own.
 ///
 /// # Errors
 /// The first check that fails.
@@ -80,8 +81,8 @@ pub fn state_of_a_simulation(build: &Builder, tree: &Tree, states: usize) -> Res
     ])
 }
 
-/// The regressor and the ZMP over a backend's own [`BodyKinematics`]: bodies and their motions are the tree's, Φw = τ, and the floor's
-/// wrench is the base wrench, at `states` random states.
+/// The regressor and the ZMP over a backend's own [`BodyKinematics`]: bodies and their motions are the
+/// tree's, Φw = τ, and the floor's wrench is the base wrench, at `states` random states.
 ///
 /// # Errors
 /// The first check that fails.

@@ -3,7 +3,8 @@
 use phiw_dynamics::{DimensionError, JointType, Tree, Workspace};
 use std::f64::consts::TAU;
 
-/// Natural frequency of the closed loop \[rad/s\]: low enough for a controller that acts every few milliseconds.
+/// Natural frequency of the closed loop \[rad/s\]: low enough for a controller that acts every few
+/// milliseconds.
 const BANDWIDTH: f64 = 15.0;
 
 /// Where all joints should be at one instant.
@@ -22,7 +23,8 @@ impl Target {
     }
 }
 
-/// All joints on sines about the middle of their ranges, each with a frequency of its own, blended in over a second.
+/// All joints on sines about the middle of their ranges, each with a frequency of its own, blended in over a
+/// second.
 #[derive(Clone, Debug)]
 pub(crate) struct Swing {
     joints: Vec<Sine>,
@@ -114,7 +116,8 @@ impl<'a> Controller<'a> {
         self.torque(q, v, &still)
     }
 
-    /// As [`pull`](Self::pull), with the target's acceleration and the present velocity's forces compensated too.
+    /// As [`pull`](Self::pull), with the target's acceleration and the present velocity's forces compensated
+    /// too.
     pub(crate) fn follow(&mut self, q: &[f64], v: &[f64], target: &Target) -> Result<&[f64], DimensionError> {
         self.velocity.copy_from_slice(v);
         self.torque(q, v, target)

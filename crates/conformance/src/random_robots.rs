@@ -11,8 +11,8 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestRng, TestRunner};
 use std::cell::Cell;
 
-/// Φw = τ over random robots, and the floor's wrench, over the tree's kinematics and the backend's own: trees of all joint types, fixed
-/// or floating, and with `mimic` joints if the backend takes them.
+/// Φw = τ over random robots, and the floor's wrench, over the tree's kinematics and the backend's own: trees
+/// of all joint types, fixed or floating, and with `mimic` joints if the backend takes them.
 ///
 /// # Errors
 /// The smallest robot that fails, and how.

@@ -14,9 +14,9 @@ pub struct Robot {
     pub tree: Tree,
 }
 
-/// Every URDF of the workspace's `models`, and of `../shared/data/robots` where that is present; prints which folder is
-/// not. A robot whose root link has a mass comes twice: with a fixed and with a floating base; one with mimic joints once more,
-/// with these held, for backends that refuse them.
+/// Every URDF of the workspace's `models`, and of `../shared/data/robots` where that is present; prints which
+/// folder is not. A robot whose root link has a mass comes twice: with a fixed and with a floating base; one
+/// with mimic joints once more, with these held, for backends that refuse them.
 ///
 /// # Errors
 /// A URDF cannot be read.

@@ -29,11 +29,12 @@ struct Instant {
     wrench: [f64; 6],
 }
 
-/// A robot that holds still on its feet for two seconds has its weight as contact force, below its centre of mass.
+/// A robot that holds still on its feet for two seconds has its weight as contact force, below its centre of
+/// mass.
 ///
 /// # Errors
-/// The force is off by more than 1e-3 of the weight, or the measured ZMP by more than 1 mm from the centre of mass's place, or
-/// the base tilts by more than 0.01 rad.
+/// The force is off by more than 1e-3 of the weight, or the measured ZMP by more than 1 mm from the centre of
+/// mass's place, or the base tilts by more than 0.01 rad.
 pub fn rests_on_its_feet(build: &Builder, tree: &Tree, world: &World) -> Result<Measured, Failure> {
     let home = home(tree);
     let instants = simulate(build, tree, world, SETTLING + 1.5, |_| Target::still(home.clone()))?;
@@ -50,8 +51,8 @@ pub fn rests_on_its_feet(build: &Builder, tree: &Tree, world: &World) -> Result<
     Measured::check("contact force of a robot at rest against its weight", error / weight, 1e-3, "")
 }
 
-/// While the arms sway, the ZMP measured from the ground's reaction is the one that follows from the momentum of the motion
-/// that is seen, over windows of 10 ms: rms over four seconds.
+/// While the arms sway, the ZMP measured from the ground's reaction is the one that follows from the momentum
+/// of the motion that is seen, over windows of 10 ms: rms over four seconds.
 ///
 /// # Errors
 /// It is above 1 mm, or the ZMP did not move by a centimetre so that nothing was tested.
@@ -128,8 +129,8 @@ pub fn slow_motion_stands(build: &Builder, tree: &Tree, world: &World) -> Result
     Measured::check("tilt in a slow bow", tilted, 0.01, "rad")
 }
 
-/// Bends the first joint, a waist that pitches, within `duration` \[s\] and waits: the foremost ZMP of the motion as
-/// planned \[m\], and the largest tilt of the base \[rad\].
+/// Bends the first joint, a waist that pitches, within `duration` \[s\] and waits: the foremost ZMP of the
+/// motion as planned \[m\], and the largest tilt of the base \[rad\].
 fn bow(build: &Builder, tree: &Tree, world: &World, duration: f64) -> Result<(f64, f64), Failure> {
     let home = home(tree);
     let bend = |time: f64| {

@@ -10,10 +10,11 @@ use phiw_dynamics::{
     AnalyticBackend, DimensionError, DynamicsBackend, Placement, SimulationBackend, Tree, Workspace, World,
 };
 
-/// Joints under PD control and gravity compensation, on a smooth motion of 5 s, against the same with a `reference` backend.
+/// Joints under PD control and gravity compensation, on a smooth motion of 5 s, against the same with a
+/// `reference` backend.
 ///
-/// The closed loop forgets small errors, so that both can be compared over seconds, which a free swing is too chaotic for.
-/// For a fixed base. `dt` \[s\] is the step and the controller's period.
+/// The closed loop forgets small errors, so that both can be compared over seconds, which a free swing is too
+/// chaotic for. For a fixed base. `dt` \[s\] is the step and the controller's period.
 ///
 /// # Errors
 /// The largest difference of a joint's position is above `limit` \[rad, m\].
@@ -44,7 +45,8 @@ pub fn tracking_difference(
     Measured::check("closed-loop motion against the reference", largest, limit, "rad or m")
 }
 
-/// A free swing from a pose at random without friction: the largest change of the energy over the largest kinetic energy.
+/// A free swing from a pose at random without friction: the largest change of the energy over the largest
+/// kinetic energy.
 ///
 /// # Errors
 /// It is above `limit`.
@@ -119,11 +121,12 @@ pub fn base_wrench_of_a_step(build: &Builder, tree: &Tree) -> Result<Measured, F
     Measured::check("base wrench of a step against the motion's", largest, 1e-3, "")
 }
 
-/// With [`World::position_limits`], a joint that is pulled against its upper limit for half a second stops there; one joint
-/// after the other, on a fixed base.
+/// With [`World::position_limits`], a joint that is pulled against its upper limit for half a second stops
+/// there; one joint after the other, on a fixed base.
 ///
 /// # Errors
-/// A joint is beyond its limit by more than 0.02 rad or m, or has not come to it within as much; no joint has a limit.
+/// A joint is beyond its limit by more than 0.02 rad or m, or has not come to it within as much; no joint has
+/// a limit.
 pub fn position_limits_hold(build: &Builder, tree: &Tree) -> Result<Measured, Failure> {
     let mut backend = build(tree, &World { position_limits: true, ..World::default() })?;
     let mut controller = Controller::new(tree);

@@ -1,4 +1,5 @@
-//! The suite on the analytic backend: what the suite asks for can be done, and the suite can tell when it is not.
+//! The suite on the analytic backend: what the suite asks for can be done, and the suite can tell when it is
+//! not.
 
 use phiw_conformance::{
     Failure, analytic, base_wrench_of_a_step, energy_drift, equation_of_motion, falls_freely,

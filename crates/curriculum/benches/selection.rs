@@ -1,4 +1,5 @@
-//! The next motion among 98 of the 18-joint upper body, four of them measured: 132 parameters, motions of 7 s.
+//! The next motion among 98 of the 18-joint upper body, four of them measured: 132 parameters, motions of 7
+//! s.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use phiw_curriculum::selection::{Question, Selection, SmallestCondition, TorqueOptimal};

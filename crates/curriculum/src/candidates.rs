@@ -18,7 +18,8 @@ pub struct Candidate {
 
 /// All motions as candidates, for one model and one weighting of the torques.
 ///
-/// The factors belong to the reference trajectories, as (11) has it: what the robot makes of them is known only after it has done so.
+/// The factors belong to the reference trajectories, as (11) has it: what the robot makes of them is known
+/// only after it has done so.
 #[derive(Clone, Debug)]
 pub struct Candidates {
     weights: Vec<f64>,
@@ -31,7 +32,8 @@ pub struct Candidates {
 }
 
 impl Candidates {
-    /// Reduces every motion, in parallel: Φ of the rigid body and the `effects`, torque j's rows times `weights[j]` (all 1 in the paper).
+    /// Reduces every motion, in parallel: Φ of the rigid body and the `effects`, torque j's rows times
+    /// `weights[j]` (all 1 in the paper).
     ///
     /// # Errors
     /// An effect is unknown, or the motions or weights are not of this robot.
@@ -57,8 +59,10 @@ impl Candidates {
         Self::of_designs(&|| robot.design_of(model), dataset, weights)
     }
 
-    /// The columns that are known before a motion has been run, for beliefs with the columns of `design`: those of the rigid body, and of the effects that follow from the
-    /// motion alone. An effect that needs torques or measured signals says nothing yet, and one that no motion excites would make cond(Φ) infinite.
+    /// The columns that are known before a motion has been run, for beliefs with the columns of `design`:
+    /// those of the rigid body, and of the effects that follow from the motion alone. An effect that needs
+    /// torques or measured signals says nothing yet, and one that no motion excites would make cond(Φ)
+    /// infinite.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -131,7 +135,8 @@ impl Candidates {
         &self.candidates
     }
 
-    /// R of what has been measured in the candidates' columns, weighted like them, its rows counted as if they were as dense in time as those of the motions.
+    /// R of what has been measured in the candidates' columns, weighted like them, its rows counted as if
+    /// they were as dense in time as those of the motions.
     ///
     /// # Errors
     /// The evidence is of another robot.

@@ -8,8 +8,8 @@ use phiw_zmp::{MotionBalance, Stance, ZmpModel, ZmpWorkspace, standing_parameter
 pub struct Safety {
     /// The largest reduction coefficient α at which the motion is allowed; negative if it never is.
     pub largest_reduction: f64,
-    /// Smallest signed distance of the ZMP from the border of the region \[m\]; −∞ if the robot would leave the floor, +∞ without a
-    /// region.
+    /// Smallest signed distance of the ZMP from the border of the region \[m\]; −∞ if the robot would leave
+    /// the floor, +∞ without a region.
     pub margin_m: f64,
 }
 
@@ -45,9 +45,11 @@ pub trait Constraint: Send + Sync {
 pub struct ZmpConstraint {
     /// What the robot stands on.
     pub stance: Stance,
-    /// Which ZMP. Default: [`ZmpModel::MultiBody`], what a force plate sees. The paper's is [`ZmpModel::PointMass`], equation (8), which leaves out that bodies turn.
+    /// Which ZMP. Default: [`ZmpModel::MultiBody`], what a force plate sees. The paper's is
+    /// [`ZmpModel::PointMass`], equation (8), which leaves out that bodies turn.
     pub model: ZmpModel,
-    /// Time between the samples that are looked at \[s\]; every sample is looked at where that is shorter than the motion's period. Default: 0.
+    /// Time between the samples that are looked at \[s\]; every sample is looked at where that is shorter
+    /// than the motion's period. Default: 0.
     pub period_s: f64,
 }
 

@@ -1,18 +1,22 @@
-//! Which of the effects that save −log L is believed: the decisions of [`crate::ScoreTest`], from numbers alone.
+//! Which of the effects that save −log L is believed: the decisions of [`crate::ScoreTest`], from numbers
+//! alone.
 
 /// When a score test believes an effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScoreTestSettings {
-    /// −log L that an effect must save beyond the price of its parameters. Higher misses small effects, lower names effects that are not there. Default: 5, so that an effect of one
-    /// parameter is four standard deviations from nothing. Seventy such effects are asked for after each log of an 18-joint robot: with all of them together, one right
-    /// model in two hundred gets a false name if their gains are χ² (arithmetic, not a count).
+    /// −log L that an effect must save beyond the price of its parameters. Higher misses small effects, lower
+    /// names effects that are not there. Default: 5, so that an effect of one parameter is four standard
+    /// deviations from nothing. Seventy such effects are asked for after each log of an 18-joint robot: with
+    /// all of them together, one right model in two hundred gets a false name if their gains are χ²
+    /// (arithmetic, not a count).
     pub least_merit: f64,
-    /// Effects of at least this share of the best one's merit are fitted in full beside it. Lower costs fits; higher misses an effect whose score is foretold too small. Default: 0.6, not
-    /// calibrated.
+    /// Effects of at least this share of the best one's merit are fitted in full beside it. Lower costs fits;
+    /// higher misses an effect whose score is foretold too small. Default: 0.6, not calibrated.
     pub near: f64,
     /// Effects at most that are fitted in full at a time. Default: 5, a limit on the time.
     pub most_near: usize,
-    /// Effects whose merits differ by no more explain the logs alike \[−log L\]; then the simplest is believed. Default: 3, odds of 20 to 1.
+    /// Effects whose merits differ by no more explain the logs alike \[−log L\]; then the simplest is
+    /// believed. Default: 3, odds of 20 to 1.
     pub alike: f64,
     /// A rival counts if it has at least this probability beside the effect that is believed. Default: 0.1.
     pub least_rival: f64,
@@ -58,13 +62,15 @@ pub struct Winner {
 }
 
 impl ScoreTestSettings {
-    /// How many effects are fitted in full, of those with these foretold `merits`, the largest first. None of them if the best is not worth its price.
+    /// How many effects are fitted in full, of those with these foretold `merits`, the largest first. None of
+    /// them if the best is not worth its price.
     pub fn shortlist(&self, merits: &[f64]) -> usize {
         let Some(best) = merits.first().filter(|best| **best >= self.least_merit) else { return 0 };
         merits.iter().take_while(|merit| **merit >= self.near * best).count().min(self.most_near)
     }
 
-    /// Which contender is believed: the simplest of those that explain the logs as well as the best. None if no contender is worth its price.
+    /// Which contender is believed: the simplest of those that explain the logs as well as the best. None if
+    /// no contender is worth its price.
     pub fn contest(&self, contenders: &[Contender]) -> Option<Winner> {
         let merit = |index: usize| contenders[index].merit;
         let mut worth: Vec<usize> =
@@ -79,18 +85,22 @@ impl ScoreTestSettings {
     }
 }
 
-/// The effect to be left out of those that were found, if the likelihood does not confirm all of them: the one that saves least, if that is less than `least_gain`.
+/// The effect to be left out of those that were found, if the likelihood does not confirm all of them: the
+/// one that saves least, if that is less than `least_gain`.
 ///
-/// `gains` are what −log L of the model grows by without each of them. What is not a number confirms nothing. Of equals the first is left out.
+/// `gains` are what −log L of the model grows by without each of them. What is not a number confirms nothing.
+/// Of equals the first is left out.
 pub fn unconfirmed(gains: &[f64], least_gain: f64) -> Option<usize> {
     let gain = |index: &usize| if gains[*index].is_nan() { f64::NEG_INFINITY } else { gains[*index] };
     let least = (0..gains.len()).min_by(|a, b| gain(a).total_cmp(&gain(b)))?;
     (gain(&least) < least_gain).then_some(least)
 }
 
-/// Which pair of rival beliefs the next motion has to tell apart, from the names of all pairs and of those that each earlier motion was chosen to separate.
+/// Which pair of rival beliefs the next motion has to tell apart, from the names of all pairs and of those
+/// that each earlier motion was chosen to separate.
 ///
-/// A pair has one motion, and then the parameters have one: what tells rivals apart need not tell anything else, and rivals that one motion has not told may be rivals for ever.
+/// A pair has one motion, and then the parameters have one: what tells rivals apart need not tell anything
+/// else, and rivals that one motion has not told may be rivals for ever.
 pub fn rivals_to_separate(rivals: &[[String; 2]], separated: &[Option<[String; 2]>]) -> Option<usize> {
     if separated.last().is_some_and(Option::is_some) {
         return None;

@@ -1,4 +1,5 @@
-//! Algorithm 1, lines 10 to 17: select, measure, estimate, relax; and, where the model may grow, look for what it lacks.
+//! Algorithm 1, lines 10 to 17: select, measure, estimate, relax; and, where the model may grow, look for
+//! what it lacks.
 
 use crate::contest::{rivals_to_separate, unconfirmed};
 use crate::estimation::RowsAt;
@@ -51,11 +52,12 @@ pub struct Curriculum<'a> {
 pub struct CurriculumSettings {
     /// What happens where the constraint allows no motion. Default: [`NoneAllowed::Refuse`].
     pub none_allowed: NoneAllowed,
-    /// Time between the samples by which rival beliefs are compared \[s\]. Shorter costs time; longer misses what is quick. Default: 0.02, since people move slowly against
-    /// it.
+    /// Time between the samples by which rival beliefs are compared \[s\]. Shorter costs time; longer misses
+    /// what is quick. Default: 0.02, since people move slowly against it.
     pub rivalry_period_s: f64,
-    /// How often after one log [`Growth`] is asked again once the likelihood has refuted one of its answers, which is then excluded. Each time costs a
-    /// search and some fits. Default: 3, a limit on the time and no finding.
+    /// How often after one log [`Growth`] is asked again once the likelihood has refuted one of its answers,
+    /// which is then excluded. Each time costs a search and some fits. Default: 3, a limit on the time and no
+    /// finding.
     pub most_answers: usize,
 }
 
@@ -74,10 +76,11 @@ struct Learning {
 }
 
 impl<'a> Curriculum<'a> {
-    /// A curriculum with the paper's choices in everything that is not asked for here: the smallest cond (11), relaxed with cond (20), five iterations, no growth. Set what should be
-    /// otherwise.
+    /// A curriculum with the paper's choices in everything that is not asked for here: the smallest cond
+    /// (11), relaxed with cond (20), five iterations, no growth. Set what should be otherwise.
     ///
-    /// A plan is refused where no motion keeps the robot standing; the paper's experiments run the least violation instead ([`CurriculumSettings::none_allowed`]).
+    /// A plan is refused where no motion keeps the robot standing; the paper's experiments run the least
+    /// violation instead ([`CurriculumSettings::none_allowed`]).
     pub fn new(
         robot: &'a Robot,
         (dataset, candidates): (&'a MotionDataset, &'a Candidates),
@@ -119,7 +122,8 @@ impl<'a> Curriculum<'a> {
 
     /// One iteration. After an error the run is as it was.
     ///
-    /// The result depends on the run and its seed alone: not on threads, nor on whether the run was interrupted before.
+    /// The result depends on the run and its seed alone: not on threads, nor on whether the run was
+    /// interrupted before.
     ///
     /// # Errors
     /// The run is not of this robot, the robot can not be run, or nothing can be estimated.
@@ -214,8 +218,8 @@ impl<'a> Curriculum<'a> {
         Ok(learning)
     }
 
-    /// The model with those of the found `effects` that the estimator's likelihood confirms: the least of them goes until each is worth
-    /// `least_gain`.
+    /// The model with those of the found `effects` that the estimator's likelihood confirms: the least of
+    /// them goes until each is worth `least_gain`.
     fn confirmed(
         &self,
         learning: Learning,
@@ -289,11 +293,13 @@ impl<'a> Curriculum<'a> {
         Candidates::of_model(self.robot, model, self.dataset, self.candidates.weights()).map(Cow::Owned)
     }
 
-    /// R of all that was measured over the declared parameters, whose cond decides: the next motion (11), and how far the constraint is relaxed (20).
+    /// R of all that was measured over the declared parameters, whose cond decides: the next motion (11), and
+    /// how far the constraint is relaxed (20).
     ///
-    /// The columns of effects that were found are left out. With them cond is that of other parameters, in other units, than before they were found; the offset of a
-    /// spring is so nearly a weight that cond grows five-fold, the constraint is never relaxed again, and the same safe motion is asked for until the end. What tells
-    /// effects apart is asked for by rivalry.
+    /// The columns of effects that were found are left out. With them cond is that of other parameters, in
+    /// other units, than before they were found; the offset of a spring is so nearly a weight that cond grows
+    /// five-fold, the constraint is never relaxed again, and the same safe motion is asked for until the end.
+    /// What tells effects apart is asked for by rivalry.
     ///
     /// # Errors
     /// The run is not of this robot.
@@ -304,7 +310,8 @@ impl<'a> Curriculum<'a> {
         Ok(Some(self.candidates.measured(evidence)?))
     }
 
-    /// What the next iteration would do; none once the run has ended. For a real robot this is all there is to do before it moves.
+    /// What the next iteration would do; none once the run has ended. For a real robot this is all there is
+    /// to do before it moves.
     ///
     /// # Errors
     /// As [`plan()`], or the run is not of this robot or these motions.
@@ -363,8 +370,8 @@ pub fn unreliable_model(truth: &RobotModel, seed: u64) -> RobotModel {
 }
 
 impl Candidates {
-    /// RMS over all motions of how far the torques move from one parameter vector to another, over their RMS; none if they are of different
-    /// models.
+    /// RMS over all motions of how far the torques move from one parameter vector to another, over their RMS;
+    /// none if they are of different models.
     pub fn torque_change(&self, before: &[f64], after: &[f64]) -> Option<f64> {
         let everything: &Triangle = self.everything();
         if before.len() != after.len() || after.len() != everything.size() {

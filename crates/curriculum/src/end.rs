@@ -25,10 +25,12 @@ impl EndCriterion for FixedCount {
     }
 }
 
-/// The curriculum has converged when its last motion neither made Φ much better nor moved the model's torques.
+/// The curriculum has converged when its last motion neither made Φ much better nor moved the model's
+/// torques.
 ///
-/// Both are known on a real robot: cond(Φ) is the paper's own proposal for an end condition (its section 6); the torques are those that the
-/// new and the old parameters predict for all motions of the dataset, which unlike a measured torque error has no floor of noise.
+/// Both are known on a real robot: cond(Φ) is the paper's own proposal for an end condition (its section 6);
+/// the torques are those that the new and the old parameters predict for all motions of the dataset, which
+/// unlike a measured torque error has no floor of noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Converged {
     /// Largest change of the predicted torques, over their RMS, that counts as none.
@@ -65,12 +67,13 @@ impl EndCriterion for Converged {
 
 /// The curriculum ends when the torques are known as well as was asked for.
 ///
-/// [`Converged`] asks what the last motion changed; a dull one changes nothing and ends it. This asks what the estimate knows of itself
-/// ([`IterationRecord::torque_uncertainty`]), and so needs an estimator that knows its covariance ([`crate::MotionLikelihood`]).
+/// [`Converged`] asks what the last motion changed; a dull one changes nothing and ends it. This asks what
+/// the estimate knows of itself ([`IterationRecord::torque_uncertainty`]), and so needs an estimator that
+/// knows its covariance ([`crate::MotionLikelihood`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Certain {
-    /// Largest RMS standard deviation of the torques that the model predicts for all motions of the dataset, weighted like the candidates: where their weights are
-    /// 1/σ, a share of the noise σ of each torque.
+    /// Largest RMS standard deviation of the torques that the model predicts for all motions of the dataset,
+    /// weighted like the candidates: where their weights are 1/σ, a share of the noise σ of each torque.
     pub torque_uncertainty: f64,
     /// Iterations at most.
     pub most: usize,

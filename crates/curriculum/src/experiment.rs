@@ -28,7 +28,8 @@ pub trait Experiment: Send + Sync {
         random: &mut ChaCha8Rng,
     ) -> Result<Trial, CurriculumError>;
 
-    /// Standard deviation of each torque's noise \[N·m, N\], if it is known. An estimator that is told another one is refused.
+    /// Standard deviation of each torque's noise \[N·m, N\], if it is known. An estimator that is told
+    /// another one is refused.
     fn known_torque_noise(&self) -> Option<Vec<f64>> {
         None
     }
@@ -37,10 +38,12 @@ pub trait Experiment: Send + Sync {
 /// Share by which two statements of one noise may differ: numbers that were written down and read again.
 const ROUNDED: f64 = 1e-6;
 
-/// The noise is stated where it is made. An estimator that takes it for another weighs what it measures wrongly, and nothing else would tell.
+/// The noise is stated where it is made. An estimator that takes it for another weighs what it measures
+/// wrongly, and nothing else would tell.
 ///
 /// # Errors
-/// The experiment knows the noise of a torque, and the estimator is told another one. Where there is no noise any will do: it stands for rounding.
+/// The experiment knows the noise of a torque, and the estimator is told another one. Where there is no noise
+/// any will do: it stands for rounding.
 pub(crate) fn check_noise(
     robot: &Robot,
     experiment: &dyn Experiment,

@@ -22,8 +22,9 @@ pub trait Growth: Send + Sync {
     /// Its name, for reports: `trace`.
     fn name(&self) -> &'static str;
 
-    /// What all logs so far say that the declared model lacks. An earlier answer, which is in `model`, is not binding; where it is `doubted`, the
-    /// last motion was chosen to tell it from a rival. What is `refuted` is no answer.
+    /// What all logs so far say that the declared model lacks. An earlier answer, which is in `model`, is not
+    /// binding; where it is `doubted`, the last motion was chosen to tell it from a rival. What is `refuted`
+    /// is no answer.
     ///
     /// # Errors
     /// The logs are not of this robot, or hold too little.
@@ -38,16 +39,19 @@ pub trait Growth: Send + Sync {
 
     /// −log L that an effect must save to be believed, where the estimator knows a likelihood.
     ///
-    /// What looks for effects may judge by least squares. Noise that moves the robot and is not in the log bends these, and an effect that looks like the bend (a delay of some milliseconds: the
-    /// command answers to noise that has already moved the robot) can be named for it. The likelihood knows better.
+    /// What looks for effects may judge by least squares. Noise that moves the robot and is not in the log
+    /// bends these, and an effect that looks like the bend (a delay of some milliseconds: the command answers
+    /// to noise that has already moved the robot) can be named for it. The likelihood knows better.
     fn least_gain(&self) -> f64;
 }
 
-/// Traces the residual with `phiw-residual`, where one is not white; effects that act on no such torque are not asked for.
+/// Traces the residual with `phiw-residual`, where one is not white; effects that act on no such torque are
+/// not asked for.
 ///
-/// A trace judges by least squares, which takes motion that noise has caused for motion that has a cause: a torque that noise helped is smaller
-/// than the motion asks for. So it sees each period as it was when it began, before the period's own noise has moved the robot, with the torque
-/// that the belief would need there, and what the belief leaves of the period.
+/// A trace judges by least squares, which takes motion that noise has caused for motion that has a cause: a
+/// torque that noise helped is smaller than the motion asks for. So it sees each period as it was when it
+/// began, before the period's own noise has moved the robot, with the torque that the belief would need
+/// there, and what the belief leaves of the period.
 #[derive(Clone, Debug)]
 pub struct TraceResidual {
     /// When a candidate is believed.
@@ -56,7 +60,8 @@ pub struct TraceResidual {
     pub least_s: f64,
     /// A rival counts if it has at least this probability. Default: 0.1.
     pub least_rival: f64,
-    /// −log L that an effect must save to be believed. Default: 20, more than six standard deviations, since one candidate of a thousand was picked.
+    /// −log L that an effect must save to be believed. Default: 20, more than six standard deviations, since
+    /// one candidate of a thousand was picked.
     pub least_gain: f64,
     /// Which torques are traced.
     pub whiteness: WhitenessSettings,
@@ -67,9 +72,11 @@ pub struct TraceResidual {
 /// How the logs of a curriculum become one session for a trace.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SessionSettings {
-    /// Stretches that all logs together are cut into. Default: 14; a trace leaves out one after the other, so each costs time.
+    /// Stretches that all logs together are cut into. Default: 14; a trace leaves out one after the other, so
+    /// each costs time.
     pub stretches: usize,
-    /// Stretches of each log at least. Default: 3, so that something is left beside the one that is held out and the one that is left out.
+    /// Stretches of each log at least. Default: 3, so that something is left beside the one that is held out
+    /// and the one that is left out.
     pub least_stretches: usize,
     /// Stretches of each log at most. Default: 7.
     pub most_stretches: usize,
@@ -95,8 +102,8 @@ impl Default for SessionSettings {
 }
 
 impl Default for TraceResidual {
-    /// From 12 s of logs on, three effects at most; a rival is what has a chance of one in ten. An effect may be small beside the noise: the
-    /// estimator's likelihood has the last word.
+    /// From 12 s of logs on, three effects at most; a rival is what has a chance of one in ten. An effect may
+    /// be small beside the noise: the estimator's likelihood has the last word.
     fn default() -> Self {
         TraceResidual {
             options: TraceOptions {

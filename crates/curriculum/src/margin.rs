@@ -16,12 +16,14 @@ pub struct MotionMargin {
     pub worst_s: f64,
     /// Standard deviation of the multi-body margin there, by all that is known of the parameters \[m\].
     pub margin_std: f64,
-    /// The part of it that no torque can tell: the base link, and what of the others only the prior says \[m\].
+    /// The part of it that no torque can tell: the base link, and what of the others only the prior says
+    /// \[m\].
     pub untold_std: f64,
 }
 
 impl MotionMargin {
-    /// Of a motion under `model`, whose parameters are those of `estimate`. The base link and what torques do not feel are as uncertain as `prior` says.
+    /// Of a motion under `model`, whose parameters are those of `estimate`. The base link and what torques do
+    /// not feel are as uncertain as `prior` says.
     ///
     /// # Errors
     /// Something is not of this robot.
@@ -41,7 +43,8 @@ impl MotionMargin {
         let gradient = gradient(robot, stance, &parameters, motion.sample(worst), &mut workspace)?;
         let (of_base_link, of_bodies) = gradient.split_at(gradient.len() - model.standard.len());
 
-        // Standard parameters vary with the base parameters as in `to_standard`, and beside them by what is left of the prior.
+        // Standard parameters vary with the base parameters as in `to_standard`, and beside them by what is
+        // left of the prior.
         let reference = &prior.model.standard;
         let of_base = robot.base().gradient_of_base(of_bodies, reference)?;
         let map = robot.base().map();
@@ -79,7 +82,8 @@ fn gradient(
     Ok(of_x.iter().zip(of_y).map(|(of_x, of_y)| x * of_x + y * of_y).collect())
 }
 
-/// Standard deviation by the base parameters that are determined; NaN without a covariance. The ZMP does not depend on effects.
+/// Standard deviation by the base parameters that are determined; NaN without a covariance. The ZMP does not
+/// depend on effects.
 fn told_std(estimate: &Estimate, of_base: &[f64]) -> Result<f64, CurriculumError> {
     let Some(covariance) = &estimate.covariance else { return Ok(f64::NAN) };
     let known: Vec<usize> =

@@ -19,8 +19,8 @@ pub struct Measured {
     pub qdd: Vec<f64>,
     /// Torques as they were logged \[N·m, N\]. Over a period the one at its beginning is held.
     pub tau: Vec<f64>,
-    /// For each row, whether the base stood still from it to the next; empty if it is bolted down. Rows in which it did not are no rows of a robot
-    /// on a fixed base, and do not count.
+    /// For each row, whether the base stood still from it to the next; empty if it is bolted down. Rows in
+    /// which it did not are no rows of a robot on a fixed base, and do not count.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub still: Vec<bool>,
 }
@@ -99,16 +99,18 @@ impl Measured {
         Block::unfiltered(self.joints, t, signals, tau)
     }
 
-    /// One row for each period as it was when it began, with the acceleration of the period before: nothing that the noise of a period has done
-    /// to the motion is in its own row. The torques of the rows are `tau`, `[period × joint]` of those that count.
+    /// One row for each period as it was when it began, with the acceleration of the period before: nothing
+    /// that the noise of a period has done to the motion is in its own row. The torques of the rows are
+    /// `tau`, `[period × joint]` of those that count.
     pub(crate) fn before_noise(&self, tau: Vec<f64>) -> Block {
         let mut block = self.beginnings();
         block.tau = tau;
         block
     }
 
-    /// One row for each period as it could be foreseen when it began: where the joints would be in its middle at the speed that they had, that speed, the
-    /// acceleration of the period before, and the torque that was commanded.
+    /// One row for each period as it could be foreseen when it began: where the joints would be in its middle
+    /// at the speed that they had, that speed, the acceleration of the period before, and the torque that was
+    /// commanded.
     pub(crate) fn begun(&self) -> Block {
         let mut block = self.beginnings();
         let half_s = 0.5 * self.period_s;
@@ -127,7 +129,8 @@ impl Measured {
         self.counted(0.0, signals, self.tau[..count].to_vec())
     }
 
-    /// One row for each period: the middle position of Hermite's cubic, and the means of velocity and acceleration.
+    /// One row for each period: the middle position of Hermite's cubic, and the means of velocity and
+    /// acceleration.
     pub(crate) fn over_periods(&self) -> Block {
         let rows = self.rows().saturating_sub(1);
         let (count, period) = (rows * self.joints, self.period_s);

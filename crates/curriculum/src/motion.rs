@@ -6,10 +6,12 @@ use phiw_telemetry::{Block, Recording};
 /// When the signals of a motion are taken for signals of one motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionTolerance {
-    /// How far stamps may lie from even, as a share of the period. Default: 10⁻³, more than stamps rounded to microseconds at 1 kHz.
+    /// How far stamps may lie from even, as a share of the period. Default: 10⁻³, more than stamps rounded to
+    /// microseconds at 1 kHz.
     pub stamps: f64,
-    /// RMS of the difference of a derivative from its signal's slope over the RMS of the larger, from which on they contradict each other. Default: 0.5; retargeted motions, by splines or
-    /// by backward differences, stay below 0.1 (`phiw retarget`, all embedded motions).
+    /// RMS of the difference of a derivative from its signal's slope over the RMS of the larger, from which
+    /// on they contradict each other. Default: 0.5; retargeted motions, by splines or by backward
+    /// differences, stay below 0.1 (`phiw retarget`, all embedded motions).
     pub contradiction: f64,
     /// RMS below which a derivative is rounding \[rad/s, m/s, rad/s², m/s²\]. Default: 10⁻³.
     pub slow: f64,
@@ -37,8 +39,9 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// A motion of `joints` joints with a sample every `period_s` \[s\]. `signals` are positions \[rad, m\], velocities and accelerations,
-    /// row-major `[sample × joints]`, as `Retargeted::signals` of `phiw-bspline-retarget` has them.
+    /// A motion of `joints` joints with a sample every `period_s` \[s\]. `signals` are positions \[rad, m\],
+    /// velocities and accelerations, row-major `[sample × joints]`, as `Retargeted::signals` of
+    /// `phiw-bspline-retarget` has them.
     ///
     /// # Errors
     /// There are fewer than two samples, the signals do not fit each other, or a number is not finite.
@@ -68,7 +71,8 @@ impl Motion {
         Ok(Motion { name: name.to_owned(), task: task.to_owned(), period_s, joints, signals })
     }
 
-    /// The first `samples` samples of a reference, one every `period_s` \[s\]. `reference` writes positions \[rad, m\], velocities and accelerations of all joints at a time \[s\].
+    /// The first `samples` samples of a reference, one every `period_s` \[s\]. `reference` writes positions
+    /// \[rad, m\], velocities and accelerations of all joints at a time \[s\].
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -92,7 +96,8 @@ impl Motion {
     /// A motion from a log with positions, velocities and accelerations, as `phiw retarget` writes it.
     ///
     /// # Errors
-    /// A signal is missing, the stamps are not even, a number is not finite, or the signals contradict each other.
+    /// A signal is missing, the stamps are not even, a number is not finite, or the signals contradict each
+    /// other.
     pub fn from_recording(name: &str, task: &str, recording: &Recording) -> Result<Self, CurriculumError> {
         let wrong =
             |problem: &str| CurriculumError::Motion { name: name.to_owned(), problem: problem.to_owned() };
@@ -119,8 +124,8 @@ impl Motion {
         Ok(motion)
     }
 
-    /// A robot that is sent positions at these times moves as they say, whatever the columns beside them say: a motion whose signals contradict each
-    /// other is refused.
+    /// A robot that is sent positions at these times moves as they say, whatever the columns beside them say:
+    /// a motion whose signals contradict each other is refused.
     fn check_derivatives(
         &self,
         joints: &[String],
@@ -194,8 +199,9 @@ impl Motion {
 }
 
 impl Motion {
-    /// Writes positions \[rad, m\], velocities and accelerations of all joints `t_s` seconds after the motion's start: linear between samples, each signal by itself; at
-    /// rest in the last posture after the end.
+    /// Writes positions \[rad, m\], velocities and accelerations of all joints `t_s` seconds after the
+    /// motion's start: linear between samples, each signal by itself; at rest in the last posture after the
+    /// end.
     pub fn at(&self, t_s: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]) {
         let last = self.samples() - 1;
         let place = (t_s / self.period_s).clamp(0.0, last as f64);

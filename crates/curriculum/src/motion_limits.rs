@@ -1,4 +1,5 @@
-//! Whether a robot can be sent a motion as it is: the limits of its joints, and whether it begins and ends at rest.
+//! Whether a robot can be sent a motion as it is: the limits of its joints, and whether it begins and ends at
+//! rest.
 
 use crate::rivalry::torques_along;
 use crate::{CurriculumError, Motion};
@@ -8,12 +9,14 @@ use phiw_identification::Design;
 /// When something about a motion is worth a warning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionLimits {
-    /// A limit counts as kept up to this share beyond it (of the range, for positions). Default: 10⁻³, since motions of `phiw retarget` run along their limits.
+    /// A limit counts as kept up to this share beyond it (of the range, for positions). Default: 10⁻³, since
+    /// motions of `phiw retarget` run along their limits.
     pub tolerance: f64,
-    /// Largest range of a joint of which the tolerance is a share \[rad, m\]; joints without limits have infinite ones. Default: 1000.
+    /// Largest range of a joint of which the tolerance is a share \[rad, m\]; joints without limits have
+    /// infinite ones. Default: 1000.
     pub largest_range: f64,
-    /// Speed at a motion's ends up to which a joint counts as at rest \[rad/s, m/s\]. Default: 0.05, not calibrated: slower than any commanded motion and faster than what
-    /// smoothing leaves of rest.
+    /// Speed at a motion's ends up to which a joint counts as at rest \[rad/s, m/s\]. Default: 0.05, not
+    /// calibrated: slower than any commanded motion and faster than what smoothing leaves of rest.
     pub at_rest: f64,
 }
 
@@ -48,7 +51,8 @@ pub struct Unrest {
 }
 
 impl MotionLimits {
-    /// The limits of the tree's joints that a motion exceeds; `torque` is what it asks for \[N·m, N\], `[sample × joint]`.
+    /// The limits of the tree's joints that a motion exceeds; `torque` is what it asks for \[N·m, N\],
+    /// `[sample × joint]`.
     pub fn excesses(&self, motion: &Motion, torque: &[f64], tree: &Tree) -> Vec<Excess> {
         let mut excesses = Vec::new();
         for joint in 0..tree.joint_count() {
@@ -88,7 +92,8 @@ impl MotionLimits {
 }
 
 impl Motion {
-    /// The torques that a model predicts for the motion, φ(q, q̇, q̈)·w \[N·m, N\], `[sample × joint]`: the feed-forward of equation (13).
+    /// The torques that a model predicts for the motion, φ(q, q̇, q̈)·w \[N·m, N\], `[sample × joint]`: the
+    /// feed-forward of equation (13).
     ///
     /// # Errors
     /// The motion is not of this robot.

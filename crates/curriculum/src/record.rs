@@ -17,7 +17,8 @@ pub struct IterationRecord {
     pub forced: bool,
     /// The reduction coefficient α.
     pub alpha: f64,
-    /// Smallest distance of the reference's ZMP from the border of the support, under the belief of the time \[m\]; none without one.
+    /// Smallest distance of the reference's ZMP from the border of the support, under the belief of the time
+    /// \[m\]; none without one.
     pub margin_m: Option<f64>,
     /// When the robot fell, since the motion's start \[s\]. Its log then counts for nothing.
     pub fell_at_s: Option<f64>,
@@ -27,14 +28,15 @@ pub struct IterationRecord {
     pub tracking_error: Vec<f64>,
     /// cond(Φ) of all that has been measured so far, this motion included; none before anything has been.
     pub condition_number: Option<f64>,
-    /// How uncertain the torques of the dataset's motions are under this belief, as the estimator sees it: RMS of their standard deviations, weighted like
-    /// the candidates; none where it does not know.
+    /// How uncertain the torques of the dataset's motions are under this belief, as the estimator sees it:
+    /// RMS of their standard deviations, weighted like the candidates; none where it does not know.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torque_uncertainty: Option<f64>,
-    /// RMS over all motions of the dataset of how far the model's torques have moved in this iteration, over their RMS; none where the model
-    /// has grown.
+    /// RMS over all motions of the dataset of how far the model's torques have moved in this iteration, over
+    /// their RMS; none where the model has grown.
     pub torque_change: Option<f64>,
-    /// The two beliefs that the motion was chosen to tell apart, in words; none if it was chosen for what it tells of the parameters.
+    /// The two beliefs that the motion was chosen to tell apart, in words; none if it was chosen for what it
+    /// tells of the parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub separates: Option<[String; 2]>,
     /// The belief after this iteration.

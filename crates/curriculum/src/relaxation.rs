@@ -20,13 +20,14 @@ pub struct Learnt {
     pub first_condition_number: f64,
     /// cond(Φ) of all that has been measured.
     pub condition_number: f64,
-    /// How sure the estimator was of the torques of all motions after the first measurement, and how sure it is now: see
-    /// [`crate::IterationRecord::torque_uncertainty`]. None where it does not know.
+    /// How sure the estimator was of the torques of all motions after the first measurement, and how sure it
+    /// is now: see [`crate::IterationRecord::torque_uncertainty`]. None where it does not know.
     pub torque_uncertainty: Option<[f64; 2]>,
 }
 
 impl Learnt {
-    /// From cond(Φ) and the torques' uncertainty after each iteration. None while nothing has been learnt: where cond was never finite, or is not now.
+    /// From cond(Φ) and the torques' uncertainty after each iteration. None while nothing has been learnt:
+    /// where cond was never finite, or is not now.
     pub fn of(
         first_alpha: f64,
         condition_numbers: &[Option<f64>],
@@ -61,7 +62,8 @@ impl Relaxation for ConstantReduction {
 pub enum Maximum {
     /// This value; the paper's robot has 0.74.
     Fixed(f64),
-    /// Such that this share of the motions is allowed at first (rounded up): how the paper's 0.74 came about, with 0.05.
+    /// Such that this share of the motions is allowed at first (rounded up): how the paper's 0.74 came about,
+    /// with 0.05.
     Share(f64),
 }
 
@@ -87,8 +89,9 @@ impl Maximum {
 pub enum Scale {
     /// This value; the paper's robot has 2.5·10⁻⁴.
     Fixed(f64),
-    /// Such that α of the second iteration is this share of α_max. cond has no natural scale: it depends on the robot and
-    /// on the units of its parameters, and with a fixed a that suits another robot α never leaves α_max, or falls to 0 at once.
+    /// Such that α of the second iteration is this share of α_max. cond has no natural scale: it depends on
+    /// the robot and on the units of its parameters, and with a fixed a that suits another robot α never
+    /// leaves α_max, or falls to 0 at once.
     Share(f64),
 }
 
@@ -104,7 +107,8 @@ pub struct ConditionRelaxation {
 }
 
 impl ConditionRelaxation {
-    /// 5 % of the motions at first and b = 1, as in the paper; a by [`Scale::Share`] of 0.8, since the paper's a suits its own robot alone.
+    /// 5 % of the motions at first and b = 1, as in the paper; a by [`Scale::Share`] of 0.8, since the
+    /// paper's a suits its own robot alone.
     pub const OF_THE_PAPER: Self =
         ConditionRelaxation { maximum: Maximum::Share(0.05), scale: Scale::Share(0.8), bias: 1.0 };
 }
@@ -132,15 +136,18 @@ impl Relaxation for ConditionRelaxation {
     }
 }
 
-/// Equation (20) with what the reduced support is a margin for in the place of cond(Φ): α = a·u, at most α_max, where u is how uncertain the torques of
-/// the dataset's motions are ([`crate::IterationRecord::torque_uncertainty`]).
+/// Equation (20) with what the reduced support is a margin for in the place of cond(Φ): α = a·u, at most
+/// α_max, where u is how uncertain the torques of the dataset's motions are
+/// ([`crate::IterationRecord::torque_uncertainty`]).
 ///
-/// A support is reduced because the ZMP of a motion is predicted by a model that may be wrong. cond(Φ) is a poor measure of that: its σ_min is the one
-/// direction of w that is known least, which may be one that no motion feels, and the ZMP neither. Of a robot with many such directions cond falls late or
-/// never, and α stays at its second value however well the model predicts. The uncertainty of Φ·w over all motions, floor wrenches included where the base floats,
-/// counts each direction as much as the motions feel it.
+/// A support is reduced because the ZMP of a motion is predicted by a model that may be wrong. cond(Φ) is a
+/// poor measure of that: its σ_min is the one direction of w that is known least, which may be one that no
+/// motion feels, and the ZMP neither. Of a robot with many such directions cond falls late or never, and α
+/// stays at its second value however well the model predicts. The uncertainty of Φ·w over all motions, floor
+/// wrenches included where the base floats, counts each direction as much as the motions feel it.
 ///
-/// It needs an estimator that knows its covariance ([`crate::MotionLikelihood`]); with others α stays at α_max.
+/// It needs an estimator that knows its covariance ([`crate::MotionLikelihood`]); with others α stays at
+/// α_max.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UncertaintyRelaxation {
     /// α_max.
@@ -150,7 +157,8 @@ pub struct UncertaintyRelaxation {
 }
 
 impl Default for UncertaintyRelaxation {
-    /// 5 % of the motions at first, and 0.8 of that α after the first measurement, as [`ConditionRelaxation`].
+    /// 5 % of the motions at first, and 0.8 of that α after the first measurement, as
+    /// [`ConditionRelaxation`].
     fn default() -> Self {
         UncertaintyRelaxation { maximum: Maximum::Share(0.05), share: 0.8 }
     }

@@ -15,8 +15,8 @@ pub struct Rivalry {
 }
 
 impl Rivalry {
-    /// RMS over a motion of how far the torques of the two differ, each joint's over its share `scale` \[N·m, N\]; a sample is looked at every
-    /// `period_s` \[s\].
+    /// RMS over a motion of how far the torques of the two differ, each joint's over its share `scale` \[N·m,
+    /// N\]; a sample is looked at every `period_s` \[s\].
     ///
     /// # Errors
     /// A belief or the motion is not of this robot.
@@ -49,7 +49,8 @@ impl Rivalry {
     }
 }
 
-/// A model's torques along a block, of every `stride`-th sample, `[sample × joint]`. The block is corrected as the model's effects have it.
+/// A model's torques along a block, of every `stride`-th sample, `[sample × joint]`. The block is corrected
+/// as the model's effects have it.
 ///
 /// # Errors
 /// The block is not of this robot.

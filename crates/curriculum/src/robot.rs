@@ -38,8 +38,9 @@ pub struct KnownEffect {
 impl Robot {
     /// A robot with viscous friction in every joint: D = base parameters + joints.
     ///
-    /// `base_link` are the ten parameters of the link that stands on the floor, in the world's frame: no joint torque feels it, so
-    /// it is never estimated and must be declared (a scale and a look at it tell enough); the ZMP feels it.
+    /// `base_link` are the ten parameters of the link that stands on the floor, in the world's frame: no
+    /// joint torque feels it, so it is never estimated and must be declared (a scale and a look at it tell
+    /// enough); the ZMP feels it.
     ///
     /// # Errors
     /// The tree has numbers that are not finite, or its base floats.
@@ -63,7 +64,8 @@ impl Robot {
         Self::with_base(tree, base, base_link, declared, catalogue)
     }
 
-    /// A robot of which not all motions are possible, with the base parameters that those tell apart which are.
+    /// A robot of which not all motions are possible, with the base parameters that those tell apart which
+    /// are.
     ///
     /// # Errors
     /// The base floats, or an effect is unknown.
@@ -111,7 +113,8 @@ impl Robot {
         Ok(Design::new(self.tree.clone(), self.base.clone(), effects?))
     }
 
-    /// The columns of the rigid body and of a belief's effects, with the belief as the reference of effects whose columns need torques.
+    /// The columns of the rigid body and of a belief's effects, with the belief as the reference of effects
+    /// whose columns need torques.
     ///
     /// # Errors
     /// An effect is unknown, or the belief is of another robot.
@@ -136,7 +139,8 @@ impl Robot {
         Ok(self.design(&[&model.specs(), more].concat())?.with_reference(reference))
     }
 
-    /// The truth of a simulated robot: the tree's own standard parameters, and one number for each declared effect's parameters.
+    /// The truth of a simulated robot: the tree's own standard parameters, and one number for each declared
+    /// effect's parameters.
     ///
     /// # Errors
     /// There are not as many numbers as parameters.
@@ -182,12 +186,13 @@ impl RobotModel {
 
     /// The model with the parameter vector `parameters` over the rigid body and the effects `specs`.
     ///
-    /// Controller (13) and ZMP (8) need standard parameters, of which motion tells only the base parameters. Of all standard parameters
-    /// that have them, those nearest to the present belief are taken, distances weighed by each body's mass
-    /// ([`BaseParameters::to_standard`]): what was measured is believed exactly, and what no joint torque feels stays as
-    /// it was believed, for nothing has been learnt of it. Joint torques do not depend on the choice. The ZMP does: the directions that
-    /// torques do not feel keep the error of the first belief (the mass of the first link, the sideways place of a
-    /// trunk that only pitches).
+    /// Controller (13) and ZMP (8) need standard parameters, of which motion tells only the base parameters.
+    /// Of all standard parameters that have them, those nearest to the present belief are taken, distances
+    /// weighed by each body's mass ([`BaseParameters::to_standard`]): what was measured is believed exactly,
+    /// and what no joint torque feels stays as it was believed, for nothing has been learnt of it. Joint
+    /// torques do not depend on the choice. The ZMP does: the directions that torques do not feel keep the
+    /// error of the first belief (the mass of the first link, the sideways place of a trunk that only
+    /// pitches).
     ///
     /// # Errors
     /// There are not as many parameters as the robot and the effects have.
@@ -219,8 +224,8 @@ impl RobotModel {
         Ok(RobotModel { standard: self.standard.clone(), effects })
     }
 
-    /// The paper's bad initial model w¹: every standard parameter and every parameter of an effect uniform between 0 and twice its
-    /// value here (section 5.2.1).
+    /// The paper's bad initial model w¹: every standard parameter and every parameter of an effect uniform
+    /// between 0 and twice its value here (section 5.2.1).
     pub fn unreliable(&self, random: &mut impl Rng) -> Self {
         let mut draw = |value: &f64| 2.0 * value * random.random::<f64>();
         let standard = self.standard.iter().map(&mut draw).collect();

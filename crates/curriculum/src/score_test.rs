@@ -8,12 +8,14 @@ use crate::{
 use phiw_effects::{Constants, EffectKind, JointRange, SignalRanges};
 use phiw_identification::{EffectCatalogue, EffectSpec};
 
-/// Asks of every effect of the catalogue what it would save of −log L ([`MotionLikelihood::gains`]), fits the few best in full, adds the simplest
-/// of those that explain alike if it is worth its price, and asks again.
+/// Asks of every effect of the catalogue what it would save of −log L ([`MotionLikelihood::gains`]), fits the
+/// few best in full, adds the simplest of those that explain alike if it is worth its price, and asks again.
 ///
-/// The likelihood knows that noise moves the robot, and needs no residual with a colour: what many rows say together is enough, however far below the noise of
-/// one row an effect is. Effects whose columns look ahead in time or need derivatives of the model's torque (delay, elasticity, an encoder's offset) are no candidates:
-/// what is known when a period begins is not enough to tell them. [`crate::TraceResidual`] asks for them.
+/// The likelihood knows that noise moves the robot, and needs no residual with a colour: what many rows say
+/// together is enough, however far below the noise of one row an effect is. Effects whose columns look ahead
+/// in time or need derivatives of the model's torque (delay, elasticity, an encoder's offset) are no
+/// candidates: what is known when a period begins is not enough to tell them. [`crate::TraceResidual`] asks
+/// for them.
 #[derive(Clone, Debug)]
 pub struct ScoreTest {
     /// The estimator that the curriculum runs with.
@@ -28,8 +30,8 @@ impl ScoreTest {
         ScoreTest { estimator, settings: ScoreTestSettings::default() }
     }
 
-    /// Every effect of the catalogue on every joint that a fit leaves something of, each with the constants that save most, the best first by gain
-    /// less price. `model` has been fitted to the logs.
+    /// Every effect of the catalogue on every joint that a fit leaves something of, each with the constants
+    /// that save most, the best first by gain less price. `model` has been fitted to the logs.
     ///
     /// # Errors
     /// The logs are not of this robot.
@@ -94,8 +96,9 @@ impl ScoreTest {
         Ok((model.with_parameters(robot, &specs, &estimate.parameters)?, misfit))
     }
 
-    /// The effects of `near` once everything has been fitted again beside `known`, each with its constants refined, and what it is then worth. What the score foretells of a
-    /// large effect is rough, and one that does half of its work may be foretold as much.
+    /// The effects of `near` once everything has been fitted again beside `known`, each with its constants
+    /// refined, and what it is then worth. What the score foretells of a large effect is rough, and one that
+    /// does half of its work may be foretold as much.
     fn contenders(
         &self,
         robot: &Robot,
@@ -202,8 +205,8 @@ fn is_alike(one: &EffectSpec, other: &EffectSpec) -> bool {
     one.kind == other.kind && one.joints == other.joints
 }
 
-/// Every effect that may be beside `present`, with all constants to try. Every log of a curriculum has a clock of its own: of what changes with the time since a motor
-/// was switched on, nothing is known.
+/// Every effect that may be beside `present`, with all constants to try. Every log of a curriculum has a
+/// clock of its own: of what changes with the time since a motor was switched on, nothing is known.
 fn candidates(robot: &Robot, ranges: &SignalRanges, present: &[EffectSpec]) -> Vec<EffectSpec> {
     let tree = robot.tree();
     let mut specs = Vec::new();
@@ -226,7 +229,8 @@ fn candidates(robot: &Robot, ranges: &SignalRanges, present: &[EffectSpec]) -> V
     specs
 }
 
-/// What the logs cover. No period of a ripple is known from a residual that is mostly noise, so there is none to try.
+/// What the logs cover. No period of a ripple is known from a residual that is mostly noise, so there is none
+/// to try.
 fn ranges(robot: &Robot, logs: &[Measured]) -> SignalRanges {
     let joints = robot.tree().joint_count();
     let joint = |joint: usize| {

@@ -29,7 +29,8 @@ pub enum StanceError {
 /// How the floor is found under a robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StanceSettings {
-    /// Corners of soles that are less than this above the lowest touch the floor \[m\]. Default: 2·10⁻³, the give of a rubber sole; not calibrated.
+    /// Corners of soles that are less than this above the lowest touch the floor \[m\]. Default: 2·10⁻³, the
+    /// give of a rubber sole; not calibrated.
     pub contact_height: f64,
 }
 
@@ -40,8 +41,8 @@ impl Default for StanceSettings {
 }
 
 impl StanceSettings {
-    /// The support polygon of the soles, seen from the base. `whole` is the robot with a floating base and no joint held, so that every link has its name; `held` are joints and their
-    /// positions \[rad, m\].
+    /// The support polygon of the soles, seen from the base. `whole` is the robot with a floating base and no
+    /// joint held, so that every link has its name; `held` are joints and their positions \[rad, m\].
     ///
     /// # Errors
     /// A joint that is not held moves a foot, or the soles have no area.

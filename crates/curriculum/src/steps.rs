@@ -1,18 +1,21 @@
 //! Whether the positions of a motion go from row to row as its velocities say.
 //!
-//! A check of [`Motion`], which asks for it when it is read from a log: the two files name each other because they are one type, and stand apart for length.
+//! A check of [`Motion`], which asks for it when it is read from a log: the two files name each other because
+//! they are one type, and stand apart for length.
 
 use crate::{CurriculumError, Motion};
 
-/// How far the step from one row's position to the next may be from the velocities that are stated beside them.
+/// How far the step from one row's position to the next may be from the velocities that are stated beside
+/// them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepTolerance {
-    /// A jump: how much further a joint may go between two rows than the stated velocities make it go \[rad, m\]. It is there for rounded positions
-    /// alone: all embedded motions, retargeted onto `models/upper_body18.urdf` with either kind of derivatives, need 1e-15, and 5e-5 if the bend of
-    /// the velocities' curve is left out (`phiw retarget`, measured in its files).
+    /// A jump: how much further a joint may go between two rows than the stated velocities make it go \[rad,
+    /// m\]. It is there for rounded positions alone: all embedded motions, retargeted onto
+    /// `models/upper_body18.urdf` with either kind of derivatives, need 1e-15, and 5e-5 if the bend of the
+    /// velocities' curve is left out (`phiw retarget`, measured in its files).
     pub jump: f64,
-    /// How much faster a step may be than the joint's limit, or than the velocities stated beside it where these exceed the limit: a share of
-    /// them. At a thousand rows a second even a small jump is that fast.
+    /// How much faster a step may be than the joint's limit, or than the velocities stated beside it where
+    /// these exceed the limit: a share of them. At a thousand rows a second even a small jump is that fast.
     pub speed_margin: f64,
 }
 
@@ -23,9 +26,9 @@ impl Default for StepTolerance {
 }
 
 impl Motion {
-    /// Checks each step from one row's positions to the next: its mean velocity must lie between the two that are stated there, give or take what
-    /// the bend of the velocities' curve adds. `joints` are the joints' names and `speed_limits` their limits \[rad/s, m/s\]; a joint beyond their
-    /// end has none.
+    /// Checks each step from one row's positions to the next: its mean velocity must lie between the two that
+    /// are stated there, give or take what the bend of the velocities' curve adds. `joints` are the joints'
+    /// names and `speed_limits` their limits \[rad/s, m/s\]; a joint beyond their end has none.
     ///
     /// # Errors
     /// [`CurriculumError::Motion`] with the lines, the joint and the values of the first step that does not.
@@ -61,8 +64,9 @@ impl Motion {
         Ok(())
     }
 
-    /// The slowest and the fastest mean velocity that a joint may have between this row and the next \[rad/s, m/s\]. The mean of a smooth curve leaves
-    /// its ends by a twelfth of its second difference; the noise of this difference takes it to an eighth.
+    /// The slowest and the fastest mean velocity that a joint may have between this row and the next \[rad/s,
+    /// m/s\]. The mean of a smooth curve leaves its ends by a twelfth of its second difference; the noise of
+    /// this difference takes it to an eighth.
     fn stated_speeds(&self, row: usize, joint: usize) -> [f64; 2] {
         let stated = |row: usize| self.sample(row)[1][joint];
         let second = |row: usize| (stated(row - 1) - 2.0 * stated(row) + stated(row + 1)).abs();

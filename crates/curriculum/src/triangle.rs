@@ -1,8 +1,9 @@
 //! Small triangles, fast: two merged into one, and the extreme singular values of the result.
 //!
-//! A selection asks for cond of the stack with each candidate. A full QR and a full singular value decomposition of a 132-triangle
-//! cost 10 ms; both know nothing of the zeros, and all singular values but two are thrown away. Here the QR of one triangle on top of
-//! another touches the non-zeros only (n³/3 multiplications), and Lanczos' method finds the two in some tens of products.
+//! A selection asks for cond of the stack with each candidate. A full QR and a full singular value
+//! decomposition of a 132-triangle cost 10 ms; both know nothing of the zeros, and all singular values but
+//! two are thrown away. Here the QR of one triangle on top of another touches the non-zeros only (n³/3
+//! multiplications), and Lanczos' method finds the two in some tens of products.
 
 use phiw_dynamics::dense::dot;
 use phiw_regressor::factor::{Factor, solve_lower, solve_upper};
@@ -38,7 +39,8 @@ impl Triangle {
         &self.entries[column * self.size..][..=column]
     }
 
-    /// Takes in the rows of another triangle: R of \[this; other\] by Householder reflections that keep to the non-zeros.
+    /// Takes in the rows of another triangle: R of \[this; other\] by Householder reflections that keep to
+    /// the non-zeros.
     ///
     /// `other` is used up as scratch.
     ///
@@ -148,7 +150,8 @@ impl Triangle {
         if sum.is_finite() { sum } else { f64::INFINITY }
     }
 
-    /// trace(X·(ΦᵀΦ)⁻¹·Xᵀ), where `of` is R of X: the variance that unit noise leaves in X·w, summed over the rows of X; infinite for a Φ without full rank.
+    /// trace(X·(ΦᵀΦ)⁻¹·Xᵀ), where `of` is R of X: the variance that unit noise leaves in X·w, summed over the
+    /// rows of X; infinite for a Φ without full rank.
     ///
     /// # Panics
     /// For triangles of different sizes.
@@ -170,7 +173,8 @@ impl Triangle {
 /// Change of the eigenvalue over one step, as a share, at which it counts as found.
 const SETTLED: f64 = 1e-14;
 
-/// Largest eigenvalue of a symmetric positive definite operator, by Lanczos' method with full reorthogonalisation.
+/// Largest eigenvalue of a symmetric positive definite operator, by Lanczos' method with full
+/// reorthogonalisation.
 ///
 /// It starts from a fixed vector with a part along every direction, so that the result is always the same.
 fn largest_eigenvalue(size: usize, mut apply: impl FnMut(&mut [f64])) -> f64 {

@@ -3,12 +3,15 @@
 use crate::rivalry::torques_along;
 use crate::{CurriculumError, Measured, Robot, RobotModel};
 
-/// When a residual is white. Each threshold is in standard deviations of what white noise gives, in any of all torques: higher asks for fewer traces and misses small effects.
+/// When a residual is white. Each threshold is in standard deviations of what white noise gives, in any of
+/// all torques: higher asks for fewer traces and misses small effects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WhitenessSettings {
-    /// How far back a residual is compared with itself \[s\]. Default: 0.2, since friction, springs and their like change slower.
+    /// How far back a residual is compared with itself \[s\]. Default: 0.2, since friction, springs and their
+    /// like change slower.
     pub reach_s: f64,
-    /// Largest sum of the autocorrelations. Default: 4 (`chance_is_told_from_what_goes_on`, 200 seeds without a false alarm).
+    /// Largest sum of the autocorrelations. Default: 4 (`chance_is_told_from_what_goes_on`, 200 seeds without
+    /// a false alarm).
     pub sum: f64,
     /// Largest sum of their squares above what chance gives. Default: 6 (the same test).
     pub squares: f64,
@@ -20,9 +23,10 @@ impl Default for WhitenessSettings {
     }
 }
 
-/// The torques whose residual under a belief is not white. Noise of the actuators that is new in every period leaves nothing else under a right
-/// model, since the rows balance the command exactly; what the model lacks depends on the motion, and goes on as the motion does. Costs a
-/// thousandth of a trace. Where the noise of a real robot has a colour, all torques are named, and the trace decides.
+/// The torques whose residual under a belief is not white. Noise of the actuators that is new in every period
+/// leaves nothing else under a right model, since the rows balance the command exactly; what the model lacks
+/// depends on the motion, and goes on as the motion does. Costs a thousandth of a trace. Where the noise of a
+/// real robot has a colour, all torques are named, and the trace decides.
 ///
 /// # Errors
 /// The belief or a log is not of this robot.
@@ -45,7 +49,8 @@ pub(crate) fn coloured(
     Ok((0..joints).filter(|&joint| !correlations[joint].are_chance(settings)).collect())
 }
 
-/// What a belief leaves of the torques of a log: measured minus modelled over each period, `[period × joint]` \[N·m, N\].
+/// What a belief leaves of the torques of a log: measured minus modelled over each period, `[period × joint]`
+/// \[N·m, N\].
 ///
 /// # Errors
 /// The belief or the log is not of this robot.

@@ -1,4 +1,5 @@
-//! The analytic backend: this crate's algorithms behind [`DynamicsBackend`], [`SimulationBackend`] and [`BodyKinematics`].
+//! The analytic backend: this crate's algorithms behind [`DynamicsBackend`], [`SimulationBackend`] and
+//! [`BodyKinematics`].
 
 use crate::backend::check_finite;
 use crate::configuration::{normalised, quaternion_product};
@@ -16,8 +17,8 @@ const RUNGE_KUTTA: [(f64, f64); 4] = [(1.0 / 6.0, 0.5), (1.0 / 3.0, 0.5), (1.0 /
 
 /// A [`Tree`] in empty space: a floating base falls freely.
 ///
-/// [`step`](SimulationBackend::step) is one step of the classical Runge-Kutta method of order four. The friction and
-/// the limits that the URDF declares are not part of it.
+/// [`step`](SimulationBackend::step) is one step of the classical Runge-Kutta method of order four. The
+/// friction and the limits that the URDF declares are not part of it.
 #[derive(Clone, Debug)]
 pub struct AnalyticBackend {
     tree: Tree,
@@ -71,8 +72,8 @@ impl AnalyticBackend {
         }
     }
 
-    /// The robot in a world of which this backend can do the rotors alone: they add their inertia to the mass matrix's
-    /// diagonal, and their reaction on the base is left out, as in physics engines ("armature").
+    /// The robot in a world of which this backend can do the rotors alone: they add their inertia to the mass
+    /// matrix's diagonal, and their reaction on the base is left out, as in physics engines ("armature").
     ///
     /// # Errors
     /// The world does not fit the robot, or has feet or position limits, which need contacts.
@@ -270,8 +271,8 @@ fn configuration_rate(tree: &Tree, q: &[f64], v: &[f64], rate: &mut [f64]) {
 
 /// `result = start + duration · rate`, with a floating base's quaternion put back on the unit sphere.
 ///
-/// Stages evaluate the rate at unit quaternions only, so the method sees one smooth field around the sphere and keeps
-/// its order.
+/// Stages evaluate the rate at unit quaternions only, so the method sees one smooth field around the sphere
+/// and keeps its order.
 fn advance(tree: &Tree, start: &[f64], duration: f64, rate: &[f64], result: &mut [f64]) {
     result.copy_from_slice(start);
     add_scaled(result, duration, rate);

@@ -1,4 +1,5 @@
-//! The contracts between algorithms that need a robot's dynamics, or a robot that moves, and what provides them.
+//! The contracts between algorithms that need a robot's dynamics, or a robot that moves, and what provides
+//! them.
 
 use crate::DimensionError;
 
@@ -45,18 +46,21 @@ pub enum BackendError {
     },
 }
 
-/// A robot's dynamics, whoever computes them: the analytic algorithms here, a physics engine, or another library.
+/// A robot's dynamics, whoever computes them: the analytic algorithms here, a physics engine, or another
+/// library.
 ///
-/// This is the half that computes. It needs no simulator: who has one implements [`SimulationBackend`] as well, and who knows how
-/// the bodies move implements [`BodyKinematics`](crate::BodyKinematics), for the regressor and the ZMP.
+/// This is the half that computes. It needs no simulator: who has one implements [`SimulationBackend`] as
+/// well, and who knows how the bodies move implements [`BodyKinematics`](crate::BodyKinematics), for the
+/// regressor and the ZMP.
 ///
-/// **Coordinates** are those of [`crate::Tree`]: the configuration `q` is `[x, y, z, qx, qy, qz, qw]` of a floating base
-/// (absent on a fixed one), then one position for each joint of [`joint_names`](Self::joint_names), in their order; the
-/// velocity `v` is the base's linear and angular velocity in its own frame, then one for each joint. Accelerations and
-/// generalised forces follow `v`. SI units throughout.
+/// **Coordinates** are those of [`crate::Tree`]: the configuration `q` is `[x, y, z, qx, qy, qz, qw]` of a
+/// floating base (absent on a fixed one), then one position for each joint of
+/// [`joint_names`](Self::joint_names), in their order; the velocity `v` is the base's linear and angular
+/// velocity in its own frame, then one for each joint. Accelerations and generalised forces follow `v`. SI
+/// units throughout.
 ///
-/// `inverse_dynamics` and `forward_dynamics` are the robot's own equation `M(q)·a + h(q, v) = force`, without contacts, friction or
-/// noise.
+/// `inverse_dynamics` and `forward_dynamics` are the robot's own equation `M(q)·a + h(q, v) = force`, without
+/// contacts, friction or noise.
 pub trait DynamicsBackend {
     /// The backend's name, for messages.
     fn name(&self) -> &str;
@@ -94,19 +98,20 @@ pub trait DynamicsBackend {
         acceleration: &mut [f64],
     ) -> Result<(), BackendError>;
 
-    /// The wrench that the world gives to the robot at its base, along the world's axes: force \[N\], then moment about
-    /// the world's origin \[N·m\]. The measured ZMP comes from it.
+    /// The wrench that the world gives to the robot at its base, along the world's axes: force \[N\], then
+    /// moment about the world's origin \[N·m\]. The measured ZMP comes from it.
     ///
-    /// It belongs to the motion of the last [`inverse_dynamics`](Self::inverse_dynamics) (what the base must be given),
-    /// or of the last [`step`](SimulationBackend::step) of a simulation at the instant at which the step began, whichever came later;
-    /// zero before either. Bodies that move are counted; the root link of a fixed base is not, as its inertia is not part of
-    /// the robot.
+    /// It belongs to the motion of the last [`inverse_dynamics`](Self::inverse_dynamics) (what the base must
+    /// be given), or of the last [`step`](SimulationBackend::step) of a simulation at the instant at which
+    /// the step began, whichever came later; zero before either. Bodies that move are counted; the root link
+    /// of a fixed base is not, as its inertia is not part of the robot.
     fn base_wrench(&self) -> [f64; 6];
 }
 
 /// A robot that moves in a world of its own, which may hold a floor or noise: the half that simulates.
 ///
-/// The state is the backend's. [`step`](Self::step) moves it on; inverse and forward dynamics leave it as it is.
+/// The state is the backend's. [`step`](Self::step) moves it on; inverse and forward dynamics leave it as it
+/// is.
 pub trait SimulationBackend: DynamicsBackend {
     /// Copies the present state into `q` and `v`.
     ///
@@ -122,16 +127,18 @@ pub trait SimulationBackend: DynamicsBackend {
 
     /// Moves the state on by `dt` \[s\] under constant joint torques, one for each joint \[N·m, N\].
     ///
-    /// A floating base is moved by gravity and by the contacts of the backend's world alone. After an error the state is
-    /// unchanged.
+    /// A floating base is moved by gravity and by the contacts of the backend's world alone. After an error
+    /// the state is unchanged.
     ///
     /// # Errors
-    /// The slice does not fit the robot, a number is not finite, `dt` is not positive, or the motion diverges.
+    /// The slice does not fit the robot, a number is not finite, `dt` is not positive, or the motion
+    /// diverges.
     fn step(&mut self, torque: &[f64], dt: f64) -> Result<(), BackendError>;
 
-    /// The part of [`base_wrench`](DynamicsBackend::base_wrench) that the floor gave to one foot of the world in the last
-    /// [`step`](Self::step), about the world's origin as well, as a force plate under that foot would say; `foot` counts
-    /// [`World::feet`](crate::World::feet). None from a backend without contacts, and before a step.
+    /// The part of [`base_wrench`](DynamicsBackend::base_wrench) that the floor gave to one foot of the world
+    /// in the last [`step`](Self::step), about the world's origin as well, as a force plate under that foot
+    /// would say; `foot` counts [`World::feet`](crate::World::feet). None from a backend without contacts,
+    /// and before a step.
     fn foot_wrench(&self, foot: usize) -> Option<[f64; 6]> {
         let _ = foot;
         None

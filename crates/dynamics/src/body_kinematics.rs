@@ -7,20 +7,23 @@ use crate::{BodyMotion, DimensionError, JointType, Scalar, Spatial, Tree, Vec3, 
 pub struct BodyJoint {
     /// Index of the parent body, which is smaller than the body's own; `None` is the world.
     pub parent: Option<usize>,
-    /// Index of the first velocity coordinate that moves the joint. Joints that follow one leader share its coordinate.
+    /// Index of the first velocity coordinate that moves the joint. Joints that follow one leader share its
+    /// coordinate.
     pub velocity_index: usize,
     /// How these coordinates move the body against its parent.
     pub motion_subspace: MotionSubspace,
 }
 
-/// The motions that a joint allows, as seen in the frame of the body behind it and at that frame's origin. They do not depend on the
-/// configuration.
+/// The motions that a joint allows, as seen in the frame of the body behind it and at that frame's origin.
+/// They do not depend on the configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MotionSubspace {
-    /// One coordinate, whose velocity times this axis is the body's velocity against its parent. A prismatic joint has a linear unit vector,
-    /// a revolute joint an angular one; for a joint that follows another it is multiplied by the ratio.
+    /// One coordinate, whose velocity times this axis is the body's velocity against its parent. A prismatic
+    /// joint has a linear unit vector, a revolute joint an angular one; for a joint that follows another it
+    /// is multiplied by the ratio.
     Axis(Spatial<f64>),
-    /// Six coordinates of a floating base: the linear, then the angular velocity of the body in its own frame.
+    /// Six coordinates of a floating base: the linear, then the angular velocity of the body in its own
+    /// frame.
     Floating,
 }
 
@@ -34,7 +37,8 @@ impl MotionSubspace {
         }
     }
 
-    /// Writes the motion that unit velocity of each coordinate gives, one after the other; as many as there is room for.
+    /// Writes the motion that unit velocity of each coordinate gives, one after the other; as many as there
+    /// is room for.
     #[inline(always)]
     pub fn axes<T: Scalar>(&self, axes: &mut [Spatial<T>]) {
         match self {
@@ -57,16 +61,17 @@ impl MotionSubspace {
     }
 }
 
-/// How the bodies of a robot hang together and how they move, whoever computes it: the little that the joint torque regressor and the ZMP
-/// need to know of a robot.
+/// How the bodies of a robot hang together and how they move, whoever computes it: the little that the joint
+/// torque regressor and the ZMP need to know of a robot.
 ///
-/// A [`Tree`] provides it, and so may any library that knows where bodies are and how they accelerate; neither dynamics nor
-/// inertial parameters are asked for. Algorithms take it by value, as readers are taken by value in [`std::io`]: pass
-/// `&tree` or `&mut backend`.
+/// A [`Tree`] provides it, and so may any library that knows where bodies are and how they accelerate;
+/// neither dynamics nor inertial parameters are asked for. Algorithms take it by value, as readers are taken
+/// by value in [`std::io`]: pass `&tree` or `&mut backend`.
 ///
-/// **Bodies** come parents before children. The frame of a body is fixed to it, and otherwise the provider's choice: the ten standard
-/// parameters that belong to the body ([`crate::PARAMETER_NAMES`]) are those in this frame. **Coordinates** are those of [`Tree`]: on a
-/// floating base, which only the first body can be, the configuration starts with `[x, y, z, qx, qy, qz, qw]`.
+/// **Bodies** come parents before children. The frame of a body is fixed to it, and otherwise the provider's
+/// choice: the ten standard parameters that belong to the body ([`crate::PARAMETER_NAMES`]) are those in this
+/// frame. **Coordinates** are those of [`Tree`]: on a floating base, which only the first body can be, the
+/// configuration starts with `[x, y, z, qx, qy, qz, qw]`.
 pub trait BodyKinematics<T: Scalar = f64> {
     /// What goes wrong where the motion is computed.
     type Error: From<DimensionError>;

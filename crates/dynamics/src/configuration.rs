@@ -2,7 +2,8 @@
 
 use crate::{DimensionError, Placement, Tree, Vec3, check_size};
 
-/// Below this angle \[rad\] the exponential's coefficients come from their series: the neglected terms vanish in rounding.
+/// Below this angle \[rad\] the exponential's coefficients come from their series: the neglected terms vanish
+/// in rounding.
 const SMALL_ANGLE: f64 = 1e-4;
 
 impl Tree {
@@ -17,7 +18,8 @@ impl Tree {
 
     /// Where the configuration is after moving with the constant velocity `v` for the time `duration`.
     ///
-    /// A floating base moves along a screw (the exponential of its body velocity), and its quaternion stays unit.
+    /// A floating base moves along a screw (the exponential of its body velocity), and its quaternion stays
+    /// unit.
     ///
     /// # Errors
     /// A slice does not fit this robot.

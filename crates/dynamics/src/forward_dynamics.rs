@@ -7,11 +7,14 @@ use crate::{
 };
 
 impl Tree {
-    /// Acceleration under the generalised force: `M(q)⁻¹·(force − h(q, v))`, the inverse of [`Tree::inverse_dynamics`].
+    /// Acceleration under the generalised force: `M(q)⁻¹·(force − h(q, v))`, the inverse of
+    /// [`Tree::inverse_dynamics`].
     ///
-    /// Where the robot is singular (a joint with nothing but massless links behind it) the result is not finite.
+    /// Where the robot is singular (a joint with nothing but massless links behind it) the result is not
+    /// finite.
     ///
-    /// Featherstone 1983, in body frames; with mimic joints, whose tree is no tree, by way of the mass matrix.
+    /// Featherstone 1983, in body frames; with mimic joints, whose tree is no tree, by way of the mass
+    /// matrix.
     ///
     /// # Errors
     /// A slice or the workspace does not fit this robot.
@@ -39,8 +42,8 @@ impl Tree {
         Ok(())
     }
 
-    /// Forward dynamics by way of the mass matrix, without checks. `rotor_inertia`: what is added to the diagonal, one for
-    /// each joint, or empty.
+    /// Forward dynamics by way of the mass matrix, without checks. `rotor_inertia`: what is added to the
+    /// diagonal, one for each joint, or empty.
     #[inline(always)]
     pub(crate) fn solve_mass_matrix<T: Scalar>(
         &self,
@@ -141,7 +144,8 @@ impl Tree {
         let upward = Spatial { linear: -Vec3::constant(self.gravity), angular: Vec3::zero() };
         for (index, body) in self.bodies.iter().enumerate() {
             if body.joint_type == JointType::Floating {
-                // What the base feels is its acceleration less gravity; the coordinates want the acceleration itself.
+                // What the base feels is its acceleration less gravity; the coordinates want the acceleration
+                // itself.
                 let rotation = crate::motion::floating_placement(q).rotation;
                 let gravity = rotation.transpose_mul(Vec3::constant(self.gravity));
                 for axis in 0..3 {
@@ -159,7 +163,8 @@ impl Tree {
     }
 }
 
-/// Solves the six equations of a floating base; leaves its acceleration less gravity in `acceleration` and in the state.
+/// Solves the six equations of a floating base; leaves its acceleration less gravity in `acceleration` and in
+/// the state.
 #[inline(always)]
 fn solve_base<T: Scalar>(state: &mut ArticulatedBody<T>, force: &[T], acceleration: &mut [T]) {
     let ArticulatedInertia { linear, coupling, angular } = state.inertia;

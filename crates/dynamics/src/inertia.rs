@@ -1,4 +1,5 @@
-//! Spatial inertia of a rigid body at an arbitrary origin: linear in the standard parameters, no division by the mass.
+//! Spatial inertia of a rigid body at an arbitrary origin: linear in the standard parameters, no division by
+//! the mass.
 
 use crate::dense::Cholesky;
 use crate::{BodyMotion, InertialParameters, Mat3, Placement, Scalar, Spatial, Vec3};
@@ -52,7 +53,8 @@ impl<T: Scalar> Inertia<T> {
         Inertia { mass: self.mass, moment: carried, tensor: shifted }
     }
 
-    /// Inertia times a motion: momentum of a velocity, or the force that gives an acceleration to a body at rest.
+    /// Inertia times a motion: momentum of a velocity, or the force that gives an acceleration to a body at
+    /// rest.
     #[inline(always)]
     pub fn times(self, motion: Spatial<T>) -> Spatial<T> {
         Spatial {
@@ -99,8 +101,8 @@ impl Inertia<f64> {
         self.tensor - lever.tensor
     }
 
-    /// Whether a distribution of positive mass has this inertia: the pseudo-inertia \[½tr(I)·1 − I, h; hᵀ, m\] is positive definite
-    /// (Wensing, Kim & Slotine 2018).
+    /// Whether a distribution of positive mass has this inertia: the pseudo-inertia \[½tr(I)·1 − I, h; hᵀ,
+    /// m\] is positive definite (Wensing, Kim & Slotine 2018).
     pub fn is_physical(&self) -> bool {
         let (Vec3(h), Mat3(tensor)) = (self.moment, self.tensor);
         let half = 0.5 * (tensor[0][0] + tensor[1][1] + tensor[2][2]);

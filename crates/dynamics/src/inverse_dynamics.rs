@@ -5,9 +5,10 @@ use crate::{BodyMotion, DimensionError, Inertia, JointType, Scalar, Spatial, Tre
 impl Tree {
     /// Generalised force that the motion `(q, v, a)` needs: `M(q)·a + h(q, v)`.
     ///
-    /// `q` has [`Tree::configuration_size`] elements, `v`, `a` and `force` have [`Tree::velocity_size`]. Torque \[N·m\]
-    /// or force \[N\] for each joint; for a floating base first the force and moment on the base, in its own frame. The
-    /// torque of a mimic's leader includes what its followers need. Friction is not part of it.
+    /// `q` has [`Tree::configuration_size`] elements, `v`, `a` and `force` have [`Tree::velocity_size`].
+    /// Torque \[N·m\] or force \[N\] for each joint; for a floating base first the force and moment on the
+    /// base, in its own frame. The torque of a mimic's leader includes what its followers need. Friction is
+    /// not part of it.
     ///
     /// Luh, Walker & Paul 1980, in body frames.
     ///
@@ -31,8 +32,8 @@ impl Tree {
         Ok(())
     }
 
-    /// [`Tree::inverse_dynamics`] without checks; leaves in `forces` the wrench that each joint transmits, in the
-    /// frame of its body.
+    /// [`Tree::inverse_dynamics`] without checks; leaves in `forces` the wrench that each joint transmits, in
+    /// the frame of its body.
     #[inline(always)]
     pub(crate) fn newton_euler<T: Scalar>(
         &self,
@@ -62,8 +63,8 @@ impl Tree {
         }
     }
 
-    /// The wrench that the world gives to the robot in the motion that [`Tree::inverse_dynamics`] has just computed with
-    /// this workspace: force, then moment about the world's origin, along the world's axes.
+    /// The wrench that the world gives to the robot in the motion that [`Tree::inverse_dynamics`] has just
+    /// computed with this workspace: force, then moment about the world's origin, along the world's axes.
     pub(crate) fn base_wrench(&self, workspace: &Workspace<f64>) -> [f64; 6] {
         let mut total = Spatial::zero();
         for (index, body) in self.bodies.iter().enumerate() {

@@ -30,9 +30,9 @@ impl Tree {
 
     /// Geometric Jacobian of a point fixed to a body: 6 × [`Tree::velocity_size`], row by row.
     ///
-    /// Times `v` it gives the velocity of the point (three rows, m/s) and the body's angular velocity (three rows,
-    /// rad/s), both along the world's axes. `placements` come from [`Tree::forward_kinematics`]; `point` is in the body's
-    /// frame \[m\].
+    /// Times `v` it gives the velocity of the point (three rows, m/s) and the body's angular velocity (three
+    /// rows, rad/s), both along the world's axes. `placements` come from [`Tree::forward_kinematics`];
+    /// `point` is in the body's frame \[m\].
     ///
     /// # Errors
     /// A slice does not fit this robot, or there is no such body.
@@ -78,8 +78,8 @@ impl Tree {
         Ok(moment.scale(T::constant(1.0 / self.mass())))
     }
 
-    /// Jacobian of the centre of mass: 3 × [`Tree::velocity_size`], row by row; times `v` it gives the velocity of the
-    /// centre of mass along the world's axes \[m/s\].
+    /// Jacobian of the centre of mass: 3 × [`Tree::velocity_size`], row by row; times `v` it gives the
+    /// velocity of the centre of mass along the world's axes \[m/s\].
     ///
     /// # Errors
     /// A slice does not fit this robot.
@@ -109,8 +109,8 @@ impl Tree {
         Ok(())
     }
 
-    /// For every coordinate that moves `body`, the motion that its unit velocity gives to `point` (in the world), along
-    /// the world's axes. A coordinate comes more than once where mimic joints share it.
+    /// For every coordinate that moves `body`, the motion that its unit velocity gives to `point` (in the
+    /// world), along the world's axes. A coordinate comes more than once where mimic joints share it.
     #[inline(always)]
     fn for_each_axis<T: Scalar>(
         &self,

@@ -5,7 +5,8 @@ use crate::{DimensionError, Inertia, JointType, Scalar, Spatial, Tree, Vec3, Wor
 impl Tree {
     /// The mass matrix `M(q)`: dense, symmetric, row by row, `velocity_size` × `velocity_size`.
     ///
-    /// In the coordinates of [`Tree::inverse_dynamics`]; rows and columns of a mimic's leader include its followers.
+    /// In the coordinates of [`Tree::inverse_dynamics`]; rows and columns of a mimic's leader include its
+    /// followers.
     ///
     /// Walker & Orin 1982; Featherstone 2008, table 6.2.
     ///

@@ -28,11 +28,11 @@ impl<T: Scalar> BodyMotion<T> {
 }
 
 impl Tree {
-    /// Motion of every body for configuration `q`, velocity `v` and acceleration `a` (see [`Tree`] for their layout; a
-    /// floating base's acceleration is the spatial one, Pinocchio's).
+    /// Motion of every body for configuration `q`, velocity `v` and acceleration `a` (see [`Tree`] for their
+    /// layout; a floating base's acceleration is the spatial one, Pinocchio's).
     ///
-    /// Sizes are the caller's duty: `q` has [`Tree::configuration_size`] elements, `v` and `a` [`Tree::velocity_size`],
-    /// `motions` one for each body.
+    /// Sizes are the caller's duty: `q` has [`Tree::configuration_size`] elements, `v` and `a`
+    /// [`Tree::velocity_size`], `motions` one for each body.
     #[inline(always)]
     pub fn body_motions<T: Scalar>(&self, q: &[T], v: &[T], a: &[T], motions: &mut [BodyMotion<T>]) {
         for (index, body) in self.bodies.iter().enumerate() {

@@ -121,8 +121,8 @@ pub fn random_tree(seed: u64, options: &RandomTreeOptions) -> Result<Tree, UrdfE
     Ok(read_urdf(&random_urdf(seed, options), &reading)?.tree)
 }
 
-/// A random state of the robot: inside its joint limits (±π where there are none), speeds and accelerations up to
-/// 2 rad/s and 5 rad/s².
+/// A random state of the robot: inside its joint limits (±π where there are none), speeds and accelerations
+/// up to 2 rad/s and 5 rad/s².
 pub fn random_state(tree: &Tree, random: &mut RandomNumbers) -> RandomState {
     let mut q = Vec::with_capacity(tree.configuration_size());
     if tree.is_floating() {

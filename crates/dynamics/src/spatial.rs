@@ -22,7 +22,8 @@ pub struct Placement<T> {
     pub translation: Vec3<T>,
 }
 
-/// A spatial motion (velocity, acceleration, joint axis) or force (force, moment), in one frame and at its origin.
+/// A spatial motion (velocity, acceleration, joint axis) or force (force, moment), in one frame and at its
+/// origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spatial<T> {
     /// Linear velocity, or force.

@@ -5,8 +5,8 @@ use crate::{Mat3, Placement, Scalar, Spatial, Vec3};
 /// Number of standard inertial parameters of a body.
 pub const PARAMETERS_PER_BODY: usize = 10;
 
-/// Names of the standard parameters of a body, in their order (Pinocchio's): mass \[kg\], first moment \[kg·m\], and
-/// inertia about the joint frame's origin \[kg·m²\].
+/// Names of the standard parameters of a body, in their order (Pinocchio's): mass \[kg\], first moment
+/// \[kg·m\], and inertia about the joint frame's origin \[kg·m²\].
 pub const PARAMETER_NAMES: [&str; PARAMETERS_PER_BODY] =
     ["m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz"];
 
@@ -70,15 +70,16 @@ pub struct Body {
     pub friction: f64,
     /// Standard parameters that the URDF declares, fixed links merged.
     pub inertial: InertialParameters,
-    /// The three matrices of R(q) = A + sin q · B + (1 − cos q) · C (Rodrigues), with the origin's rotation multiplied in.
+    /// The three matrices of R(q) = A + sin q · B + (1 − cos q) · C (Rodrigues), with the origin's rotation
+    /// multiplied in.
     pub(crate) rotation_terms: [Mat3<f64>; 3],
 }
 
 /// A robot: bodies in depth-first order, parents before children.
 ///
-/// Velocity coordinates: six for a floating base (linear and angular velocity of the base in its own frame), then one
-/// for each joint that moves by itself. Configuration: `[x, y, z, qx, qy, qz, qw]` for a floating base, then one
-/// position for each joint. The URDF reader in [`crate::urdf`] builds it.
+/// Velocity coordinates: six for a floating base (linear and angular velocity of the base in its own frame),
+/// then one for each joint that moves by itself. Configuration: `[x, y, z, qx, qy, qz, qw]` for a floating
+/// base, then one position for each joint. The URDF reader in [`crate::urdf`] builds it.
 #[derive(Clone, Debug)]
 pub struct Tree {
     pub(crate) name: String,
@@ -119,7 +120,8 @@ impl Body {
         }
     }
 
-    /// The joint's motion axis in its own frame (times `ratio`, so that coordinates of a mimic's leader can be used).
+    /// The joint's motion axis in its own frame (times `ratio`, so that coordinates of a mimic's leader can
+    /// be used).
     #[inline(always)]
     pub fn motion_axis<T: Scalar>(&self) -> Spatial<T> {
         let axis = Vec3::constant(self.axis.scale(self.ratio).0);

@@ -4,8 +4,8 @@ use crate::{DimensionError, Tree, check_size};
 
 /// The world of a simulated robot, the same for every physics engine.
 ///
-/// The robot itself is a [`Tree`]. A fixed base stays where it is; a floating base without feet falls; a floating base
-/// with feet stands on the floor `z = 0` and topples when its ZMP leaves the feet.
+/// The robot itself is a [`Tree`]. A fixed base stays where it is; a floating base without feet falls; a
+/// floating base with feet stands on the floor `z = 0` and topples when its ZMP leaves the feet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct World {
     /// What touches the floor; empty: there is no floor.
@@ -38,8 +38,9 @@ impl World {
     /// Whether this world can hold the robot.
     ///
     /// # Errors
-    /// The rotor inertias are not one for each joint or not finite and ≥ 0; the floor friction is not finite and ≥ 0; a foot names a
-    /// body that the tree has not, or has fewer than three corners; feet under a fixed base.
+    /// The rotor inertias are not one for each joint or not finite and ≥ 0; the floor friction is not finite
+    /// and ≥ 0; a foot names a body that the tree has not, or has fewer than three corners; feet under a
+    /// fixed base.
     pub fn check(&self, tree: &Tree) -> Result<(), WorldError> {
         if !self.rotor_inertia.is_empty() {
             check_size("the world's rotor inertias", self.rotor_inertia.len(), tree.joint_count())?;

@@ -101,7 +101,8 @@ fn forward_dynamics_undoes_inverse_dynamics() {
     }
 }
 
-/// Force = rate of the momentum less weight; moment about the origin = rate of the angular momentum less the weight's.
+/// Force = rate of the momentum less weight; moment about the origin = rate of the angular momentum less the
+/// weight's.
 #[test]
 fn base_wrench_is_newtons() {
     for (seed, options) in kinds().enumerate() {

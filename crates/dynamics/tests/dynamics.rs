@@ -1,4 +1,5 @@
-//! Inverse dynamics, mass matrix and forward dynamics agree with each other and with energy, over random robots.
+//! Inverse dynamics, mass matrix and forward dynamics agree with each other and with energy, over random
+//! robots.
 
 mod arbitrary;
 

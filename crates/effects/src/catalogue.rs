@@ -1,4 +1,5 @@
-//! The catalogue finds kinds of effects by name, declares them for a robot, and builds them from a model's file.
+//! The catalogue finds kinds of effects by name, declares them for a robot, and builds them from a model's
+//! file.
 
 use crate::{Constants, EffectKind, FittedEffect, JointProperty, SignalRanges};
 use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};

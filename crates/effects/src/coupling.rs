@@ -9,8 +9,8 @@ use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator,
 
 /// Torque at one joint from the motion of another, both ways or one way.
 ///
-/// Motors that turn with the sum q_i + q_j feel viscous friction, Coulomb friction and inertia of the sum; what the joints' own friction and
-/// rotor inertia do not take up is the part that crosses over.
+/// Motors that turn with the sum q_i + q_j feel viscous friction, Coulomb friction and inertia of the sum;
+/// what the joints' own friction and rotor inertia do not take up is the part that crosses over.
 pub struct TransmissionCoupling;
 
 /// Which terms a coupling has: one bit for each of [`TERMS`].
@@ -27,7 +27,8 @@ struct Term {
     name: &'static str,
     dimension: ParameterKind,
     lower: f64,
-    /// Columns in the torques of the first and the second joint of the pair, of the velocities and accelerations of both, and the sign's width.
+    /// Columns in the torques of the first and the second joint of the pair, of the velocities and
+    /// accelerations of both, and the sign's width.
     columns: [Option<MotionColumn>; 2],
 }
 

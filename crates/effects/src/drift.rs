@@ -7,8 +7,8 @@ use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant,
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, Sample};
 
-/// Viscous and Coulomb friction times a factor that falls from one to zero: exp(−t / `time_constant`), or with the temperature where the log has
-/// one (`time_constant` zero).
+/// Viscous and Coulomb friction times a factor that falls from one to zero: exp(−t / `time_constant`), or
+/// with the temperature where the log has one (`time_constant` zero).
 pub struct ThermalDrift;
 
 const TIME_CONSTANT: &str = "time_constant";

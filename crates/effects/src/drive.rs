@@ -64,8 +64,9 @@ impl EffectKind for TorqueOffset {
     }
 }
 
-/// (1 + ε) on the measured torque: the column is all torque that the model knows of, friction included. Where the friction is fitted its own columns take up that
-/// part of the change; where it is held nothing else would.
+/// (1 + ε) on the measured torque: the column is all torque that the model knows of, friction included. Where
+/// the friction is fitted its own columns take up that part of the change; where it is held nothing else
+/// would.
 pub struct TorqueGain;
 
 impl EffectKind for TorqueGain {

@@ -5,10 +5,12 @@ use crate::kind::{Constants, EffectKind, Signal, constant};
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
 
-/// The encoder sits on the motor: the link lags behind it by τ/k. Linear in the compliance 1/k, about the value that is in force already:
-/// the link's position, velocity and acceleration differ by −τ/k, −τ̇/k, −τ̈/k.
+/// The encoder sits on the motor: the link lags behind it by τ/k. Linear in the compliance 1/k, about the
+/// value that is in force already: the link's position, velocity and acceleration differ by −τ/k, −τ̇/k,
+/// −τ̈/k.
 ///
-/// τ is the torque of the reference model, which is smooth: the measured one has noise that its second rate would blow up.
+/// τ is the torque of the reference model, which is smooth: the measured one has noise that its second rate
+/// would blow up.
 pub struct JointElasticity;
 
 impl EffectKind for JointElasticity {

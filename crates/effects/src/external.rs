@@ -56,10 +56,11 @@ impl EffectKind for Payload {
     }
 }
 
-/// A constant force in the world's frame on a link, at a point fixed in the link: F and the nine products of F with the point.
+/// A constant force in the world's frame on a link, at a point fixed in the link: F and the nine products of
+/// F with the point.
 ///
-/// A body of mass m under gravity g feels the force m·g at its centre of mass, so the columns are those of the regressor at rest under unit
-/// gravity along x, y and z.
+/// A body of mass m under gravity g feels the force m·g at its centre of mass, so the columns are those of
+/// the regressor at rest under unit gravity along x, y and z.
 pub struct ExternalForce;
 
 impl EffectKind for ExternalForce {
@@ -120,7 +121,8 @@ impl EffectKind for ExternalForce {
     }
 }
 
-/// Columns read off the regressor's pairs of one body: those of the sample, then those at rest under unit gravity along x, y, z.
+/// Columns read off the regressor's pairs of one body: those of the sample, then those at rest under unit
+/// gravity along x, y, z.
 struct BodyColumns {
     rows: Vec<usize>,
     /// For each row, the place of each parameter's number.

@@ -3,7 +3,8 @@
 use crate::Catalogue;
 use phiw_identification::{EffectParameter, EffectSpec};
 
-/// An effect and the values of its parameters, as its kind's sentence needs them ([`crate::EffectKind::sentence`]).
+/// An effect and the values of its parameters, as its kind's sentence needs them
+/// ([`crate::EffectKind::sentence`]).
 #[derive(Clone, Copy, Debug)]
 pub struct FittedEffect<'a> {
     spec: &'a EffectSpec,
@@ -42,7 +43,8 @@ impl<'a> FittedEffect<'a> {
         self.in_unit_of(place, self.value(place))
     }
 
-    /// A value \[the unit of the parameter at `place`\] with that unit; nothing if there is no such parameter.
+    /// A value \[the unit of the parameter at `place`\] with that unit; nothing if there is no such
+    /// parameter.
     pub fn in_unit_of(&self, place: usize, value: f64) -> String {
         self.parameters.get(place).map(|info| quantity(value, &info.unit)).unwrap_or_default()
     }
@@ -67,7 +69,8 @@ impl<'a> FittedEffect<'a> {
     }
 }
 
-/// What an effect of [`Catalogue::default`] means, with its fitted values; kinds that it does not know get their name and numbers.
+/// What an effect of [`Catalogue::default`] means, with its fitted values; kinds that it does not know get
+/// their name and numbers.
 pub fn sentence(spec: &EffectSpec, parameters: &[EffectParameter], fitted: &[f64]) -> String {
     Catalogue::default().sentence(spec, parameters, fitted)
 }

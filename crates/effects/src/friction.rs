@@ -11,7 +11,8 @@ use phiw_identification::{Effect, Needs, Sample};
 /// The constant of every smoothed sign: the speed over which it turns \[rad/s, m/s\].
 pub(crate) const WIDTH: &str = "sign_width";
 
-/// Speeds over which a sign may turn: the plain sign, then up to 0.064 rad/s (m/s), but no more than half of the joint's RMS speed.
+/// Speeds over which a sign may turn: the plain sign, then up to 0.064 rad/s (m/s), but no more than half of
+/// the joint's RMS speed.
 pub(crate) fn sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
     let largest = 0.5 * ranges.joints[joint].velocity_rms;
     let widths =
@@ -104,7 +105,8 @@ impl EffectKind for Coulomb {
     }
 }
 
-/// Half the difference between the two directions, of the viscous part, the Coulomb part, or both (`part` 0, 1, 2).
+/// Half the difference between the two directions, of the viscous part, the Coulomb part, or both (`part` 0,
+/// 1, 2).
 pub struct Asymmetric;
 
 impl EffectKind for Asymmetric {

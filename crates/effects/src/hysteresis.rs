@@ -6,9 +6,11 @@ use crate::kind::{Constants, EffectKind, SignalRanges, around, constant, values}
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, Sample};
 
-/// A torque that depends on the way since the last reversal (Dahl 1968): dz = (1 − sign(q̇)·z)·dq / `presliding`.
+/// A torque that depends on the way since the last reversal (Dahl 1968): dz = (1 − sign(q̇)·z)·dq /
+/// `presliding`.
 ///
-/// z runs to ±1 over the presliding distance; with Coulomb friction declared beside it, the fit shares the torque between the two.
+/// z runs to ±1 over the presliding distance; with Coulomb friction declared beside it, the fit shares the
+/// torque between the two.
 pub struct Hysteresis;
 
 const PRESLIDING: &str = "presliding";

@@ -35,10 +35,12 @@ pub enum JointProperty {
     Armature,
 }
 
-/// A kind of effect: where it can act, which constants to try, how to build it, and what the rest of the program needs to know of it.
+/// A kind of effect: where it can act, which constants to try, how to build it, and what the rest of the
+/// program needs to know of it.
 ///
-/// What it says of its parameters (units, physical bounds) and columns (linear in the motion, causal) the [`Effect`] says that it builds.
-/// Implement it for an effect of your own and add it with [`crate::Catalogue::with`]: see the recipe on the crate's front page.
+/// What it says of its parameters (units, physical bounds) and columns (linear in the motion, causal) the
+/// [`Effect`] says that it builds. Implement it for an effect of your own and add it with
+/// [`crate::Catalogue::with`]: see the recipe on the crate's front page.
 pub trait EffectKind: Send + Sync {
     /// Its name, as in `report.json`.
     fn name(&self) -> &str;
@@ -73,12 +75,14 @@ pub trait EffectKind: Send + Sync {
         Some(Constants::new())
     }
 
-    /// Whether its parameters may have changed against a held model that has it already: the change is then found as the same kind again.
+    /// Whether its parameters may have changed against a held model that has it already: the change is then
+    /// found as the same kind again.
     fn may_change(&self) -> bool {
         false
     }
 
-    /// Whether a free rigid body takes the effect up entirely, so that it can only be seen against a held model.
+    /// Whether a free rigid body takes the effect up entirely, so that it can only be seen against a held
+    /// model.
     fn needs_held_model(&self) -> bool {
         false
     }
@@ -86,7 +90,8 @@ pub trait EffectKind: Send + Sync {
     /// The motion, or the signal, that would tell it from its rivals.
     fn telling_motion(&self) -> &'static str;
 
-    /// What it means when it was found, with its fitted values, in one sentence to a user: its name and numbers by default.
+    /// What it means when it was found, with its fitted values, in one sentence to a user: its name and
+    /// numbers by default.
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         found.plainly()
     }
@@ -96,27 +101,32 @@ pub trait EffectKind: Send + Sync {
         Signal::Velocity
     }
 
-    /// Names of kinds that are tried together with it on one site as well: either alone mimics the other in part.
+    /// Names of kinds that are tried together with it on one site as well: either alone mimics the other in
+    /// part.
     fn goes_with(&self) -> &'static [&'static str] {
         &[]
     }
 
-    /// Names of its constants that belong to the joint rather than to the effect: where it is in a model, other kinds on the same site take the values that it has.
+    /// Names of its constants that belong to the joint rather than to the effect: where it is in a model,
+    /// other kinds on the same site take the values that it has.
     fn constants_of_the_site(&self) -> &'static [&'static str] {
         &[]
     }
 
-    /// The property of a joint that holds its only parameter, in a URDF or a simulator; none if neither can express it.
+    /// The property of a joint that holds its only parameter, in a URDF or a simulator; none if neither can
+    /// express it.
     fn joint_property(&self) -> Option<JointProperty> {
         None
     }
 
-    /// Whether it always takes energy from the motion: its power is that of a brake at every moment, whatever its parameters are within their bounds.
+    /// Whether it always takes energy from the motion: its power is that of a brake at every moment, whatever
+    /// its parameters are within their bounds.
     fn dissipates(&self) -> bool {
         false
     }
 
-    /// Whether it changes with the time since the session began, so that logs whose clocks each begin anew cannot tell it.
+    /// Whether it changes with the time since the session began, so that logs whose clocks each begin anew
+    /// cannot tell it.
     fn needs_session_time(&self) -> bool {
         false
     }

@@ -9,7 +9,8 @@ use phiw_telemetry::Block;
 
 /// The torque is stamped later (positive) or earlier than the position: on one joint, or on all alike.
 ///
-/// Linear in the delay about the value that has been corrected for already; a fitted delay really shifts the torque.
+/// Linear in the delay about the value that has been corrected for already; a fitted delay really shifts the
+/// torque.
 pub struct TimeDelay;
 
 const DELAY: &str = "delay";
@@ -210,8 +211,8 @@ impl Evaluator for OffsetColumns<'_> {
     }
 }
 
-/// The logged torque is the commanded one; what is delivered clips at `limit`. The column is the part beyond it, whose parameter is one where
-/// the drive clips in truth.
+/// The logged torque is the commanded one; what is delivered clips at `limit`. The column is the part beyond
+/// it, whose parameter is one where the drive clips in truth.
 pub struct ActuatorSaturation;
 
 const LIMIT: &str = "limit";
@@ -221,7 +222,8 @@ impl EffectKind for ActuatorSaturation {
         "actuator_saturation"
     }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
-        // A drive that clips most of the time would be no drive: and below the torque's own level the column is the torque itself.
+        // A drive that clips most of the time would be no drive: and below the torque's own level the column
+        // is the torque itself.
         let range = ranges.joints[site[0]];
         let (lowest, highest) = (1.2 * range.torque_rms, 0.97 * range.torque_peak);
         if lowest >= highest {

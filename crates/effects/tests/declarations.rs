@@ -17,7 +17,8 @@ const MOMENTS: [f64; 4] = [0.0, 0.7, 1.9, 4.1];
 /// Rows of a motion, and the one of which it is asked whether later ones change it.
 const ROWS: usize = 40;
 const LOOKED_AT: usize = 20;
-/// Time between rows \[s\], how fast the joints swing \[rad/s\], and how large the measured torques are \[N·m, N\].
+/// Time between rows \[s\], how fast the joints swing \[rad/s\], and how large the measured torques are
+/// \[N·m, N\].
 const PERIOD: f64 = 0.01;
 const SWING: f64 = 5.0;
 const TORQUE: f64 = 9.0;
@@ -63,7 +64,8 @@ impl Zoo {
         Zoo { tree, design, kinds }
     }
 
-    /// Columns of the samples of a block up to `last`: for each sample and parameter, its number in each torque that it acts on.
+    /// Columns of the samples of a block up to `last`: for each sample and parameter, its number in each
+    /// torque that it acts on.
     fn columns(&self, block: &Block, last: usize) -> Vec<Columns> {
         let mut scratch = self.design.scratch();
         scratch.begin(block).unwrap();
@@ -80,7 +82,8 @@ impl Zoo {
         (0..=last).map(of_sample).collect()
     }
 
-    /// For each parameter of the design: whether its columns change with velocity or acceleration, and whether they are affine in both.
+    /// For each parameter of the design: whether its columns change with velocity or acceleration, and
+    /// whether they are affine in both.
     fn probe_of_linearity(&self, seed: u64) -> Vec<(bool, bool)> {
         let mut random = RandomNumbers::new(seed);
         let joints = self.tree.joint_count();
@@ -140,7 +143,8 @@ impl Zoo {
         until.iter().zip(&whole).map(|(a, b)| a.iter().zip(b).any(differs)).collect()
     }
 
-    /// For each effect, the least power \[W\] that it takes from a motion at any moment, its parameters drawn within their bounds.
+    /// For each effect, the least power \[W\] that it takes from a motion at any moment, its parameters drawn
+    /// within their bounds.
     fn least_powers(&self, seed: u64) -> Vec<f64> {
         let (block, mut random) = (self.swing(seed, ROWS), RandomNumbers::new(seed));
         let columns = self.columns(&block, ROWS - 1);
@@ -173,7 +177,8 @@ impl Zoo {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
-    /// The estimators rely on it: noise of a period is accounted for exactly in what is linear, and in what looks ahead it is not to be told from the motion.
+    /// The estimators rely on it: noise of a period is accounted for exactly in what is linear, and in what
+    /// looks ahead it is not to be told from the motion.
     #[test]
     fn what_effects_declare_is_true_of_their_columns(seed in 0u64..100_000, joints in 1usize..5) {
         let zoo = Zoo::new(seed, joints);
@@ -199,7 +204,8 @@ proptest! {
 #[test]
 fn what_effects_do_not_declare_is_not_true_of_their_columns() {
     let catalogue = Catalogue::default();
-    // Whether there was any robot on which what is not declared does not hold, by the kind and what it does not declare.
+    // Whether there was any robot on which what is not declared does not hold, by the kind and what it does
+    // not declare.
     let mut refuted: BTreeMap<String, bool> = BTreeMap::new();
     for seed in 0..12 {
         let zoo = Zoo::new(seed, 2 + seed as usize % 3);
@@ -226,7 +232,8 @@ fn what_effects_do_not_declare_is_not_true_of_their_columns() {
     assert!(refuted.len() > 40, "{refuted:?}");
 }
 
-/// A probe with a few random states took it for linear on joints whose speeds happened to have the same sign in all of them.
+/// A probe with a few random states took it for linear on joints whose speeds happened to have the same sign
+/// in all of them.
 #[test]
 fn the_magnitude_of_a_speed_is_linear_on_no_joint() {
     let zoo = Zoo::new(1, 4);

@@ -4,7 +4,8 @@ use anyhow::{Context, ensure};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-/// The folder of the workspace: the nearest one at or above the package that cargo runs which holds a `Cargo.lock`.
+/// The folder of the workspace: the nearest one at or above the package that cargo runs which holds a
+/// `Cargo.lock`.
 ///
 /// # Errors
 /// The task was not started by `cargo xtask`.

@@ -1,7 +1,9 @@
-//! The experiments of this project: what phiw's crates can do, measured, on robots and logs that are made on the spot.
+//! The experiments of this project: what phiw's crates can do, measured, on robots and logs that are made on
+//! the spot.
 //!
-//! Each experiment is a module with a page of documentation: what it asks, how it is run, what it prints, and where its results go. Each has its command line,
-//! `Arguments`, and `command(&Arguments)`, which does it. `cargo xtask` is the way in.
+//! Each experiment is a module with a page of documentation: what it asks, how it is run, what it prints, and
+//! where its results go. Each has its command line, `Arguments`, and `command(&Arguments)`, which does it.
+//! `cargo xtask` is the way in.
 //!
 //! | module | asks |
 //! |---|---|

@@ -14,7 +14,8 @@
 //!
 //! # Where results go
 //!
-//! The log goes where `--out` says. A robot of other than 18 joints is a random one, and its URDF is written beside the log.
+//! The log goes where `--out` says. A robot of other than 18 joints is a random one, and its URDF is written
+//! beside the log.
 
 use crate::environment;
 use crate::run::synthetic::Plant;
@@ -30,7 +31,8 @@ pub struct Arguments {
     /// Rows of the log.
     #[arg(long, default_value_t = 5_000_000)]
     rows: u64,
-    /// Joints of the robot; with 18 it is models/upper_body18.urdf, else a random one, written beside the log.
+    /// Joints of the robot; with 18 it is models/upper_body18.urdf, else a random one, written beside the
+    /// log.
     #[arg(long, default_value_t = 18)]
     joints: usize,
     /// Rows a second.

@@ -1,4 +1,5 @@
-//! Blocks of conditioned samples into factors, one for each torque and fold, in parallel and in constant memory.
+//! Blocks of conditioned samples into factors, one for each torque and fold, in parallel and in constant
+//! memory.
 
 use crate::block_source::try_for_each_batch;
 use crate::{BlockSource, Design, IdentificationError};
@@ -28,8 +29,9 @@ impl Fold {
 
 /// The factors of `design` over each fold: \[Φ f\] of each torque, after the parallel filter.
 ///
-/// Every block is reduced by itself and the results are merged in the order of the blocks, so the outcome does not depend on the
-/// number of threads. A fold that is named several times (a bootstrap draw) is read once and comes out as often as it is named.
+/// Every block is reduced by itself and the results are merged in the order of the blocks, so the outcome
+/// does not depend on the number of threads. A fold that is named several times (a bootstrap draw) is read
+/// once and comes out as often as it is named.
 ///
 /// # Errors
 /// A log cannot be read, or a block has not the robot's joints.

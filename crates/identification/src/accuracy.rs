@@ -1,20 +1,24 @@
-//! How near estimates are to a truth that is known, as it is of a simulated robot: the three measures of the paper's section 5.
+//! How near estimates are to a truth that is known, as it is of a simulated robot: the three measures of the
+//! paper's section 5.
 //!
-//! They need the true parameters, or motion without noise, which no robot gives. For a real one [`torque_error`](crate::torque_error) on folds held out is what
-//! can be had.
+//! They need the true parameters, or motion without noise, which no robot gives. For a real one
+//! [`torque_error`](crate::torque_error) on folds held out is what can be had.
 
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::Factor;
 
-/// Root mean square error of parameters, equation (17): √(‖ŵ − w‖²/D), over the D parameters of `truth`. Those that an estimate has beyond them do not count.
+/// Root mean square error of parameters, equation (17): √(‖ŵ − w‖²/D), over the D parameters of `truth`.
+/// Those that an estimate has beyond them do not count.
 ///
-/// Each parameter counts in its own SI unit \[kg, kg·m, kg·m², …\], as in the paper. No parameters have no error: 0.
+/// Each parameter counts in its own SI unit \[kg, kg·m, kg·m², …\], as in the paper. No parameters have no
+/// error: 0.
 pub fn parameter_rmse(estimate: &[f64], truth: &[f64]) -> f64 {
     let sum: f64 = estimate.iter().zip(truth).map(|(estimate, truth)| (estimate - truth).powi(2)).sum();
     (sum / truth.len().max(1) as f64).sqrt()
 }
 
-/// Root mean square error of the predicted torques, equation (19): √(‖f − Φŵ‖²/T) \[N·m, N\], all torques of a sample taken together.
+/// Root mean square error of the predicted torques, equation (19): √(‖f − Φŵ‖²/T) \[N·m, N\], all torques of
+/// a sample taken together.
 ///
 /// `factor` is R of \[Φ f\] of the motion that is judged, and `samples` the number T of its samples in time.
 ///
@@ -29,7 +33,8 @@ pub fn torque_rmse(factor: &Factor, parameters: &[f64], samples: f64) -> Result<
 pub struct ReliabilityCriterion {
     /// Relative standard deviation up to which it is \[%\]. The paper's is 10 %.
     pub relative_deviation_percent: f64,
-    /// Mean, in the parameter's SI unit, below which it is too small to matter and counts as well estimated. The paper's is 0.02.
+    /// Mean, in the parameter's SI unit, below which it is too small to matter and counts as well estimated.
+    /// The paper's is 0.02.
     pub small: f64,
 }
 
@@ -74,7 +79,8 @@ impl Reliability {
         self.mean.abs() < criterion.small || self.percent() <= criterion.relative_deviation_percent
     }
 
-    /// The same with the error's root mean square for its standard deviation: an estimate that is always wrong by the same is not good.
+    /// The same with the error's root mean square for its standard deviation: an estimate that is always
+    /// wrong by the same is not good.
     pub fn well_with_bias(&self, criterion: &ReliabilityCriterion) -> bool {
         self.mean.abs() < criterion.small
             || 100.0 * self.rms_error / self.mean.abs() <= criterion.relative_deviation_percent

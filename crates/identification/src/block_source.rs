@@ -3,7 +3,8 @@
 use phiw_telemetry::{Block, LogError};
 use std::ops::ControlFlow;
 
-/// Where blocks come from: a log on disk, a recording in memory, a simulator. Each call brings the same blocks again.
+/// Where blocks come from: a log on disk, a recording in memory, a simulator. Each call brings the same
+/// blocks again.
 pub trait BlockSource: Sync {
     /// Hands the blocks to `sink`, in order, until it breaks.
     ///

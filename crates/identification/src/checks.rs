@@ -149,9 +149,11 @@ const STANDING_STILL: f64 = 1e-3;
 /// A travel below this many standard deviations of the position noise counts as standing still.
 const TRAVEL_TO_NOISE: f64 = 20.0;
 
-/// Rates at which robots are logged \[Hz\]; stamps in another unit than seconds give a rate outside, a thousand times too low or too high.
+/// Rates at which robots are logged \[Hz\]; stamps in another unit than seconds give a rate outside, a
+/// thousand times too low or too high.
 const RATES_HZ: std::ops::Range<f64> = 2.0..50_000.0;
-/// Times beyond its limits that a joint's positions may run; drives read beyond their limits by a little, another unit by 57 or 1000.
+/// Times beyond its limits that a joint's positions may run; drives read beyond their limits by a little,
+/// another unit by 57 or 1000.
 const BEYOND_LIMITS: f64 = 6.0;
 /// Distance of a factor from that of a change of units, as a share of it.
 const FACTOR_TOLERANCE: f64 = 0.05;
@@ -174,7 +176,8 @@ fn check_time_unit(survey: &Survey) -> Result<(), InputError> {
     Err(InputError::TimeUnit { path: survey.path.clone(), period: survey.period, rate_hz, mend })
 }
 
-/// A velocity column whose slope against the positions' derivative is that of another unit: either is wrong, and nobody can tell which.
+/// A velocity column whose slope against the positions' derivative is that of another unit: either is wrong,
+/// and nobody can tell which.
 fn check_velocity_unit(survey: &Survey) -> Result<(), InputError> {
     let degree = std::f64::consts::PI / 180.0;
     let units = [
@@ -213,7 +216,8 @@ pub fn check_logs(tree: &Tree, train: &[Survey], validate: &[Survey]) -> Result<
             let body = tree.joint(index);
             let (lower, upper) = (body.limits.lower, body.limits.upper);
             let largest = joint.q_min.abs().max(joint.q_max.abs());
-            // A joint turns three times round at the most in what is identified here; degrees exceed that by far.
+            // A joint turns three times round at the most in what is identified here; degrees exceed that by
+            // far.
             let limit = lower.abs().max(upper.abs());
             let limit = if limit.is_finite() && upper > lower { limit } else { std::f64::consts::TAU };
             let beyond = largest > 6.0 * limit && largest > 10.0;
@@ -252,8 +256,8 @@ pub fn check_size_of_factors(design: &Design, folds: usize, limits: &Limits) -> 
     check_size(widths, design.parameter_count(), folds, limits)
 }
 
-/// The same from the fewest parameters that a robot and its effects can have, before the base parameters are searched for, which takes long and much
-/// memory where there are many joints.
+/// The same from the fewest parameters that a robot and its effects can have, before the base parameters are
+/// searched for, which takes long and much memory where there are many joints.
 ///
 /// # Errors
 /// [`InputError::TooLarge`].

@@ -22,8 +22,8 @@ pub struct RowLayout {
 }
 
 impl RowLayout {
-    /// The model's torque \[N·m, N\]: the row's columns times their parameters, given an evaluation of all rows
-    /// ([`DesignScratch::evaluate`]) and all parameters of the design.
+    /// The model's torque \[N·m, N\]: the row's columns times their parameters, given an evaluation of all
+    /// rows ([`DesignScratch::evaluate`]) and all parameters of the design.
     pub fn torque(&self, evaluation: &[f64], parameters: &[f64]) -> f64 {
         let columns = &evaluation[self.range.clone()];
         columns.iter().zip(&self.parameters).map(|(column, &parameter)| column * parameters[parameter]).sum()
@@ -56,7 +56,8 @@ pub struct Design {
     rest_speeds: Vec<f64>,
     /// Effects from this one on are candidates.
     candidates_from: usize,
-    /// Whether a candidate's columns held a number that is not finite. Set while blocks are evaluated, in parallel.
+    /// Whether a candidate's columns held a number that is not finite. Set while blocks are evaluated, in
+    /// parallel.
     not_finite: Vec<AtomicBool>,
 }
 
@@ -139,15 +140,17 @@ impl Design {
 
     /// The same with the speed of each torque's joint below which it stands still \[rad/s, m/s\].
     ///
-    /// A joint at rest may carry any torque within its static friction, whatever the model: a filtered row counts for a torque only if its joint
-    /// moves in at least half of the filter's window. Passing through zero at a reversal is no rest.
+    /// A joint at rest may carry any torque within its static friction, whatever the model: a filtered row
+    /// counts for a torque only if its joint moves in at least half of the filter's window. Passing through
+    /// zero at a reversal is no rest.
     pub fn with_rest_speeds(mut self, rest_speeds: Vec<f64>) -> Self {
         self.rest_speeds = rest_speeds;
         self
     }
 
-    /// The same with the effects from `first` on as candidates: where one's columns are not finite on the logs, they count as zero and
-    /// [`not_finite`](Design::not_finite) says so, instead of an error. `first` is at most the number of effects.
+    /// The same with the effects from `first` on as candidates: where one's columns are not finite on the
+    /// logs, they count as zero and [`not_finite`](Design::not_finite) says so, instead of an error. `first`
+    /// is at most the number of effects.
     pub fn with_candidates_from(mut self, first: usize) -> Self {
         self.candidates_from = first;
         self
@@ -158,7 +161,8 @@ impl Design {
         (0..self.effects.len()).filter(|&effect| self.not_finite[effect].load(Ordering::Relaxed)).collect()
     }
 
-    /// Numbers that [`DesignScratch::evaluate`] writes: all rows, then for each torque one while its joint moves and zero while it rests.
+    /// Numbers that [`DesignScratch::evaluate`] writes: all rows, then for each torque one while its joint
+    /// moves and zero while it rests.
     pub fn evaluation_width(&self) -> usize {
         self.width + self.rows.len()
     }
@@ -275,7 +279,8 @@ impl DesignScratch<'_> {
         Ok(())
     }
 
-    /// All rows of one sample, side by side as [`RowLayout::range`] says: columns, then the measured torque. After them, which joints move.
+    /// All rows of one sample, side by side as [`RowLayout::range`] says: columns, then the measured torque.
+    /// After them, which joints move.
     ///
     /// Samples must come in order, from the block's warm-up on.
     ///

@@ -70,24 +70,29 @@ pub trait Effect: Send + Sync {
     fn needs(&self) -> Needs {
         Needs::default()
     }
-    /// Whether the columns of a parameter (an index into [`Effect::parameters`]) are linear in the motion: at a given position they change with the velocities or the accelerations
-    /// of the same sample, they are affine in both, and they depend on nothing else (time, torque, what was before). Viscous friction and rotor inertia are.
+    /// Whether the columns of a parameter (an index into [`Effect::parameters`]) are linear in the motion: at
+    /// a given position they change with the velocities or the accelerations of the same sample, they are
+    /// affine in both, and they depend on nothing else (time, torque, what was before). Viscous friction and
+    /// rotor inertia are.
     ///
-    /// No is always safe. It costs a little of what noisy logs tell: such a column is then taken of the motion at the beginning of a control period.
+    /// No is always safe. It costs a little of what noisy logs tell: such a column is then taken of the
+    /// motion at the beginning of a control period.
     fn is_linear_in_motion(&self, _parameter: usize) -> bool {
         false
     }
-    /// Whether the columns of a sample depend on that sample and earlier ones alone. A rate of change of the torque depends on later samples too.
+    /// Whether the columns of a sample depend on that sample and earlier ones alone. A rate of change of the
+    /// torque depends on later samples too.
     fn is_causal(&self) -> bool {
         true
     }
     /// A new evaluator of its columns.
     fn evaluator(&self) -> Box<dyn Evaluator + '_>;
-    /// Corrects the signals before any column is evaluated: how an encoder offset or a delay, fitted by linearisation, comes
-    /// into force.
+    /// Corrects the signals before any column is evaluated: how an encoder offset or a delay, fitted by
+    /// linearisation, comes into force.
     fn correct(&self, _block: &mut Block) {}
-    /// The joint whose link lags behind its encoder, and by how much for each unit of torque \[rad/(N·m), m/N\]: rigid body and gravity are then evaluated at
-    /// the link's position, by the reference model's torque; all other columns at the encoder's.
+    /// The joint whose link lags behind its encoder, and by how much for each unit of torque \[rad/(N·m),
+    /// m/N\]: rigid body and gravity are then evaluated at the link's position, by the reference model's
+    /// torque; all other columns at the encoder's.
     fn compliance(&self) -> Option<(usize, f64)> {
         None
     }

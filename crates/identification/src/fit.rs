@@ -10,8 +10,8 @@ use phiw_regressor::least_squares::{GroupedFactor, weighted_least_squares};
 pub struct Fit {
     /// Value of each parameter; those that the logs do not determine are zero (see `undetermined`).
     pub parameters: Vec<f64>,
-    /// Standard deviation of each parameter, from leaving out one fold after the other (correlated samples count as what they are); not a number
-    /// where there are too few folds.
+    /// Standard deviation of each parameter, from leaving out one fold after the other (correlated samples
+    /// count as what they are); not a number where there are too few folds.
     pub standard_deviations: Vec<f64>,
     /// Parameters that the logs do not determine: their columns depend on others.
     pub undetermined: Vec<usize>,
@@ -132,8 +132,8 @@ pub(crate) fn undetermined(all: &GroupedFactor) -> Result<Vec<usize>, RegressorE
     Ok(all.combine(&weights)?.undetermined_columns())
 }
 
-/// Standard deviations by the delete-one-fold jackknife (Efron & Stein 1981): folds are long against the residual's correlation, so
-/// correlated samples are not counted as independent ones.
+/// Standard deviations by the delete-one-fold jackknife (Efron & Stein 1981): folds are long against the
+/// residual's correlation, so correlated samples are not counted as independent ones.
 fn jackknife(
     folds: &[GroupedFactor],
     determined: &[usize],
@@ -149,7 +149,8 @@ fn jackknife(
     for factor in phiw_regressor::factor::leave_one_out(&weighted?)? {
         match factor.solve() {
             Ok(solution) => solutions.push(solution.parameters),
-            // Without this fold some parameter is not determined: all its weight lies there, and nothing can be said of its spread.
+            // Without this fold some parameter is not determined: all its weight lies there, and nothing can
+            // be said of its spread.
             Err(RegressorError::RankDeficient { .. }) => return Ok(absent),
             Err(error) => return Err(error),
         }

@@ -10,7 +10,8 @@ use phiw_regressor::factor::FactorBuilder;
 use phiw_regressor::least_squares::{GroupedFactor, WeightedSolution, weighted_least_squares};
 use phiw_regressor::{BaseParameters, BaseParametersOptions, RegressorError};
 
-/// The same effect with several values of its constants, one of which the data will choose; the first is the simplest.
+/// The same effect with several values of its constants, one of which the data will choose; the first is the
+/// simplest.
 pub type Variants = Vec<Box<dyn Effect>>;
 
 /// What a model is fitted to and validated on.
@@ -21,7 +22,8 @@ pub struct Data<'a> {
     pub held_out: Vec<Fold>,
     /// Where the samples come from.
     pub sources: Vec<&'a dyn BlockSource>,
-    /// For each joint the speed below which it stands still \[rad/s, m/s\] (see [`Design::with_rest_speeds`]).
+    /// For each joint the speed below which it stands still \[rad/s, m/s\] (see
+    /// [`Design::with_rest_speeds`]).
     pub rest_speeds: Vec<f64>,
 }
 
@@ -43,7 +45,8 @@ pub struct Identified {
 
 /// Identifies a rigid body with effects from the training folds.
 ///
-/// One pass over the logs: all variants of all effects go into the factors, and choosing among them is choosing columns.
+/// One pass over the logs: all variants of all effects go into the factors, and choosing among them is
+/// choosing columns.
 ///
 /// # Errors
 /// A log cannot be read or does not fit the robot, or holds too little.
@@ -94,7 +97,8 @@ pub fn identify(
     })
 }
 
-/// Passes over the logs that bring the model's torque into the columns that need it; a third changes nothing that the logs can tell.
+/// Passes over the logs that bring the model's torque into the columns that need it; a third changes nothing
+/// that the logs can tell.
 const REFERENCE_PASSES: usize = 2;
 
 /// The robot with the inertial parameters that the training folds tell with the columns as they are.
@@ -138,7 +142,8 @@ fn choose(
         return Ok(chosen);
     }
     let undetermined = undetermined_with(design, &chosen, factors)?;
-    // The columns of the slot that is being chosen all stay, so that its variants have equally many: which of them are determined differs.
+    // The columns of the slot that is being chosen all stay, so that its variants have equally many: which of
+    // them are determined differs.
     let columns = |chosen: &[usize], open: Option<usize>| -> Vec<usize> {
         let of_effect = |(slot, &effect): (usize, &usize)| {
             let stays = open == Some(slot);

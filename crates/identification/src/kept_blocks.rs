@@ -11,7 +11,8 @@ pub struct KeptBlocks<'a> {
 }
 
 impl<'a> KeptBlocks<'a> {
-    /// Keeps the sources' blocks as long as they fit into `budget` bytes together; those that do not are read again at every pass.
+    /// Keeps the sources' blocks as long as they fit into `budget` bytes together; those that do not are read
+    /// again at every pass.
     ///
     /// # Errors
     /// A log cannot be read.

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 
 /// Share of each training log that is held out when no log is given for validation.
 pub const HELD_OUT_SHARE: f64 = 0.3;
-/// Stretches of time that the training logs are cut into: long against the residual's correlation, enough for a standard deviation.
+/// Stretches of time that the training logs are cut into: long against the residual's correlation, enough for
+/// a standard deviation.
 const TRAINING_FOLDS: usize = 10;
 const HELD_OUT_FOLDS: usize = 8;
 /// Speed of a joint at rest over its RMS speed.
@@ -92,7 +93,8 @@ impl LogSet {
             .collect()
     }
 
-    /// For each joint the speed below which it stands still: a hundredth of its RMS velocity in the training logs \[rad/s, m/s\].
+    /// For each joint the speed below which it stands still: a hundredth of its RMS velocity in the training
+    /// logs \[rad/s, m/s\].
     pub fn rest_speeds(&self) -> Vec<f64> {
         let joints = self.surveys.first().map_or(0, |survey| survey.joints.len());
         let rms = |joint: usize| {

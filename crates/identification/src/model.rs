@@ -1,4 +1,5 @@
-//! An identified model as one thing: rigid body, effects, what it was fitted to; written to `model.json` and read back.
+//! An identified model as one thing: rigid body, effects, what it was fitted to; written to `model.json` and
+//! read back.
 
 use crate::{
     Design, Effect, EffectCatalogue, EffectError, EffectSpec, FactorRows, Fit, IdentificationError,
@@ -29,13 +30,15 @@ pub struct Model {
     pub declared: Vec<String>,
     /// The base parameters.
     pub base_parameters: Vec<NamedParameter>,
-    /// Standard parameters of each body: those nearest to the URDF's that have the base parameters (a small sphere's where the URDF has no mass).
+    /// Standard parameters of each body: those nearest to the URDF's that have the base parameters (a small
+    /// sphere's where the URDF has no mass).
     pub bodies: Vec<BodyParameters>,
     /// The effects beside the rigid body.
     pub effects: Vec<EffectParameters>,
     /// Standard deviation of each torque's residual on the training logs \[N·m, N\].
     pub residual_std: Vec<f64>,
-    /// What the fit knew, error included: the weighted factor R of \[Φ f\] over the parameters that were determined.
+    /// What the fit knew, error included: the weighted factor R of \[Φ f\] over the parameters that were
+    /// determined.
     pub factor: FactorRows,
     /// Cut-offs of the low-pass over positions and of the parallel filter \[Hz\].
     pub cutoff_hz: (f64, f64),
@@ -138,7 +141,8 @@ impl Model {
         })
     }
 
-    /// Whether the numbers of a file can be a model's: finite, of a size that squares can be taken of, deviations positive, lengths that fit each other.
+    /// Whether the numbers of a file can be a model's: finite, of a size that squares can be taken of,
+    /// deviations positive, lengths that fit each other.
     ///
     /// # Errors
     /// [`IdentificationError::Model`] with the first that cannot.
@@ -283,9 +287,11 @@ fn first_difference(what: &str, model: &[&str], urdf: &[&str]) -> Option<String>
 /// Radius of the sphere that stands for a body of which the URDF says nothing \[m\].
 const UNKNOWN_RADIUS: f64 = 0.1;
 
-/// The tree's standard parameters, a body without mass replaced by a sphere of the others' mean mass (of 1 kg if none has any).
+/// The tree's standard parameters, a body without mass replaced by a sphere of the others' mean mass (of 1 kg
+/// if none has any).
 ///
-/// Standard parameters near a mass of zero belong to no real body, and URDF cannot express a first moment without mass.
+/// Standard parameters near a mass of zero belong to no real body, and URDF cannot express a first moment
+/// without mass.
 pub fn with_masses(tree: &Tree) -> Vec<f64> {
     let mut parameters = tree.inertial_parameters();
     let masses = parameters.iter().step_by(PARAMETERS_PER_BODY).filter(|mass| **mass > 0.0);

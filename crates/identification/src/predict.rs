@@ -42,7 +42,8 @@ impl Prediction<'_> {
 
 /// Hands the prediction at every output of every log to `sink`, in order.
 ///
-/// The model's torque is summed sample by sample before the filter, which is linear: three numbers a torque go through it instead of all columns.
+/// The model's torque is summed sample by sample before the filter, which is linear: three numbers a torque
+/// go through it instead of all columns.
 ///
 /// # Errors
 /// A log cannot be read, a block has not the robot's joints, or `parameters` has the wrong length.

@@ -1,9 +1,10 @@
 //! Rates of change of torques that are computed from smoothed motion.
 
-/// First and second rates by local polynomials of degree four, weighted towards the middle (Savitzky & Golay 1964; Cleveland 1979).
+/// First and second rates by local polynomials of degree four, weighted towards the middle (Savitzky & Golay
+/// 1964; Cleveland 1979).
 ///
-/// A torque contains the acceleration already: two differences more would bring up what noise is left in it. The window is as wide as the motion is slow, and at
-/// the ends it is one-sided, with the same degree.
+/// A torque contains the acceleration already: two differences more would bring up what noise is left in it.
+/// The window is as wide as the motion is slow, and at the ends it is one-sided, with the same degree.
 pub(crate) struct LocalRates {
     /// Samples on one side of the middle one.
     half: usize,
@@ -76,7 +77,8 @@ impl LocalRates {
     }
 }
 
-/// The weights for samples at `offsets` from the one where the rates are wanted: from polynomials that are orthogonal on the window.
+/// The weights for samples at `offsets` from the one where the rates are wanted: from polynomials that are
+/// orthogonal on the window.
 fn taps(offsets: std::ops::Range<isize>, half: usize, period: f64) -> Taps {
     let scale = 1.0 / (half as f64 + 1.0);
     let places: Vec<f64> = offsets.map(|offset| offset as f64 * scale).collect();

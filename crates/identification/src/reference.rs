@@ -1,4 +1,5 @@
-//! A rigid-body model with numbers, for effects whose columns need torques (load-dependent friction, delays, offsets, …).
+//! A rigid-body model with numbers, for effects whose columns need torques (load-dependent friction, delays,
+//! offsets, …).
 
 use crate::rates::{LocalRates, interpolate};
 use crate::{BlockReference, Effect, Needs, Sample};
@@ -73,7 +74,8 @@ impl ReferenceModel {
         Ok(())
     }
 
-    /// Where the links are behind compliant joints whose encoders sit on the motors: q − τ/k, with τ at the link's own position, by iteration.
+    /// Where the links are behind compliant joints whose encoders sit on the motors: q − τ/k, with τ at the
+    /// link's own position, by iteration.
     pub(crate) fn deflected(
         &self,
         block: &Block,

@@ -1,13 +1,15 @@
-//! What logs and robot together show, beyond what ends an identification: torques in another unit, joints that no log moves.
+//! What logs and robot together show, beyond what ends an identification: torques in another unit, joints
+//! that no log moves.
 
 use phiw_dynamics::{JointType, Tree};
 use phiw_telemetry::{CheckSettings, Finding, FindingKind, Survey, findings};
 
-/// Torque over the joint's effort limit from where on it is in another unit: drives exceed their rating threefold for a moment, mA and per mille by more.
+/// Torque over the joint's effort limit from where on it is in another unit: drives exceed their rating
+/// threefold for a moment, mA and per mille by more.
 const BEYOND_EFFORT: f64 = 10.0;
 
-/// What should be known of the logs of a robot before anything is fitted: of each log, by its place, what [`findings`] says, less joints that stand
-/// still in one log but move in another.
+/// What should be known of the logs of a robot before anything is fitted: of each log, by its place, what
+/// [`findings`] says, less joints that stand still in one log but move in another.
 pub fn robot_findings(tree: &Tree, surveys: &[Survey], settings: &CheckSettings) -> Vec<(usize, Finding)> {
     let mut all = Vec::new();
     for (log, survey) in surveys.iter().enumerate() {

@@ -7,7 +7,8 @@ use phiw_telemetry::Block;
 pub struct Needs {
     /// The torques of the reference model, and their first and second rate of change.
     pub torque: bool,
-    /// The torque of the reference model with its effects in it. A column made of it can stand for any of those effects, and tells nothing in a contest with one.
+    /// The torque of the reference model with its effects in it. A column made of it can stand for any of
+    /// those effects, and tells nothing in a contest with one.
     pub total_torque: bool,
     /// The derivatives of the reference model's torques by position, velocity and acceleration of each joint.
     pub derivatives: bool,
@@ -40,7 +41,8 @@ impl Needs {
     }
 }
 
-/// The reference model over a block, `[sample × joint]` (or `[sample × joint × joint]`, row the torque's), empty where no effect needs it.
+/// The reference model over a block, `[sample × joint]` (or `[sample × joint × joint]`, row the torque's),
+/// empty where no effect needs it.
 #[derive(Clone, Debug, Default)]
 pub struct BlockReference {
     /// Torque of the rigid body \[N·m, N\].

@@ -14,7 +14,8 @@ fn exact_bytes(design: &phiw_identification::Design) -> u64 {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
 
-    /// What the search for base parameters finds is never less than what is told from the joints alone: no robot whose factors fit is refused early.
+    /// What the search for base parameters finds is never less than what is told from the joints alone: no
+    /// robot whose factors fit is refused early.
     #[test]
     fn no_robot_is_refused_early_whose_factors_fit(seed in 0u64..100_000, joints in 1usize..9) {
         let tree = synthetic::robot(seed, joints);
@@ -31,7 +32,8 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
-    /// Every row is that of φ at the base parameters' columns, then the effects' columns, then the torque; what it leaves out is zero.
+    /// Every row is that of φ at the base parameters' columns, then the effects' columns, then the torque;
+    /// what it leaves out is zero.
     #[test]
     fn rows_are_those_of_the_regressor(seed in 0u64..1000, joints in 1usize..9, rest_speed in 0.0..1.0f64) {
         let tree = synthetic::robot(seed, joints);
@@ -93,7 +95,8 @@ fn factors_that_do_not_fit_into_memory_are_refused_before_the_work() {
     assert!(error.contains("5 joints") && error.contains("--hold"), "{error}");
 }
 
-/// 200 joints with friction took 40 s and 20 GB in the search for their base parameters, before their size was looked at.
+/// 200 joints with friction took 40 s and 20 GB in the search for their base parameters, before their size
+/// was looked at.
 #[test]
 fn a_robot_of_200_joints_is_refused_before_its_base_parameters_are_searched_for() {
     let joint = |number: usize| {

@@ -1,18 +1,21 @@
 #![doc = include_str!("../README.md")]
 
-/// How much an input may ask for. What exceeds a limit is refused before the work begins, with a message that names the limit.
+/// How much an input may ask for. What exceeds a limit is refused before the work begins, with a message that
+/// names the limit.
 ///
 /// The defaults lie far above what real robots need and far below what would exhaust a machine of 1 GB.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Limits {
-    /// Bytes of a URDF. The largest that are published have about 2 MB; a tree of the parsed text takes some ten times its size.
+    /// Bytes of a URDF. The largest that are published have about 2 MB; a tree of the parsed text takes some
+    /// ten times its size.
     pub urdf_bytes: u64,
     /// Elements inside each other in a URDF; six are enough for what the format defines.
     pub xml_depth: usize,
     /// Elements of a URDF.
     pub xml_elements: usize,
-    /// Attributes of one element; the format defines eight at most, and checking that they differ costs their square.
+    /// Attributes of one element; the format defines eight at most, and checking that they differ costs their
+    /// square.
     pub xml_attributes: usize,
     /// Bytes that the entities of a URDF may expand to in all.
     pub xml_expanded_bytes: u64,
@@ -24,7 +27,8 @@ pub struct Limits {
     pub log_columns: usize,
     /// Bytes of a marker recording, which is held in memory.
     pub recording_bytes: u64,
-    /// Control points of the splines of one recording: 20 minutes at one every 0.2 s. A robot of 18 joints takes 0.13 MB for each.
+    /// Control points of the splines of one recording: 20 minutes at one every 0.2 s. A robot of 18 joints
+    /// takes 0.13 MB for each.
     pub control_points: usize,
     /// Bytes of a TOML file: marker map, support.
     pub toml_bytes: u64,

@@ -64,7 +64,8 @@ impl<'a> Analysis<'a> {
         self.identified.fit.factor.condition_number().unwrap_or(f64::NAN)
     }
 
-    /// Determined parameters that act like an undetermined one on the training motion, with their share, largest first.
+    /// Determined parameters that act like an undetermined one on the training motion, with their share,
+    /// largest first.
     ///
     /// # Errors
     /// None is known: the fit has solved the same columns.

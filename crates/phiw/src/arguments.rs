@@ -17,13 +17,17 @@ pub struct Arguments {
 pub enum Command {
     /// Fit the declared model to logs: model.json, report.json, report.html, identified.urdf.
     Identify(IdentifyArguments),
-    /// The same, then close the loop: find what the model lacks, add it, and report the error before and after.
+    /// The same, then close the loop: find what the model lacks, add it, and report the error before and
+    /// after.
     Explain(ExplainArguments),
-    /// Say what is in logs before anything is fitted: late velocities, torques that are missing or clipped, units, clocks, and what to do about it.
+    /// Say what is in logs before anything is fitted: late velocities, torques that are missing or clipped,
+    /// units, clocks, and what to do about it.
     Check(CheckArguments),
-    /// Turn marker recordings of people into motions of the robot: for each a log without torques, and what it is worth.
+    /// Turn marker recordings of people into motions of the robot: for each a log without torques, and what
+    /// it is worth.
     Retarget(RetargetArguments),
-    /// Choose the motion that a real robot should run next, given what has been measured: one iteration of the curriculum.
+    /// Choose the motion that a real robot should run next, given what has been measured: one iteration of
+    /// the curriculum.
     Next(NextArguments),
 }
 
@@ -54,10 +58,12 @@ pub struct ExplainArguments {
     /// Robot, logs and declared model.
     #[command(flatten)]
     pub session: SessionArguments,
-    /// A model.json of `phiw identify` or `phiw explain`: its parameters are held, and what has changed since is sought.
+    /// A model.json of `phiw identify` or `phiw explain`: its parameters are held, and what has changed since
+    /// is sought.
     #[arg(long, value_name = "MODEL.json")]
     pub model: Option<PathBuf>,
-    /// Trace again on this many bootstrap draws of the training motion, and say how often each effect is named.
+    /// Trace again on this many bootstrap draws of the training motion, and say how often each effect is
+    /// named.
     #[arg(long, value_name = "COUNT", default_value_t = 0)]
     pub draws: u32,
 }
@@ -101,7 +107,8 @@ pub struct RetargetArguments {
     /// The robot's URDF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
-    /// Recordings: C3D, or CSV of named points (`t`, `<point>.x`, `<point>.y`, `<point>.z` in metres, or in the map's `units`).
+    /// Recordings: C3D, or CSV of named points (`t`, `<point>.x`, `<point>.y`, `<point>.z` in metres, or in
+    /// the map's `units`).
     #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
     pub c3d: Vec<PathBuf>,
     /// Which marker sits where; by default the built-in map that names most markers of the recordings.
@@ -110,7 +117,8 @@ pub struct RetargetArguments {
     /// Joints of the URDF that do not move, at 0 or at a value (rad, m).
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
     pub hold: Vec<(String, f64)>,
-    /// Torso and head follow reach and gaze of the hands: for recordings that hold neither. The results say so.
+    /// Torso and head follow reach and gaze of the hands: for recordings that hold neither. The results say
+    /// so.
     #[arg(long)]
     pub torso_from_reach: bool,
     /// Keep joint velocities inside the URDF's limits, too.
@@ -122,7 +130,8 @@ pub struct RetargetArguments {
     /// How velocities and accelerations come about.
     #[arg(long, value_enum, default_value_t = Derivatives::Analytic)]
     pub derivatives: Derivatives,
-    /// Folder for the results; it is made if it is absent. What is done in it with the same settings is not done again.
+    /// Folder for the results; it is made if it is absent. What is done in it with the same settings is not
+    /// done again.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Print nothing but errors.
@@ -145,7 +154,8 @@ pub struct NextArguments {
     /// What the robot stands on (soles of links); without it the robot is taken as bolted down.
     #[arg(long, value_name = "SUPPORT.toml")]
     pub support: Option<PathBuf>,
-    /// A model.json of `phiw identify` or `phiw explain` to take the parameters from, instead of fitting the logs.
+    /// A model.json of `phiw identify` or `phiw explain` to take the parameters from, instead of fitting the
+    /// logs.
     #[arg(long, value_name = "MODEL.json", conflicts_with = "declare")]
     pub model: Option<PathBuf>,
     /// Effects beside the rigid body, on every joint: viscous_friction, coulomb_friction, rotor_inertia, …
@@ -154,19 +164,23 @@ pub struct NextArguments {
     /// Joints of the URDF that do not move, at 0 or at a value (rad, m).
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
     pub hold: Vec<(String, f64)>,
-    /// How far off the URDF's inertial parameters may be, as a share of each body's magnitude: what the logs do not tell is taken from it.
+    /// How far off the URDF's inertial parameters may be, as a share of each body's magnitude: what the logs
+    /// do not tell is taken from it.
     #[arg(long, value_name = "SHARE", default_value_t = 0.3, value_parser = positive)]
     pub urdf_error: f64,
-    /// The part that the support is reduced by, 0 to 1; by default from cond(Φ), as in the paper's equation (20).
+    /// The part that the support is reduced by, 0 to 1; by default from cond(Φ), as in the paper's equation
+    /// (20).
     #[arg(long, value_name = "ALPHA", value_parser = share)]
     pub alpha: Option<f64>,
     /// Cut-off of the low-pass over positions (Hz); by default chosen from the logs' spectra.
     #[arg(long, value_name = "HZ")]
     pub cutoff_hz: Option<f64>,
-    /// Cut-off of the low-pass over the model's columns and the torque alike (Hz); by default the motion's bandwidth.
+    /// Cut-off of the low-pass over the model's columns and the torque alike (Hz); by default the motion's
+    /// bandwidth.
     #[arg(long, value_name = "HZ")]
     pub parallel_cutoff_hz: Option<f64>,
-    /// The motion to run, as a log with the feed-forward torque; the reason goes beside it, with the extension .json.
+    /// The motion to run, as a log with the feed-forward torque; the reason goes beside it, with the
+    /// extension .json.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Print nothing but errors.
@@ -220,7 +234,8 @@ pub struct SessionArguments {
     /// Cut-off of the low-pass over positions (Hz); by default chosen from the logs' spectra.
     #[arg(long, value_name = "HZ")]
     pub cutoff_hz: Option<f64>,
-    /// Cut-off of the low-pass over the model's columns and the torque alike (Hz); by default the motion's bandwidth.
+    /// Cut-off of the low-pass over the model's columns and the torque alike (Hz); by default the motion's
+    /// bandwidth.
     #[arg(long, value_name = "HZ")]
     pub parallel_cutoff_hz: Option<f64>,
     /// Folder for the results; it is made if it is absent.

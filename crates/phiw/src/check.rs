@@ -60,7 +60,8 @@ pub fn check(arguments: &CheckArguments, console: &Console) -> Result<CheckOutco
     Ok(CheckOutcome { summary: summary(&surveys, &findings, &refused), report })
 }
 
-/// One warning for each thing that was found, with the number of logs that show it; without what the identification says or refuses by itself.
+/// One warning for each thing that was found, with the number of logs that show it; without what the
+/// identification says or refuses by itself.
 pub fn warnings(tree: &Tree, surveys: &[Survey]) -> Vec<String> {
     let findings = robot_findings(tree, surveys, &CheckSettings::default());
     let said_elsewhere = |finding: &Finding| finding.kind == FindingKind::StandsStill;

@@ -6,7 +6,8 @@ use std::io::Write;
 /// Characters of a message that are shown; a name in a broken file can fill screens.
 const LONGEST_MESSAGE: usize = 1000;
 
-/// One message on standard error, of one line. Where nobody listens any more, nothing is lost but the message.
+/// One message on standard error, of one line. Where nobody listens any more, nothing is lost but the
+/// message.
 pub fn say(prefix: &str, message: &str) {
     let mut line = String::from(prefix);
     message.chars().take(LONGEST_MESSAGE).for_each(|c| push_visible(&mut line, c));
@@ -23,7 +24,8 @@ pub fn print(text: &str) {
     let _ = std::io::stdout().write_all(visible(text).as_bytes());
 }
 
-/// The text as a terminal may have it: names in logs and robots can hold characters that move its cursor, colour it or turn its direction.
+/// The text as a terminal may have it: names in logs and robots can hold characters that move its cursor,
+/// colour it or turn its direction.
 pub fn visible(text: &str) -> String {
     let mut clean = String::with_capacity(text.len());
     for c in text.chars() {

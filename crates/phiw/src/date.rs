@@ -22,7 +22,8 @@ pub fn now() -> String {
     written(SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs()))
 }
 
-/// Seconds since 1970 as a date (Hinnant, "chrono-compatible low-level date algorithms", 2013: years begin in March, so that leap days end them).
+/// Seconds since 1970 as a date (Hinnant, "chrono-compatible low-level date algorithms", 2013: years begin in
+/// March, so that leap days end them).
 fn written(seconds: u64) -> String {
     let (days, minutes) = (seconds / 86_400 + 719_468, seconds / 60 % 1440);
     let (era, day) = (days / 146_097, days % 146_097);

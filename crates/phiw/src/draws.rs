@@ -1,4 +1,5 @@
-//! Would other training motion have led to other names? All of it again on bootstrap draws of the training motion (Efron 1979).
+//! Would other training motion have led to other names? All of it again on bootstrap draws of the training
+//! motion (Efron 1979).
 
 use crate::Error;
 use phiw_identification::{Data, EffectSpec};
@@ -14,7 +15,8 @@ pub struct Draws {
 }
 
 impl Draws {
-    /// Names the effects again on `count` draws, each of as many training folds as there are, with replacement.
+    /// Names the effects again on `count` draws, each of as many training folds as there are, with
+    /// replacement.
     ///
     /// # Errors
     /// Those of `name`, which identifies and traces on other data.
@@ -41,7 +43,8 @@ impl Draws {
         Ok(Draws { named })
     }
 
-    /// Each effect's stability becomes the share of draws in which it is named; what is named where it is not becomes its rival.
+    /// Each effect's stability becomes the share of draws in which it is named; what is named where it is not
+    /// becomes its rival.
     pub fn weigh(&self, tracing: &mut Tracing) {
         if self.named.is_empty() {
             return;

@@ -30,7 +30,8 @@ struct Start {
     held: Option<HeldModel>,
 }
 
-/// Identifies the declared model (or takes the held one), traces its residual, and writes the grown model with its report.
+/// Identifies the declared model (or takes the held one), traces its residual, and writes the grown model
+/// with its report.
 ///
 /// # Errors
 /// An input is wrong, or the results cannot be written: [`Error::exit_status`] tells the two apart.

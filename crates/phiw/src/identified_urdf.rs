@@ -9,7 +9,8 @@ use phiw_identification::EffectSpec;
 /// Properties of a joint that URDF's `<dynamics>` has: damping and friction.
 const EXPRESSED: [JointProperty; 2] = [JointProperty::Damping, JointProperty::Friction];
 
-/// The URDF with the identified inertial parameters, and with damping and friction where they were identified.
+/// The URDF with the identified inertial parameters, and with damping and friction where they were
+/// identified.
 ///
 /// # Errors
 /// The parameters cannot be expressed.

@@ -34,13 +34,14 @@ pub struct NextOutcome {
     pub report_json: PathBuf,
 }
 
-/// Chooses the next reference motion, equations (8) to (12) and (20), and writes it as a log with the torques that the present estimate
-/// predicts for it; beside it the reason, as JSON.
+/// Chooses the next reference motion, equations (8) to (12) and (20), and writes it as a log with the torques
+/// that the present estimate predicts for it; beside it the reason, as JSON.
 ///
 /// Nothing is written before everything has been computed.
 ///
 /// # Errors
-/// An input is wrong, no motion is safe, or the results cannot be written: [`Error::exit_status`] tells them apart.
+/// An input is wrong, no motion is safe, or the results cannot be written: [`Error::exit_status`] tells them
+/// apart.
 pub fn next(arguments: &NextArguments, console: &Console) -> Result<NextOutcome, Error> {
     check_file(&arguments.out)?;
     let report_json = arguments.out.with_extension("json");

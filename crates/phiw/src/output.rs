@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 /// Names of the files that `identify` and `explain` write.
 pub const RESULT_FILES: [&str; 4] = ["model.json", "report.json", "report.html", "identified.urdf"];
 
-/// Takes a folder for the results of `command`: it can be there, none of its results is an input, and nobody else writes to it.
+/// Takes a folder for the results of `command`: it can be there, none of its results is an input, and nobody
+/// else writes to it.
 ///
 /// # Errors
 /// [`Error::OutIsFile`], [`Error::Output`].

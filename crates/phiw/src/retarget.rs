@@ -19,12 +19,15 @@ use phiw_result_folder::{Disk, Lock, check_inputs, remove_partial_files};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Retargets all recordings: for each a log `<name>.csv` without torques, and `<name>.json` with what it is worth.
+/// Retargets all recordings: for each a log `<name>.csv` without torques, and `<name>.json` with what it is
+/// worth.
 ///
-/// A file that has been done with the same settings is kept. A file that cannot be done does not stop the others.
+/// A file that has been done with the same settings is kept. A file that cannot be done does not stop the
+/// others.
 ///
 /// # Errors
-/// The robot or the map is wrong, two recordings would go into one file, or no recording can be retargeted at all.
+/// The robot or the map is wrong, two recordings would go into one file, or no recording can be retargeted at
+/// all.
 pub fn retarget(arguments: &RetargetArguments, console: &Console) -> Result<RetargetOutcome, Error> {
     check_folder(&arguments.out)?;
     check_names(&arguments.c3d)?;

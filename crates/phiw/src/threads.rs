@@ -2,7 +2,8 @@
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// Address space that a thread reserves \[bytes\]: its stack, and what the allocator sets aside for it (64 MB in glibc).
+/// Address space that a thread reserves \[bytes\]: its stack, and what the allocator sets aside for it (64 MB
+/// in glibc).
 #[cfg(target_os = "linux")]
 const RESERVED_BY_THREAD: u64 = 66 << 20;
 
@@ -10,11 +11,11 @@ const RESERVED_BY_THREAD: u64 = 66 << 20;
 #[cfg(target_os = "linux")]
 const SHARE_FOR_THREADS: f64 = 0.25;
 
-/// Does `work` with one thread a core (or `RAYON_NUM_THREADS`), or fewer where the system gives fewer, at the least
-/// with the thread that is there.
+/// Does `work` with one thread a core (or `RAYON_NUM_THREADS`), or fewer where the system gives fewer, at the
+/// least with the thread that is there.
 ///
-/// The threads are a pool of their own, not the global one: that can be built once only, so that one thread too many
-/// would leave none.
+/// The threads are a pool of their own, not the global one: that can be built once only, so that one thread
+/// too many would leave none.
 pub fn with<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     let most = std::thread::available_parallelism().map_or(1, usize::from);
     let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.parse().ok());

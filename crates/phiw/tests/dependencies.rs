@@ -31,7 +31,8 @@ fn no_simulator() {
     assert_eq!(simulators, [""; 0]);
 }
 
-/// A URDF went through four readers of XML, three of them unmaintained; two of them spelled names differently.
+/// A URDF went through four readers of XML, three of them unmaintained; two of them spelled names
+/// differently.
 #[test]
 fn one_reader_of_xml() {
     let readers = linked_like(|name| {

@@ -1,4 +1,5 @@
-//! `phiw explain` from files to files: a sufficient model, an effect that is found, a held model that has changed.
+//! `phiw explain` from files to files: a sufficient model, an effect that is found, a held model that has
+//! changed.
 
 mod synthetic;
 

@@ -38,7 +38,8 @@ fn log() -> Recording {
     log
 }
 
-/// Stamps since 1970 were widened by a billionth of themselves, 1.7 s: training swallowed the start of what was held out.
+/// Stamps since 1970 were widened by a billionth of themselves, 1.7 s: training swallowed the start of what
+/// was held out.
 #[test]
 fn stamps_since_1970_say_the_same_as_stamps_from_zero() {
     let zero = log();
@@ -108,7 +109,8 @@ fn a_joint_at_rest_where_held_out_is_said() {
     );
 }
 
-/// The variants of an effect had different numbers of determined columns: "columns of the merged factor has 49 elements, but this robot needs 48".
+/// The variants of an effect had different numbers of determined columns: "columns of the merged factor has
+/// 49 elements, but this robot needs 48".
 #[test]
 fn short_logs_and_effects_that_need_the_models_torque_end_in_a_result_or_a_reason() {
     let whole = synthetic::recording(1, 20.0);

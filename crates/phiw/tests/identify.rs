@@ -24,7 +24,8 @@ struct Identification {
 }
 
 impl Identification {
-    /// Identifies from two logs and validates on a third. The URDF's inertials are changed by `spoil`: identification must not lean on them.
+    /// Identifies from two logs and validates on a third. The URDF's inertials are changed by `spoil`:
+    /// identification must not lean on them.
     fn new(declare: &[&str], spoil: impl Fn(&str) -> String) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
@@ -67,7 +68,8 @@ fn without_inertials(urdf: &str) -> String {
     text
 }
 
-/// The same with the first axis horizontal, so that joint_1 feels the weight of link_1, though never its mass alone.
+/// The same with the first axis horizontal, so that joint_1 feels the weight of link_1, though never its mass
+/// alone.
 fn lying_without_inertials(urdf: &str) -> String {
     without_inertials(urdf).replacen("<axis xyz=\"0 0 1\"/>", "<axis xyz=\"1 0 0\"/>", 1)
 }

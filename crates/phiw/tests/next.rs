@@ -17,7 +17,8 @@ fn wrong_urdf() -> String {
     )
 }
 
-/// RMS of the difference between the planned torques and those of a robot (with friction), over the latter's RMS.
+/// RMS of the difference between the planned torques and those of a robot (with friction), over the latter's
+/// RMS.
 fn torque_error(plan: &Recording, urdf: &str, viscous: [f64; 3]) -> f64 {
     let tree = tree(urdf, false);
     let mut workspace = phiw_dynamics::Workspace::new(&tree);
@@ -120,8 +121,8 @@ fn logs_correct_the_estimate_and_open_the_way_to_livelier_motions() {
     assert!(believed > 0.2 && error < 0.01, "{believed} by the URDF, {error} by the estimate");
 }
 
-/// Robots that are off the URDF by as much as it is said to be: over all of them the margin is off by its standard deviation, before and after
-/// something has been measured, and less after.
+/// Robots that are off the URDF by as much as it is said to be: over all of them the margin is off by its
+/// standard deviation, before and after something has been measured, and less after.
 #[test]
 fn the_margin_is_as_uncertain_as_it_says() {
     const SHARE: f64 = 0.15;

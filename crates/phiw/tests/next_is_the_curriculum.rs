@@ -1,4 +1,5 @@
-//! `phiw next` and the curriculum plan the same on the same inputs: the same motion, α and margin, and the same refusal.
+//! `phiw next` and the curriculum plan the same on the same inputs: the same motion, α and margin, and the
+//! same refusal.
 
 mod next_scene;
 mod synthetic;
@@ -186,8 +187,8 @@ fn both_refuse_where_no_motion_keeps_the_balance() {
     assert!(message.contains(same.split(';').next().unwrap()), "{message}, {same}");
 }
 
-/// A first log after which something was undetermined had the condition number ∞, over which any later one is nothing: α fell to 0, and all motions
-/// that stay on the support were allowed at once.
+/// A first log after which something was undetermined had the condition number ∞, over which any later one is
+/// nothing: α fell to 0, and all motions that stay on the support were allowed at once.
 #[test]
 fn a_first_log_that_leaves_parameters_undetermined_does_not_open_every_motion() {
     let scene = Scene::new(&urdf());

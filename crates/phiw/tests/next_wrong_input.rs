@@ -1,4 +1,5 @@
-//! `phiw next` on wrong input: one message that names the file, the place and the mend, exit status 2, and nothing written.
+//! `phiw next` on wrong input: one message that names the file, the place and the mend, exit status 2, and
+//! nothing written.
 
 mod next_scene;
 mod synthetic;
@@ -136,7 +137,8 @@ fn a_motion_whose_stamps_contradict_its_velocities_is_refused() {
     }
 }
 
-/// The comparison of whole columns let a short jump pass: 0.02 rad between two rows is 2 rad/s that no column states.
+/// The comparison of whole columns let a short jump pass: 0.02 rad between two rows is 2 rad/s that no column
+/// states.
 #[test]
 fn a_motion_that_jumps_between_two_rows_is_refused() {
     let jump = |size: f64, rows: std::ops::Range<usize>| {

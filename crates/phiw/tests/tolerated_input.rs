@@ -1,11 +1,13 @@
-//! Input that is odd but can be worked with: exit status 0, and everyone is told, on standard error, in the page and in `report.json`.
+//! Input that is odd but can be worked with: exit status 0, and everyone is told, on standard error, in the
+//! page and in `report.json`.
 
 mod synthetic;
 
 use assert_cmd::Command;
 use phiw_report::ReportJson;
 
-/// Identifies from the logs given and looks for `warnings` in all three places; gives back the number of rows used.
+/// Identifies from the logs given and looks for `warnings` in all three places; gives back the number of rows
+/// used.
 fn check(train: &str, validate: &str, warnings: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);

@@ -1,4 +1,5 @@
-//! Wrong input gets one message that names the file, the place and the mend, exit status 2, and nothing written.
+//! Wrong input gets one message that names the file, the place and the mend, exit status 2, and nothing
+//! written.
 
 mod synthetic;
 

@@ -7,14 +7,16 @@ use phiw_dynamics::{DimensionError, Tree, Workspace, check_size};
 
 /// What a controller believes that a motion needs.
 pub trait TorqueModel {
-    /// Writes the torque of each joint for positions `q` \[rad, m\], velocities `v` and accelerations `a` of the joints.
+    /// Writes the torque of each joint for positions `q` \[rad, m\], velocities `v` and accelerations `a` of
+    /// the joints.
     ///
     /// # Errors
     /// A slice does not fit the model.
     fn torque(&mut self, q: &[f64], v: &[f64], a: &[f64], torque: &mut [f64]) -> Result<(), DimensionError>;
 }
 
-/// Rigid bodies with viscous friction: φ(q, q̇, q̈)·w of the paper. A floating base is believed to stand still, upright.
+/// Rigid bodies with viscous friction: φ(q, q̇, q̈)·w of the paper. A floating base is believed to stand
+/// still, upright.
 #[derive(Clone, Debug)]
 pub struct RigidBodyModel {
     tree: Tree,
@@ -25,8 +27,8 @@ pub struct RigidBodyModel {
 }
 
 impl RigidBodyModel {
-    /// The tree's own parameters, which may be as wrong as one likes, and a coefficient of viscous friction for each joint
-    /// \[N·m·s/rad, N·s/m\]; none if empty.
+    /// The tree's own parameters, which may be as wrong as one likes, and a coefficient of viscous friction
+    /// for each joint \[N·m·s/rad, N·s/m\]; none if empty.
     ///
     /// # Errors
     /// The coefficients are not one for each joint.
@@ -96,17 +98,20 @@ impl Gains {
 pub struct GainSettings {
     /// Bandwidth that is wanted of each joint \[rad/s\]; 0 for none.
     pub bandwidth: f64,
-    /// Position gain over the effort limit \[1/rad, 1/m\] that a joint has at least, as dry friction would hold a light joint wherever it is.
+    /// Position gain over the effort limit \[1/rad, 1/m\] that a joint has at least, as dry friction would
+    /// hold a light joint wherever it is.
     pub stiffness: f64,
-    /// Largest K_p·T² over the joint's inertia, as commands that are held are a delay: the square of the largest bandwidth times T.
+    /// Largest K_p·T² over the joint's inertia, as commands that are held are a delay: the square of the
+    /// largest bandwidth times T.
     pub held_inertia: f64,
     /// Largest K_p·T over the joint's viscous friction, which allows that much more.
     pub held_friction: f64,
 }
 
 impl Default for GainSettings {
-    /// Small gains, as the paper's: half of the effort limit for a radian, of which a robot's own weight pulls a third. The bounds of held commands leave
-    /// the loops of `cargo xtask paper` (0.01 s) stable in both engines.
+    /// Small gains, as the paper's: half of the effort limit for a radian, of which a robot's own weight
+    /// pulls a third. The bounds of held commands leave the loops of `cargo xtask paper` (0.01 s) stable in
+    /// both engines.
     fn default() -> Self {
         GainSettings { bandwidth: 0.0, stiffness: 0.5, held_inertia: 0.04, held_friction: 0.3 }
     }
@@ -115,8 +120,9 @@ impl Default for GainSettings {
 impl Gains {
     /// Critically damped gains that stay stable when commands are held for `period_s` \[s\].
     ///
-    /// `inertia` is what each joint feels \[kg·m², kg\], as [`apparent_inertia`] or [`least_apparent_inertia`] tells, and `viscous` the viscous friction that damps
-    /// it already \[N·m·s/rad, N·s/m\]; none if empty.
+    /// `inertia` is what each joint feels \[kg·m², kg\], as [`apparent_inertia`] or
+    /// [`least_apparent_inertia`] tells, and `viscous` the viscous friction that damps it already
+    /// \[N·m·s/rad, N·s/m\]; none if empty.
     ///
     /// # Errors
     /// A list does not fit the robot.
@@ -165,11 +171,12 @@ pub fn least_apparent_inertia(
     Ok(inertia)
 }
 
-/// What each joint feels of the robot when all other joints are free and the base is held \[kg·m², kg\]: 1/(M⁻¹)ⱼⱼ, with
-/// `rotor_inertia` on the mass matrix's diagonal (none if empty).
+/// What each joint feels of the robot when all other joints are free and the base is held \[kg·m², kg\]:
+/// 1/(M⁻¹)ⱼⱼ, with `rotor_inertia` on the mass matrix's diagonal (none if empty).
 ///
-/// It is never more than what the joint feels when the others are locked, and often much less. A velocity gain that is held for
-/// a control period must stay below twice this inertia over the period, or the loop is unstable.
+/// It is never more than what the joint feels when the others are locked, and often much less. A velocity
+/// gain that is held for a control period must stay below twice this inertia over the period, or the loop is
+/// unstable.
 ///
 /// # Errors
 /// A list does not fit the robot.
@@ -235,7 +242,8 @@ mod tests {
     use super::*;
     use phiw_dynamics::random_tree::{RandomTreeOptions, random_tree};
 
-    /// Each case asks for more or less than a held command allows: K_p and K_d of inertias of 0.5 kg·m² at a limit that the settings name.
+    /// Each case asks for more or less than a held command allows: K_p and K_d of inertias of 0.5 kg·m² at a
+    /// limit that the settings name.
     #[test]
     fn gains_are_as_stiff_as_wanted_and_held_commands_allow() -> Result<(), Box<dyn std::error::Error>> {
         let tree = random_tree(3, &RandomTreeOptions::default())?;

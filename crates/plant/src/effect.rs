@@ -7,8 +7,9 @@ use phiw_dynamics::Tree;
 
 /// One effect in the plant's physics or sensors. Torques in N·m or N, angles in rad or m.
 ///
-/// Whether it is declared or secret is not the plant's business: a log never mentions it. Joints are indices in the robot's
-/// order, bodies indices in [`Tree::bodies`]. The torque is what the joint must deliver on top of the rigid body's.
+/// Whether it is declared or secret is not the plant's business: a log never mentions it. Joints are indices
+/// in the robot's order, bodies indices in [`Tree::bodies`]. The torque is what the joint must deliver on top
+/// of the rigid body's.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
     /// A friction of the joint's speed.
@@ -62,8 +63,8 @@ pub enum Effect {
     },
     /// Two joints feel each other through the transmission.
     Coupling(Coupling),
-    /// A spring between motor and link; with `backlash`, one with play. The encoder and all other effects of the joint are on the
-    /// motor's side, and so is the rotor, whose inertia must be > 0.
+    /// A spring between motor and link; with `backlash`, one with play. The encoder and all other effects of
+    /// the joint are on the motor's side, and so is the rotor, whose inertia must be > 0.
     Flexibility {
         /// The joint.
         joint: usize,
@@ -135,7 +136,8 @@ pub enum Coupling {
     SharedInertia {
         /// The joints.
         joints: [usize; 2],
-        /// What couples them; its size must stay below the geometric mean of the inertias that the joints feel.
+        /// What couples them; its size must stay below the geometric mean of the inertias that the joints
+        /// feel.
         inertia: f64,
     },
     /// One feels the other's speed.
@@ -187,7 +189,8 @@ impl Effect {
         }
     }
 
-    /// The joints that it is named after; none for a tilt of the base. A body stands for the joint that moves it.
+    /// The joints that it is named after; none for a tilt of the base. A body stands for the joint that moves
+    /// it.
     pub fn joints(&self, tree: &Tree) -> Vec<usize> {
         let of_body = |body: usize| {
             let joint = tree.bodies().get(body).map(|body| body.joint.as_str());

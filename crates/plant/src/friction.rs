@@ -2,10 +2,11 @@
 
 use crate::numbers::Numbers;
 
-/// A friction that depends on the joint's speed. What the joint must deliver against it has the sign of the motion.
+/// A friction that depends on the joint's speed. What the joint must deliver against it has the sign of the
+/// motion.
 ///
-/// `width` is the speed over which a sign turns, tanh(q̇/width) \[rad/s, m/s\]; torques are in N·m or N, joint speeds in rad/s or
-/// m/s.
+/// `width` is the speed over which a sign turns, tanh(q̇/width) \[rad/s, m/s\]; torques are in N·m or N,
+/// joint speeds in rad/s or m/s.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Friction {
     /// fv·q̇.
@@ -68,7 +69,8 @@ pub enum Friction {
 }
 
 impl Friction {
-    /// Torque at a speed, `t_s` after the plant was switched on, with the torque `load` going into the rigid body.
+    /// Torque at a speed, `t_s` after the plant was switched on, with the torque `load` going into the rigid
+    /// body.
     pub fn torque(&self, speed: f64, t_s: f64, load: f64) -> f64 {
         let sign = |width: f64| (speed / width).tanh();
         match *self {

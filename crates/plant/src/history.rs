@@ -1,7 +1,7 @@
 //! What the plant truly did, at every boundary between integration steps.
 
-/// A run's truth, which no sensor sees. Arrays are row-major, `[row × joints]`; a row is a boundary between two steps, and what
-/// is constant over a step stands in the row of its beginning.
+/// A run's truth, which no sensor sees. Arrays are row-major, `[row × joints]`; a row is a boundary between
+/// two steps, and what is constant over a step stands in the row of its beginning.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct History {
     /// Number of joints.
@@ -26,13 +26,14 @@ pub struct History {
     pub joint_torque: Vec<f64>,
     /// Configuration of a floating base, 7 numbers a row; empty on a fixed base.
     pub base: Vec<f64>,
-    /// Velocity of a floating base in its own frame, linear then angular, 6 numbers a row; empty on a fixed base.
+    /// Velocity of a floating base in its own frame, linear then angular, 6 numbers a row; empty on a fixed
+    /// base.
     pub base_velocity: Vec<f64>,
     /// Wrench at the base at the beginning of the step, 6 numbers a row (see
     /// [`base_wrench`](phiw_dynamics::DynamicsBackend::base_wrench)).
     pub wrench: Vec<f64>,
-    /// The same of each foot (see [`foot_wrench`](phiw_dynamics::SimulationBackend::foot_wrench)), 6 numbers a foot, one foot after the other in a
-    /// row; empty if the backend does not tell.
+    /// The same of each foot (see [`foot_wrench`](phiw_dynamics::SimulationBackend::foot_wrench)), 6 numbers
+    /// a foot, one foot after the other in a row; empty if the backend does not tell.
     pub foot_wrenches: Vec<f64>,
 }
 
@@ -65,8 +66,8 @@ impl History {
         v0 + x * (v1 - v0)
     }
 
-    /// Mean of what is constant over steps, from `from_s` to `to_s`; its value at the time where both are the same.
-    /// `values` has `width` numbers a row, of which `column` is meant.
+    /// Mean of what is constant over steps, from `from_s` to `to_s`; its value at the time where both are the
+    /// same. `values` has `width` numbers a row, of which `column` is meant.
     pub fn mean(&self, values: &[f64], width: usize, column: usize, from_s: f64, to_s: f64) -> f64 {
         let place = |t_s: f64| ((t_s - self.start_s) / self.step_s).clamp(0.0, self.steps() as f64);
         let (from, to) = (place(from_s), place(to_s));

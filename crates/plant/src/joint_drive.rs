@@ -114,8 +114,8 @@ impl JointDrive {
         self.offset + self.smooth.iter().map(|law| law.torque(middle)).sum::<f64>()
     }
 
-    /// Torque of the stiff effects over a step at whose end the drive has `speed`: backward Euler, which is stable however
-    /// steep they are.
+    /// Torque of the stiff effects over a step at whose end the drive has `speed`: backward Euler, which is
+    /// stable however steep they are.
     pub(crate) fn stiff_torque(&self, step: &DriveStep, speed: f64) -> f64 {
         let DriveStep { angle, t_s, step_s, load, .. } = *step;
         let frictions: f64 = self.frictions.iter().map(|law| law.torque(speed, t_s, load)).sum();

@@ -12,8 +12,9 @@ pub enum Mechanism {
         /// Angle at which it is slack.
         rest: f64,
     },
-    /// k·sin(q − zero)·(1 − rest/length): a spring between the base and a lever on the link, whose length is that of the third side
-    /// of a triangle with the sides 1 and `arm`. `rest` is its slack length; with 0 the torque is a pure sinusoid.
+    /// k·sin(q − zero)·(1 − rest/length): a spring between the base and a lever on the link, whose length is
+    /// that of the third side of a triangle with the sides 1 and `arm`. `rest` is its slack length; with 0
+    /// the torque is a pure sinusoid.
     Balancer {
         /// k.
         torque: f64,

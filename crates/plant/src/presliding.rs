@@ -3,12 +3,14 @@
 /// A friction that builds up over a way, not at once.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Presliding {
-    /// Springs in parallel, each of which slips at its own torque (Iwan 1966): `[yield way [rad, m], slip torque [N·m, N]]`.
+    /// Springs in parallel, each of which slips at its own torque (Iwan 1966): `[yield way [rad, m], slip
+    /// torque [N·m, N]]`.
     MaxwellSlip {
         /// The springs.
         elements: Vec<[f64; 2]>,
     },
-    /// LuGre's bristles without micro-damping (Canudas de Wit et al. 1995): ż = q̇ − |q̇|·z/way; torque·z/way.
+    /// LuGre's bristles without micro-damping (Canudas de Wit et al. 1995): ż = q̇ − |q̇|·z/way;
+    /// torque·z/way.
     LuGre {
         /// Torque when sliding \[N·m, N\].
         torque: f64,
@@ -26,7 +28,8 @@ impl Presliding {
         }
     }
 
-    /// Torque at the end of a step that is made at `speed`. It rises with the speed, so a step can be solved for it.
+    /// Torque at the end of a step that is made at `speed`. It rises with the speed, so a step can be solved
+    /// for it.
     pub(crate) fn torque(&self, memory: &[f64], speed: f64, step_s: f64) -> f64 {
         match self {
             Presliding::MaxwellSlip { elements } => {

@@ -8,7 +8,8 @@ use std::f64::consts::TAU;
 ///
 /// Any closure `|t_s, q, v, a|` is one.
 pub trait Reference {
-    /// Writes positions \[rad, m\], velocities and accelerations of all joints `t_s` seconds after the motion's start.
+    /// Writes positions \[rad, m\], velocities and accelerations of all joints `t_s` seconds after the
+    /// motion's start.
     fn at(&self, t_s: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]);
 }
 
@@ -44,8 +45,8 @@ pub struct FadedSines {
 }
 
 impl MultiSine {
-    /// Random sines up to `highest_hz` that stay within the shares `reach` of each joint's range and `speed` of its speed limit
-    /// (3 rad/s where it has none).
+    /// Random sines up to `highest_hz` that stay within the shares `reach` of each joint's range and `speed`
+    /// of its speed limit (3 rad/s where it has none).
     pub fn random(
         tree: &Tree,
         duration_s: f64,

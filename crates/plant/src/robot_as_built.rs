@@ -1,10 +1,11 @@
-//! The robot as it is built, which is not always as it is declared: payloads, a base that is not level, other rotors.
+//! The robot as it is built, which is not always as it is declared: payloads, a base that is not level, other
+//! rotors.
 
 use crate::{Effect, PlantError};
 use phiw_dynamics::{Inertia, Mat3, PARAMETERS_PER_BODY, Tree, Vec3, World};
 
-/// The tree and the world with all effects that change them. Rotors behind springs are taken out of the world and returned,
-/// joint by joint, 0 where there is none.
+/// The tree and the world with all effects that change them. Rotors behind springs are taken out of the world
+/// and returned, joint by joint, 0 where there is none.
 pub(crate) fn robot_as_built(
     tree: &Tree,
     world: &World,

@@ -5,8 +5,9 @@ const MOST_STEPS: usize = 80;
 
 /// The root of `excess`, whose slope is at least 1 or near it, to `tolerance`, searched from `guess`.
 ///
-/// Where the slope is at least 1, the root is no farther than the excess at the guess; elsewhere the bracket grows until it
-/// holds a change of sign. Then regula falsi, with Illinois' halving (Dowell & Jarratt 1971) and bisection as a guard.
+/// Where the slope is at least 1, the root is no farther than the excess at the guess; elsewhere the bracket
+/// grows until it holds a change of sign. Then regula falsi, with Illinois' halving (Dowell & Jarratt 1971)
+/// and bisection as a guard.
 pub(crate) fn rising_root(mut excess: impl FnMut(f64) -> f64, guess: f64, tolerance: f64) -> f64 {
     let at_guess = excess(guess);
     if at_guess == 0.0 || !at_guess.is_finite() {

@@ -21,7 +21,8 @@ pub struct PlantRun {
 /// Force and moment between robot and floor, as a force plate measures them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reaction {
-    /// Force \[N\], then moment about the world's origin \[N·m\], along the world's axes; a mean over the torque's window.
+    /// Force \[N\], then moment about the world's origin \[N·m\], along the world's axes; a mean over the
+    /// torque's window.
     pub wrench: [f64; 6],
     /// The ZMP on the floor z = 0 \[m\]; none while the robot does not press on the floor.
     pub zmp: Option<[f64; 2]>,

@@ -25,10 +25,11 @@ pub enum Derivatives {
     /// None: encoders tell positions alone.
     #[default]
     Unlogged,
-    /// The drives' own, as a simulator knows them: without noise, the acceleration a mean over the torque's window.
+    /// The drives' own, as a simulator knows them: without noise, the acceleration a mean over the torque's
+    /// window.
     Exact,
-    /// Central differences of the logged positions over their stamps, and of these velocities again: what is made of encoders alone. One-sided in the first
-    /// and the last row.
+    /// Central differences of the logged positions over their stamps, and of these velocities again: what is
+    /// made of encoders alone. One-sided in the first and the last row.
     Differences,
 }
 
@@ -43,8 +44,9 @@ pub struct Sensors {
     pub angle_quantum: Vec<f64>,
     /// Standard deviation of the torques' white noise \[N·m, N\].
     pub torque_noise: Vec<f64>,
-    /// The logged torque is a mean over this time around the stamp \[s\]; 0 is the present value. A sampled controller's torque
-    /// jumps when it is told to, so the present value would be half a control period ahead of the motion it makes.
+    /// The logged torque is a mean over this time around the stamp \[s\]; 0 is the present value. A sampled
+    /// controller's torque jumps when it is told to, so the present value would be half a control period
+    /// ahead of the motion it makes.
     pub torque_window_s: f64,
     /// All logged torques are this old \[s\].
     pub torque_delay_s: f64,
@@ -71,14 +73,16 @@ impl Default for Sensors {
 }
 
 impl Sensors {
-    /// Without any error: exact positions, velocities and accelerations, and the command itself, every `period_s` \[s\]. If that is the control period, a row's
-    /// torque is the one that is held until the next row.
+    /// Without any error: exact positions, velocities and accelerations, and the command itself, every
+    /// `period_s` \[s\]. If that is the control period, a row's torque is the one that is held until the next
+    /// row.
     pub fn exact(period_s: f64) -> Self {
         Sensors { period_s, torque_window_s: 0.0, derivatives: Derivatives::Exact, ..Sensors::default() }
     }
 
-    /// The same with encoders of 2^`bits` steps a turn on each of `joints` revolute joints, and velocities and accelerations from their differences. The step
-    /// of a prismatic joint's encoder is a length: set [`Self::angle_quantum`].
+    /// The same with encoders of 2^`bits` steps a turn on each of `joints` revolute joints, and velocities
+    /// and accelerations from their differences. The step of a prismatic joint's encoder is a length: set
+    /// [`Self::angle_quantum`].
     pub fn with_encoder_bits(self, bits: u8, joints: usize) -> Self {
         let angle_quantum = vec![TAU * 0.5_f64.powi(i32::from(bits)); joints];
         Sensors { angle_quantum, derivatives: Derivatives::Differences, ..self }
@@ -133,7 +137,8 @@ impl Sensors {
         self.torque_window_s + self.period_s + (-earliest).max(0.0)
     }
 
-    /// The log of a history from time 0 to `end_s`, stamped from `origin_s` on, and the window of each row's torque.
+    /// The log of a history from time 0 to `end_s`, stamped from `origin_s` on, and the window of each row's
+    /// torque.
     pub(crate) fn record(
         &self,
         tree: &Tree,

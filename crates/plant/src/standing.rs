@@ -4,8 +4,8 @@ use phiw_dynamics::{Placement, Tree, Vec3, World};
 
 use crate::PlantError;
 
-/// The configuration with these joint positions and an upright base: at the origin, or so high that the lowest corner of the
-/// soles touches the floor.
+/// The configuration with these joint positions and an upright base: at the origin, or so high that the
+/// lowest corner of the soles touches the floor.
 pub(crate) fn standing_configuration(
     tree: &Tree,
     world: &World,

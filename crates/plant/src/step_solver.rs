@@ -1,10 +1,11 @@
 //! One integration step under effects that are too stiff to be taken from the state at its beginning.
 //!
-//! A backend steps under constant joint torques. Friction over 1 mrad/s on a wrist of 2 g·m² is a damper with a time constant of
-//! microseconds, so its torque must be that of the *end* of the step. The end is predicted: the joints' accelerations answer a
-//! change of torque by the mobility W, the inverse of the mass matrix, and everything else (gravity, Coriolis, contacts) is what
-//! it was in the last step, which leaves an error of the order of the step squared. Joint after joint is solved for its own
-//! torque with the others' fixed until nothing moves any more (Gauss-Seidel: W is positive definite, frictions are monotone).
+//! A backend steps under constant joint torques. Friction over 1 mrad/s on a wrist of 2 g·m² is a damper with
+//! a time constant of microseconds, so its torque must be that of the *end* of the step. The end is
+//! predicted: the joints' accelerations answer a change of torque by the mobility W, the inverse of the mass
+//! matrix, and everything else (gravity, Coriolis, contacts) is what it was in the last step, which leaves an
+//! error of the order of the step squared. Joint after joint is solved for its own torque with the others'
+//! fixed until nothing moves any more (Gauss-Seidel: W is positive definite, frictions are monotone).
 
 use crate::joint_drive::{DriveStep, Flexible, JointDrive};
 use crate::root::rising_root;
@@ -250,8 +251,8 @@ fn other(joints: [usize; 2], joint: usize) -> usize {
     if joints[0] == joint { joints[1] } else { joints[0] }
 }
 
-/// Inverse of the part of a symmetric positive definite matrix from row and column `first` on; not a number where the matrix is none such, which
-/// the motion that follows from it reports.
+/// Inverse of the part of a symmetric positive definite matrix from row and column `first` on; not a number
+/// where the matrix is none such, which the motion that follows from it reports.
 pub(crate) fn inverse(matrix: &[f64], size: usize, first: usize) -> Vec<f64> {
     let n = size - first;
     let entry = |row: usize, column: usize| matrix[(row + first) * size + column + first];

@@ -1,5 +1,6 @@
-//! Each effect, seen from outside: what the log's torque has beyond the rigid body's inverse dynamics along the true motion is the
-//! effect's own formula. The effect is felt by the motion (the loop is closed), and the log is the plant's ordinary one.
+//! Each effect, seen from outside: what the log's torque has beyond the rigid body's inverse dynamics along
+//! the true motion is the effect's own formula. The effect is felt by the motion (the loop is closed), and
+//! the log is the plant's ordinary one.
 
 mod plants;
 
@@ -10,8 +11,9 @@ use plants::{TrueStep, model, rms, rotors, run, setup, true_steps};
 /// What an effect adds to a joint's torque, step by step.
 type Formula<'a> = &'a dyn Fn(&Tree, &[TrueStep], usize) -> Vec<f64>;
 
-/// Runs `name` with the effect and compares each joint's torque beyond the declared rigid body with the formula: RMS of the
-/// difference over RMS of the largest joint's formula stays below `tolerance`, and the motion is tracked poorly.
+/// Runs `name` with the effect and compares each joint's torque beyond the declared rigid body with the
+/// formula: RMS of the difference over RMS of the largest joint's formula stays below `tolerance`, and the
+/// motion is tracked poorly.
 fn check(name: &str, effect: Effect, tolerance: f64, formula: Formula) {
     let tree = model(name, false);
     let world = rotors(&tree);

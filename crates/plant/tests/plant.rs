@@ -1,4 +1,5 @@
-//! The plant as a whole: without secrets it is the rigid body, with the same seed it is the same, and it refuses nonsense.
+//! The plant as a whole: without secrets it is the rigid body, with the same seed it is the same, and it
+//! refuses nonsense.
 
 mod plants;
 
@@ -11,7 +12,8 @@ use phiw_plant::{
 };
 use plants::{analytic, model, motion, poor_controller, random, rms, rotors, run, setup, true_steps};
 
-/// A plant without noise: the logged torque is the inverse dynamics of the true motion, for any model and period.
+/// A plant without noise: the logged torque is the inverse dynamics of the true motion, for any model and
+/// period.
 fn check_rigid(name: &str, control_period_s: f64, period_s: f64) {
     let tree = model(name, false);
     let world = rotors(&tree);
@@ -110,7 +112,8 @@ fn sensors_add_what_they_are_told() {
 fn velocities_from_differences_are_as_coarse_as_the_encoder() {
     let tree = model("arm7", false);
     let world = rotors(&tree);
-    // The true speeds, the logged ones, and the RMS of their difference between the first row and the last. The motion is the controller's, who sees the encoders.
+    // The true speeds, the logged ones, and the RMS of their difference between the first row and the last.
+    // The motion is the controller's, who sees the encoders.
     let with = |sensors: Sensors| {
         let run = run(&tree, &world, PlantSetup { sensors, ..setup(&tree, &world, Vec::new()) }, 3);
         let log = run.recording;

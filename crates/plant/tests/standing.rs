@@ -12,8 +12,9 @@ fn rapier(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, Back
     Ok(Box::new(RapierBackend::new(tree, world)?.with_solver_iterations(4)?))
 }
 
-/// A model on its soles follows a reference for `duration_s`. The controller takes the base as held, so legs must be stiff: all gains
-/// are those of position-controlled humanoids, in proportion to the joints' effort limits.
+/// A model on its soles follows a reference for `duration_s`. The controller takes the base as held, so legs
+/// must be stiff: all gains are those of position-controlled humanoids, in proportion to the joints' effort
+/// limits.
 fn stand(name: &str, reference: &dyn Reference, duration_s: f64) -> PlantRun {
     let tree = model(name, true);
     let path = format!("{}/../../models/{name}.support.toml", env!("CARGO_MANIFEST_DIR"));

@@ -1,7 +1,8 @@
 //! Base parameters: the combinations of standard parameters that motion can tell apart.
 //!
-//! Found numerically: φ over random states, a rank-revealing (column-pivoted) QR, and the dependent columns written in the
-//! independent ones (Gautier, "Numerical calculation of the base inertial parameters of robots", 1991).
+//! Found numerically: φ over random states, a rank-revealing (column-pivoted) QR, and the dependent columns
+//! written in the independent ones (Gautier, "Numerical calculation of the base inertial parameters of
+//! robots", 1991).
 
 use crate::{JointTorqueRegressor, RegressorError, factor::FactorBuilder};
 use faer::linalg::solvers::ColPivQr;
@@ -16,8 +17,8 @@ use rand_chacha::ChaCha8Rng;
 pub struct BaseParametersOptions {
     /// Seed of the random states.
     pub seed: u64,
-    /// A column whose independent part is smaller than this share of the largest is dependent. Angles in a URDF are often
-    /// rounded to eight digits, which leaves 1e-9 of a column that is dependent in truth.
+    /// A column whose independent part is smaller than this share of the largest is dependent. Angles in a
+    /// URDF are often rounded to eight digits, which leaves 1e-9 of a column that is dependent in truth.
     pub tolerance: f64,
 }
 
@@ -71,10 +72,12 @@ impl BaseParameters {
         Self::of_columns(factor.as_mat(), options.tolerance)
     }
 
-    /// The base parameters of a robot that can not move as it likes, from states `[q, v, a]` that it can be in: one whose feet stay on the floor,
-    /// for one. States must be many and all over what is possible, and hold the constraint to many digits.
+    /// The base parameters of a robot that can not move as it likes, from states `[q, v, a]` that it can be
+    /// in: one whose feet stay on the floor, for one. States must be many and all over what is possible, and
+    /// hold the constraint to many digits.
     ///
-    /// Bodies in `without` have no parameters, as the links of a chain of virtual joints: their columns are left out.
+    /// Bodies in `without` have no parameters, as the links of a chain of virtual joints: their columns are
+    /// left out.
     ///
     /// # Errors
     /// A state does not fit the robot, or has numbers that are not finite.
@@ -108,7 +111,8 @@ impl BaseParameters {
         let standard_size = matrix.ncols();
         let norms: Vec<f64> = matrix.col_iter().map(|column| column.norm_l2()).collect();
         let largest = norms.iter().copied().fold(0.0, f64::max);
-        // Columns of unit length, so that kg and kg·m² are judged alike; columns that no torque feels stay zero.
+        // Columns of unit length, so that kg and kg·m² are judged alike; columns that no torque feels stay
+        // zero.
         let unit = |norm: f64| if norm > tolerance * largest { 1.0 / norm } else { 0.0 };
         let scaled = Mat::from_fn(matrix.nrows(), standard_size, |row, column| {
             matrix[(row, column)] * unit(norms[column])
@@ -153,7 +157,8 @@ impl BaseParameters {
         &self.independent
     }
 
-    /// Last diagonal element of the pivoted R that counts over the first that does not: how clear the rank is.
+    /// Last diagonal element of the pivoted R that counts over the first that does not: how clear the rank
+    /// is.
     pub fn rank_gap(&self) -> f64 {
         self.rank_gap
     }
@@ -193,7 +198,8 @@ impl BaseParameters {
 
     /// The standard parameters nearest to `reference` that have the base parameters `base` exactly.
     ///
-    /// Distances are weighed by `reference`'s own magnitudes body by body, so that a heavy link takes up more than a light one.
+    /// Distances are weighed by `reference`'s own magnitudes body by body, so that a heavy link takes up more
+    /// than a light one.
     ///
     /// # Errors
     /// A slice has the wrong length.
@@ -208,8 +214,8 @@ impl BaseParameters {
         Ok(reference.iter().enumerate().map(|(column, value)| value + change[(column, 0)]).collect())
     }
 
-    /// The gradient with respect to the base parameters of something whose gradient with respect to the standard ones is `gradient`, where these
-    /// follow the base parameters as in [`Self::to_standard`].
+    /// The gradient with respect to the base parameters of something whose gradient with respect to the
+    /// standard ones is `gradient`, where these follow the base parameters as in [`Self::to_standard`].
     ///
     /// # Errors
     /// A slice has the wrong length.
@@ -223,10 +229,12 @@ impl BaseParameters {
         Ok((0..self.count()).map(|row| solution[(row, 0)]).collect())
     }
 
-    /// A belief about the standard parameters, as rows for a factor: each is `reference`, give or take `share` of [`parameter_scales`].
+    /// A belief about the standard parameters, as rows for a factor: each is `reference`, give or take
+    /// `share` of [`parameter_scales`].
     ///
-    /// Rows of \[Φ f\] with unit variance, row by row: `count` rows of `count` + 1 numbers. They hold all that this belief says of the base parameters;
-    /// once these are found, [`Self::to_standard`] gives the standard parameters that are then the likeliest.
+    /// Rows of \[Φ f\] with unit variance, row by row: `count` rows of `count` + 1 numbers. They hold all
+    /// that this belief says of the base parameters; once these are found, [`Self::to_standard`] gives the
+    /// standard parameters that are then the likeliest.
     ///
     /// # Errors
     /// `reference` has the wrong length.
@@ -278,7 +286,8 @@ pub fn parameter_scales(standard: &[f64]) -> Vec<f64> {
     standard.chunks_exact(PARAMETERS_PER_BODY).flat_map(scales).collect()
 }
 
-/// A random state: positions inside the limits (a turn where there are none), speeds and accelerations of some rad/s.
+/// A random state: positions inside the limits (a turn where there are none), speeds and accelerations of
+/// some rad/s.
 fn random_state(tree: &Tree, random: &mut ChaCha8Rng) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let mut q = Vec::with_capacity(tree.configuration_size());
     if tree.is_floating() {

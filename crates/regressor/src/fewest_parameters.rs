@@ -2,13 +2,16 @@
 
 use phiw_dynamics::{JointType, Placement, Tree, Vec3};
 
-/// Sine of the angle between two axes below which they count as parallel. Where in doubt they are, since parallel axes tell less.
+/// Sine of the angle between two axes below which they count as parallel. Where in doubt they are, since
+/// parallel axes tell less.
 const PARALLEL: f64 = 1e-3;
 
-/// For each body so many base parameters as it has at the least, by the rules of regrouping (Mayeda, Yoshida and Osuka 1990): seven behind a joint that turns
-/// about another direction than one before it, three where all axes so far are parallel, one for the first joint that turns and for a slide.
+/// For each body so many base parameters as it has at the least, by the rules of regrouping (Mayeda, Yoshida
+/// and Osuka 1990): seven behind a joint that turns about another direction than one before it, three where
+/// all axes so far are parallel, one for the first joint that turns and for a slide.
 ///
-/// It takes no time, where [`BaseParameters::of_tree`](crate::BaseParameters::of_tree) takes the cube of the number of bodies.
+/// It takes no time, where [`BaseParameters::of_tree`](crate::BaseParameters::of_tree) takes the cube of the
+/// number of bodies.
 pub fn fewest_base_parameters(tree: &Tree) -> Vec<usize> {
     // Where each body's frame lies with all joints at zero, and what turns before it.
     let mut frames: Vec<Placement<f64>> = Vec::with_capacity(tree.bodies().len());

@@ -1,4 +1,5 @@
-//! The joint torque regressor φ(q, q̇, q̈): τ = φ · π with π the standard parameters of all bodies (paper, equation 2).
+//! The joint torque regressor φ(q, q̇, q̈): τ = φ · π with π the standard parameters of all bodies (paper,
+//! equation 2).
 
 use phiw_dynamics::{
     BodyJoint, BodyKinematics, BodyMotion, DimensionError, Lanes, PARAMETERS_PER_BODY, Scalar, Spatial,
@@ -7,8 +8,9 @@ use phiw_dynamics::{
 
 /// Which bodies act on which torque, and the kernel that fills in their numbers.
 ///
-/// Row r of φ is non-zero only for the bodies that coordinate r moves, so φ is stored as *pairs*: for each row in order,
-/// for each such body in order, ten numbers. [`JointTorqueRegressor::scatter`] makes the dense matrix of it.
+/// Row r of φ is non-zero only for the bodies that coordinate r moves, so φ is stored as *pairs*: for each
+/// row in order, for each such body in order, ten numbers. [`JointTorqueRegressor::scatter`] makes the dense
+/// matrix of it.
 #[derive(Clone, Debug)]
 pub struct JointTorqueRegressor {
     /// The joint before each body.
@@ -25,7 +27,8 @@ pub struct JointTorqueRegressor {
 #[derive(Clone, Copy, Debug)]
 struct ChainAxis {
     pair: usize,
-    /// Whether an earlier axis of the chain has written to the pair already (a mimic joint behind its leader).
+    /// Whether an earlier axis of the chain has written to the pair already (a mimic joint behind its
+    /// leader).
     accumulate: bool,
 }
 
@@ -98,7 +101,8 @@ impl JointTorqueRegressor {
         self.row_offsets[self.velocity_size]
     }
 
-    /// The pairs of `row`, as a range of the buffer that [`Self::compute`] fills: `PARAMETERS_PER_BODY` numbers each.
+    /// The pairs of `row`, as a range of the buffer that [`Self::compute`] fills: `PARAMETERS_PER_BODY`
+    /// numbers each.
     pub fn row_range(&self, row: usize) -> std::ops::Range<usize> {
         PARAMETERS_PER_BODY * self.row_offsets[row]..PARAMETERS_PER_BODY * self.row_offsets[row + 1]
     }
@@ -118,9 +122,9 @@ impl JointTorqueRegressor {
 
     /// φ for one state, as pairs.
     ///
-    /// `robot` is the one that this structure was made for: `&tree`, or `&mut backend` of another library, whose own kinematics are then
-    /// used. `q` \[rad, m\], `v`, `a` are its coordinates (see [`BodyKinematics`]); `pairs` has [`Self::buffer_size`] numbers.
-    /// Allocates nothing.
+    /// `robot` is the one that this structure was made for: `&tree`, or `&mut backend` of another library,
+    /// whose own kinematics are then used. `q` \[rad, m\], `v`, `a` are its coordinates (see
+    /// [`BodyKinematics`]); `pairs` has [`Self::buffer_size`] numbers. Allocates nothing.
     ///
     /// # Errors
     /// A slice of the wrong length, or the robot's motion can not be computed.
@@ -180,8 +184,8 @@ impl JointTorqueRegressor {
         Ok(())
     }
 
-    /// Each axis is pushed down to the bodies that it moves and multiplied there with the body's own 6×10 regressor: one
-    /// product for each (axis, body) pair and none for the zeros.
+    /// Each axis is pushed down to the bodies that it moves and multiplied there with the body's own 6×10
+    /// regressor: one product for each (axis, body) pair and none for the zeros.
     #[inline(always)]
     fn kernel<T: Scalar>(&self, scratch: &mut RegressorScratch<T>, pairs: &mut [T]) {
         for (index, joint) in self.joints.iter().enumerate() {
@@ -219,7 +223,8 @@ fn axis_row<T: Scalar>(axis: Spatial<T>, motion: &BodyMotion<T>) -> [T; PARAMETE
     let Spatial { linear: force_axis, angular: moment_axis } = axis;
     let (omega, alpha, acceleration) =
         (motion.angular_velocity, motion.angular_acceleration, motion.proper_acceleration);
-    // Transposed cross products: s·(α × x) = (s × α)·x, s·(ω × (ω × x)) = ((s × ω) × ω)·x, s·(x × a) = (a × s)·x.
+    // Transposed cross products: s·(α × x) = (s × α)·x, s·(ω × (ω × x)) = ((s × ω) × ω)·x, s·(x × a) = (a ×
+    // s)·x.
     let first_moment =
         force_axis.cross(alpha) + force_axis.cross(omega).cross(omega) + acceleration.cross(moment_axis);
     let gyroscopic = moment_axis.cross(omega);

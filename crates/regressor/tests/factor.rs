@@ -166,7 +166,8 @@ fn rows_that_do_not_fit_are_refused() {
     assert_eq!(error, RegressorError::NotFinite { row: 1 });
 }
 
-/// A column that is not there was reported as a slice of the wrong length: "column index has 9 elements, but this robot needs 8".
+/// A column that is not there was reported as a slice of the wrong length: "column index has 9 elements, but
+/// this robot needs 8".
 #[test]
 fn an_index_out_of_range_is_named_with_what_it_indexes_and_its_bound() {
     let check = |result: Result<(), RegressorError>, message: &str| {

@@ -78,8 +78,8 @@ proptest! {
     #[test]
     fn base_parameters_say_all_that_standard_ones_say((tree, state, _) in trees()) {
         let base = BaseParameters::of_tree(&tree, BaseParametersOptions::default()).unwrap();
-        // Joints that follow one coordinate at different ratios are analytic functions of it, whose independence fades
-        // without a gap: what is left of them then has few digits.
+        // Joints that follow one coordinate at different ratios are analytic functions of it, whose
+        // independence fades without a gap: what is left of them then has few digits.
         prop_assert!(tree.has_mimic() || base.rank_gap() > 1e3, "rank gap {}", base.rank_gap());
         prop_assume!(base.rank_gap() > 1e3);
         let standard = tree.inertial_parameters();
@@ -96,7 +96,8 @@ proptest! {
         assert_relative(&base.from_standard(&lifted).unwrap(), &changed, 1e-9);
         assert_relative(&base.to_standard(&parameters, &standard).unwrap(), &standard, 1e-9);
 
-        // A gradient follows: what the standard parameters change by, times theirs, is what the base parameters change by, times its own.
+        // A gradient follows: what the standard parameters change by, times theirs, is what the base
+        // parameters change by, times its own.
         let gradient: Vec<f64> = (0..standard.len()).map(|index| (1.0 + index as f64).sin()).collect();
         let dot = |left: &[f64], right: &[f64]| left.iter().zip(right).map(|(a, b)| a * b).sum::<f64>();
         let moved: Vec<f64> = lifted.iter().zip(&standard).map(|(new, old)| new - old).collect();
@@ -105,8 +106,8 @@ proptest! {
         assert_relative(&[dot(&pulled, &step)], &[dot(&gradient, &moved)], 1e-7);
     }
 
-    /// A belief about standard parameters says of the base parameters what many draws of the standard ones say: the rows have mean zero and unit
-    /// variance, independent of each other.
+    /// A belief about standard parameters says of the base parameters what many draws of the standard ones
+    /// say: the rows have mean zero and unit variance, independent of each other.
     #[test]
     fn prior_rows_have_unit_variance((tree, _, _) in trees(), share in 0.05..1.0) {
         prop_assume!(!tree.has_mimic());

@@ -14,7 +14,8 @@ fn normal(random: &mut RandomNumbers) -> f64 {
 
 const TRUTH: [f64; 3] = [2.0, -1.0, 0.5];
 
-/// Two groups over three parameters, the middle one shared; noise of the second is ten times that of the first.
+/// Two groups over three parameters, the middle one shared; noise of the second is ten times that of the
+/// first.
 fn rows(seed: u64, count: usize, outliers: bool) -> Vec<(usize, Vec<f64>)> {
     let mut random = RandomNumbers::new(seed);
     let mut rows = Vec::new();

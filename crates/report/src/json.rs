@@ -86,7 +86,8 @@ pub struct EffectJson {
     /// Pooled held-out error once it and all before it are in.
     #[serde(deserialize_with = "number_or_nan")]
     pub validate_relative: f64,
-    /// Share of the residual's variance above the noise floor that it took away, on data it was not fitted to.
+    /// Share of the residual's variance above the noise floor that it took away, on data it was not fitted
+    /// to.
     #[serde(deserialize_with = "number_or_nan")]
     pub explains: f64,
     /// Probability of this effect against its rivals, 0 to 1.
@@ -143,8 +144,8 @@ pub struct ProgramJson {
     /// How the logs were conditioned: cut-off, decimation, segments, samples skipped.
     #[serde(default)]
     pub conditioning: IndexMap<String, serde_json::Value>,
-    /// The final model's pooled error with rests included: samples at which a joint stands still, where static friction may carry any torque,
-    /// are left out of the errors above.
+    /// The final model's pooled error with rests included: samples at which a joint stands still, where
+    /// static friction may carry any torque, are left out of the errors above.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relative_with_rests: Option<RelativeErrors>,
     /// How sure the effects are, in their order.

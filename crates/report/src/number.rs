@@ -38,7 +38,8 @@ pub fn percent(share: f64) -> String {
     }
 }
 
-/// The label of a tick at `value` on an axis whose ticks are `step` apart: just the digits that tell ticks apart.
+/// The label of a tick at `value` on an axis whose ticks are `step` apart: just the digits that tell ticks
+/// apart.
 pub(crate) fn tick(value: f64, step: f64) -> String {
     if value.abs() < 1e-6 * step {
         return "0".into();

@@ -1,7 +1,7 @@
 //! The report: one HTML page with everything in it.
 //!
-//! [`IdentificationPage`] and [`ExperimentPage`] are plain data; what is empty or `None` does not appear. All text is escaped. The
-//! page loads nothing, reads in light and dark, and prints.
+//! [`IdentificationPage`] and [`ExperimentPage`] are plain data; what is empty or `None` does not appear. All
+//! text is escaped. The page loads nothing, reads in light and dark, and prints.
 
 mod conditioning;
 mod effects;

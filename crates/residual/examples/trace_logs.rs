@@ -1,7 +1,8 @@
 //! Traces the residual of logs and prints what it finds:
 //! `trace_logs ROBOT.urdf viscous_friction,coulomb_friction TRAIN.csv,… [VALIDATE.csv,… [SEED]]`.
 //!
-//! With a seed the training folds are a bootstrap draw: as many as there are, with replacement. The names should not depend on it.
+//! With a seed the training folds are a bootstrap draw: as many as there are, with replacement. The names
+//! should not depend on it.
 
 use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};

@@ -1,4 +1,5 @@
-//! Tracing on recordings of a small robot whose secrets are known: named right, with its joints, and nothing else.
+//! Tracing on recordings of a small robot whose secrets are known: named right, with its joints, and nothing
+//! else.
 
 use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
@@ -79,7 +80,8 @@ fn traced(seed: u64, secret: &dyn Fn(&State<'_>, &mut [f64])) -> Tracing {
     traced_on(folds().0, &DECLARED, seed, secret, false)
 }
 
-/// Traces the secret on the training folds `train`; with `held` against the model of the same robot, identified without its secret on another recording.
+/// Traces the secret on the training folds `train`; with `held` against the model of the same robot,
+/// identified without its secret on another recording.
 fn traced_on(
     train: Vec<Fold>,
     declared: &[&str],
@@ -240,8 +242,8 @@ fn names_are_the_same_on_bootstrap_draws_of_the_training_folds() {
     }
 }
 
-/// The shoulder's rotor cannot be told from its link's inertia, so the held model has the one and not the other; the one that it has not must not take up the
-/// inertia of what the arm holds.
+/// The shoulder's rotor cannot be told from its link's inertia, so the held model has the one and not the
+/// other; the one that it has not must not take up the inertia of what the arm holds.
 #[test]
 fn a_payload_is_heard_beside_a_rotor_that_was_not_determined() {
     let declared = ["viscous_friction", "coulomb_friction", "rotor_inertia"];
@@ -281,8 +283,8 @@ fn a_friction_that_grew_is_named_once() {
     assert_eq!(named(&tracing), [("viscous_friction".to_owned(), vec!["elbow".to_owned()])]);
 }
 
-/// A candidate of which the motion leaves nothing is listed, not left out in silence: the base of a free rigid body takes up any payload's column of the
-/// shoulder's rotor.
+/// A candidate of which the motion leaves nothing is listed, not left out in silence: the base of a free
+/// rigid body takes up any payload's column of the shoulder's rotor.
 #[test]
 fn what_the_logs_cannot_tell_is_listed() {
     let tracing = traced(1, &|_, _| ());
@@ -291,7 +293,8 @@ fn what_the_logs_cannot_tell_is_listed() {
     assert!(silent.contains(&("rotor_inertia", &["shoulder".to_owned()])), "{silent:?}");
 }
 
-/// A gain scales all of the torque, friction included. Beside a held model nothing else can take up the friction's part, which was once named a friction of its own.
+/// A gain scales all of the torque, friction included. Beside a held model nothing else can take up the
+/// friction's part, which was once named a friction of its own.
 #[test]
 fn a_gain_scales_the_held_friction_too() {
     let gain = |_: &State<'_>, torque: &mut [f64]| torque[1] *= 1.15;
@@ -299,8 +302,9 @@ fn a_gain_scales_the_held_friction_too() {
     assert_eq!(named(&tracing), [("torque_gain".to_owned(), vec!["elbow".to_owned()])]);
 }
 
-/// The column of a gain is all torque that the model knows of, an effect found before it included. On a joint whose rigid body shares no parameter with another
-/// that column once did the effect's work in its place, as a rival of probability 1.
+/// The column of a gain is all torque that the model knows of, an effect found before it included. On a joint
+/// whose rigid body shares no parameter with another that column once did the effect's work in its place, as
+/// a rival of probability 1.
 #[test]
 fn a_gain_is_no_rival_of_an_effect_that_it_contains() {
     let lift = URDF.replace(
@@ -345,7 +349,8 @@ fn coloured_noise() -> impl Fn(&mut [f64]) {
     }
 }
 
-/// The floor knows nothing of a noise's colour, and such noise stands far above it. It does not follow the motion.
+/// The floor knows nothing of a noise's colour, and such noise stands far above it. It does not follow the
+/// motion.
 #[test]
 fn coloured_noise_is_no_structure() {
     let noise = coloured_noise();
@@ -353,7 +358,8 @@ fn coloured_noise_is_no_structure() {
     assert_eq!(tracing.verdict, Verdict::Sufficient, "{:?}", tracing.remaining.depends_on);
 }
 
-/// A spring of the joint itself takes a part of it; what that leaves is smaller than the noise, and was once taken for noise.
+/// A spring of the joint itself takes a part of it; what that leaves is smaller than the noise, and was once
+/// taken for noise.
 #[test]
 fn a_spring_to_the_neighbour_under_coloured_noise_is_not_explained() {
     let noise = coloured_noise();
@@ -385,7 +391,8 @@ fn friction_that_comes_and_goes_around_the_turn_is_not_sufficient() {
     );
 }
 
-/// A candidate whose columns were not finite ended the whole trace: a Stribeck velocity of zero, where steps of the encoder hide the speed.
+/// A candidate whose columns were not finite ended the whole trace: a Stribeck velocity of zero, where steps
+/// of the encoder hide the speed.
 #[test]
 fn a_candidate_that_cannot_be_judged_does_not_end_the_trace() {
     let tree = read_urdf(URDF, &UrdfOptions::default()).unwrap().tree;

@@ -94,8 +94,8 @@ fn stage(
     system.sync_folder(staged).map_err(unwritable(staged))
 }
 
-/// The files in the folder that are no results of these names; none if the folder cannot be exchanged: it holds something else than files, or
-/// somebody works in it.
+/// The files in the folder that are no results of these names; none if the folder cannot be exchanged: it
+/// holds something else than files, or somebody works in it.
 fn other_files(folder: &Path, files: &[ResultFile]) -> io::Result<Option<Vec<OsString>>> {
     let working = std::env::current_dir().and_then(|path| path.canonicalize());
     if working.is_ok_and(|working| working.starts_with(folder)) {

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// The operations that change a file system. The methods given are the real ones; a test overrides [`FileSystem::before`].
+/// The operations that change a file system. The methods given are the real ones; a test overrides
+/// [`FileSystem::before`].
 pub trait FileSystem {
     /// Called before every operation; an error takes the operation's place.
     ///

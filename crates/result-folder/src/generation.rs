@@ -10,8 +10,8 @@ const CURRENT: &str = "current";
 
 /// Replaces `files` in `folder` all at once. `set` names them together; the caller holds a lock for it.
 ///
-/// The files lie in `.<set>.phiw/<generation>/`; the visible names are links through `.<set>.phiw/current`. Where there are no symbolic links the files are
-/// renamed one by one.
+/// The files lie in `.<set>.phiw/<generation>/`; the visible names are links through `.<set>.phiw/current`.
+/// Where there are no symbolic links the files are renamed one by one.
 ///
 /// # Errors
 /// [`ResultError::Unwritable`]; then the files are as they were.
@@ -43,8 +43,8 @@ pub fn replace_file(system: &dyn FileSystem, path: &Path, content: &[u8]) -> Res
     Ok(())
 }
 
-/// Replaces a file, and another that vouches for it: as long as the second is there, it belongs to the first. The caller is the only one who
-/// writes them.
+/// Replaces a file, and another that vouches for it: as long as the second is there, it belongs to the first.
+/// The caller is the only one who writes them.
 ///
 /// # Errors
 /// [`ResultError::Unwritable`]; the second file may be gone then, if there was one.
@@ -65,7 +65,8 @@ pub fn replace_vouched(
     Ok(())
 }
 
-/// Removes the partial files that killed runs of [`replace_file`] and [`replace_vouched`] have left in a folder; the caller holds its lock.
+/// Removes the partial files that killed runs of [`replace_file`] and [`replace_vouched`] have left in a
+/// folder; the caller holds its lock.
 pub fn remove_partial_files(system: &dyn FileSystem, folder: &Path) {
     for entry in folder.read_dir().into_iter().flatten().flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
@@ -166,7 +167,8 @@ impl Generations<'_> {
         let old = self.generation()?;
         for file in files {
             let shown = self.folder.join(&file.name);
-            // What a link leads to is read through it: a link to somewhere else is replaced, not followed when writing.
+            // What a link leads to is read through it: a link to somewhere else is replaced, not followed
+            // when writing.
             if let Ok(content) = std::fs::read(&shown) {
                 self.system.create_file(&old.join(&file.name), &content).map_err(unwritable(&shown))?;
             }

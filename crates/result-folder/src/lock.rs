@@ -18,7 +18,8 @@ pub struct Lock {
 impl Lock {
     /// Takes the lock of a folder or file of results, for `command` (a few words for whoever is refused).
     ///
-    /// The lock is a hidden file beside the target, or, where nothing is there yet, in the nearest folder above.
+    /// The lock is a hidden file beside the target, or, where nothing is there yet, in the nearest folder
+    /// above.
     ///
     /// # Errors
     /// [`ResultError::Busy`] if another run holds it, [`ResultError::Unwritable`].
@@ -71,7 +72,8 @@ impl Drop for Lock {
     }
 }
 
-/// What the holder of a lock says of itself. It writes that right after it has taken the lock: whoever comes in between waits a moment.
+/// What the holder of a lock says of itself. It writes that right after it has taken the lock: whoever comes
+/// in between waits a moment.
 fn holder(mut file: &File) -> String {
     for _ in 0..READS {
         let mut text = String::new();
@@ -88,7 +90,8 @@ fn holder(mut file: &File) -> String {
 const READS: usize = 200;
 const BETWEEN_READS: Duration = Duration::from_millis(1);
 
-/// The target with the symbolic links of the folders that exist followed; a file's own name may be a link to its generation, and stays.
+/// The target with the symbolic links of the folders that exist followed; a file's own name may be a link to
+/// its generation, and stays.
 fn resolved(target: &Path) -> PathBuf {
     let absolute = std::path::absolute(target).unwrap_or_else(|_| target.to_owned());
     for ancestor in absolute.ancestors().filter(|path| path.is_dir()) {

@@ -1,4 +1,5 @@
-//! Whatever operation fails, and wherever the program is killed: all old or all new, and the next run clears up.
+//! Whatever operation fails, and wherever the program is killed: all old or all new, and the next run clears
+//! up.
 
 use phiw_result_folder::{
     Disk, FileSystem, Lock, ResultError, ResultFile, check_inputs, replace_file, replace_files,

@@ -43,8 +43,8 @@ pub struct MujocoBackend {
     v: Vec<f64>,
     /// The robot in its world; its state is the present one.
     world: Simulation,
-    /// The robot by itself; what is in it between calls is nobody's business. In a cell, since the wrench is computed
-    /// in it when it is asked for.
+    /// The robot by itself; what is in it between calls is nobody's business. In a cell, since the wrench is
+    /// computed in it when it is asked for.
     pub(crate) alone: RefCell<Simulation>,
     reaction: Reaction,
     /// The foot of each shape, and what each foot got in the last step; none before one.
@@ -68,8 +68,8 @@ impl MujocoBackend {
     /// The robot in its world, at rest in its neutral configuration.
     ///
     /// # Errors
-    /// MuJoCo is not found, the world does not fit the robot, the robot has mimic joints, a link has a first moment but
-    /// no mass, or MuJoCo refuses the model.
+    /// MuJoCo is not found, the world does not fit the robot, the robot has mimic joints, a link has a first
+    /// moment but no mass, or MuJoCo refuses the model.
     pub fn new(tree: &Tree, world: &World) -> Result<Self, MujocoError> {
         world.check(tree)?;
         if let Some(body) = tree.bodies().iter().find(|body| body.mimic) {

@@ -1,9 +1,9 @@
 //! Between phiw's coordinates of a floating base and MuJoCo's.
 //!
-//! phiw (Pinocchio) has `[position, quaternion xyzw]` and the linear and angular velocity in the base's frame, of which
-//! accelerations are the time derivatives, component by component. MuJoCo has `[position, quaternion wxyz]`, the linear
-//! velocity along the world's axes, and the angular velocity in the base's frame. With the base's rotation `R`, linear
-//! velocity `v` and angular velocity `ω`:
+//! phiw (Pinocchio) has `[position, quaternion xyzw]` and the linear and angular velocity in the base's
+//! frame, of which accelerations are the time derivatives, component by component. MuJoCo has `[position,
+//! quaternion wxyz]`, the linear velocity along the world's axes, and the angular velocity in the base's
+//! frame. With the base's rotation `R`, linear velocity `v` and angular velocity `ω`:
 //!
 //! - velocity: `ẋ = R·v`
 //! - acceleration: `ẍ = R·(a + ω × v)`

@@ -1,6 +1,7 @@
 //! Why there is no simulator.
 //!
-//! It names the library's version and variable, which `library.rs` owns, and `library.rs` returns it: a message is no use without them.
+//! It names the library's version and variable, which `library.rs` owns, and `library.rs` returns it: a
+//! message is no use without them.
 
 use phiw_dynamics::{BackendError, WorldError};
 use std::path::PathBuf;

@@ -6,6 +6,7 @@ pub enum Integrator {
     /// The classical Runge-Kutta method of order four.
     #[default]
     RungeKutta4,
-    /// Implicit in the velocity, of order one: no cheaper for a robot, but steady where velocities make it stiff.
+    /// Implicit in the velocity, of order one: no cheaper for a robot, but steady where velocities make it
+    /// stiff.
     Implicit,
 }

@@ -1,9 +1,9 @@
 //! Where the fields are that this crate reads and writes, in the structures of MuJoCo 3.17.0.
 //!
-//! Offsets in bytes, by `offsetof` over that release's headers (`layout.c` beside this file prints them). They are the
-//! same on every 64-bit platform: the structures hold `int`, `int64_t`, `double`, `size_t`, `bool` and pointers only. A
-//! library of another version is refused before anything is read; that the fields are where they should be is
-//! checked on each model (`Simulation::new`).
+//! Offsets in bytes, by `offsetof` over that release's headers (`layout.c` beside this file prints them).
+//! They are the same on every 64-bit platform: the structures hold `int`, `int64_t`, `double`, `size_t`,
+//! `bool` and pointers only. A library of another version is refused before anything is read; that the fields
+//! are where they should be is checked on each model (`Simulation::new`).
 
 #[cfg(not(target_pointer_width = "64"))]
 compile_error!("MuJoCo's libraries, and the offsets of their fields, are for 64-bit platforms");

@@ -29,8 +29,8 @@ pub const LIBRARY_FILE_NAME: &str = if cfg!(windows) {
 
 /// Where `cargo xtask mujoco` puts the library: `phiw/mujoco-3.17.0` in the user's cache folder.
 ///
-/// The cache folder is `$XDG_CACHE_HOME` or `~/.cache` on Linux, `~/Library/Caches` on macOS, `%LOCALAPPDATA%` on
-/// Windows. `None` where the user has no home.
+/// The cache folder is `$XDG_CACHE_HOME` or `~/.cache` on Linux, `~/Library/Caches` on macOS,
+/// `%LOCALAPPDATA%` on Windows. `None` where the user has no home.
 pub fn library_cache_path() -> Option<PathBuf> {
     let caches = etcetera::base_strategy::choose_native_strategy().ok()?.cache_dir();
     Some(caches.join("phiw").join(format!("mujoco-{VERSION}")).join(LIBRARY_FILE_NAME))
@@ -38,12 +38,12 @@ pub fn library_cache_path() -> Option<PathBuf> {
 
 /// Loads MuJoCo, if it is not yet loaded, and says from where.
 ///
-/// The places: the file that the variable [`LIBRARY_VARIABLE`] names and, if it is not set, [`library_cache_path`],
-/// then what the system's loader knows.
+/// The places: the file that the variable [`LIBRARY_VARIABLE`] names and, if it is not set,
+/// [`library_cache_path`], then what the system's loader knows.
 ///
 /// # Errors
-/// [`MujocoError::NotFound`] if it is in none of the places, [`MujocoError::Unusable`] if it is of another version or
-/// can not be loaded.
+/// [`MujocoError::NotFound`] if it is in none of the places, [`MujocoError::Unusable`] if it is of another
+/// version or can not be loaded.
 pub fn find_library() -> Result<PathBuf, MujocoError> {
     Ok(functions()?.path.clone())
 }
@@ -65,8 +65,8 @@ pub(crate) struct LogMessage {
     subject: [c_char; 1024],
 }
 
-/// Velocity or acceleration of an object: its type, its number, room for six numbers with the angular half first, and whether they are along
-/// the object's own axes.
+/// Velocity or acceleration of an object: its type, its number, room for six numbers with the angular half
+/// first, and whether they are along the object's own axes.
 pub(crate) type ObjectMotion = unsafe extern "C" fn(*const Model, *const Data, c_int, c_int, *mut f64, c_int);
 
 type LogHandler = unsafe extern "C" fn(*const LogMessage);
@@ -85,7 +85,8 @@ macro_rules! functions {
         impl Functions {
             fn look_up(library: Library, path: PathBuf) -> Result<Self, String> {
                 Ok(Functions {
-                    // SAFETY: the version has been checked, and these are the signatures in that version's headers.
+                    // SAFETY: the version has been checked, and these are the signatures in that version's
+                    // headers.
                     $($name: *unsafe { library.get(concat!(stringify!($name), "\0")) }
                         .map_err(whole_message)?,)*
                     path,
@@ -130,8 +131,9 @@ pub(crate) fn functions() -> Result<&'static Functions, MujocoError> {
     Ok(FUNCTIONS.get_or_init(|| functions))
 }
 
-/// Keeps MuJoCo from writing warnings to the terminal and a log into the present folder: this crate looks at the counts
-/// of warnings and reports errors of its own. An error ends the process, so that its message is the last that is heard.
+/// Keeps MuJoCo from writing warnings to the terminal and a log into the present folder: this crate looks at
+/// the counts of warnings and reports errors of its own. An error ends the process, so that its message is
+/// the last that is heard.
 unsafe extern "C" fn log(message: *const LogMessage) {
     const ERROR: c_int = 3;
     // SAFETY: MuJoCo calls this with a message that lives as long as the call; its subject ends with a zero.
@@ -170,8 +172,8 @@ fn find() -> Result<Functions, MujocoError> {
 
 /// Loads this file, if it is MuJoCo of the right version.
 fn load(path: &Path) -> Result<Functions, String> {
-    // SAFETY: loading runs the library's initialisers. The file is one that the user named, that `cargo xtask mujoco`
-    // checked, or that the system's loader knows under MuJoCo's name.
+    // SAFETY: loading runs the library's initialisers. The file is one that the user named, that `cargo xtask
+    // mujoco` checked, or that the system's loader knows under MuJoCo's name.
     let library = unsafe { Library::new(path) }.map_err(whole_message)?;
     let version: c_int = {
         // SAFETY: this function has had this signature in all versions of MuJoCo.

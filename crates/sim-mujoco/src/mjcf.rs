@@ -4,11 +4,11 @@ use crate::inertial::quaternion_of;
 use phiw_dynamics::{Body, JointType, Tree, World};
 use std::fmt::Write;
 
-/// What stands for the inertia of every body in the text; the true one is written into the compiled model, where
-/// neither the compiler's rounding nor its idea of a real body get at it.
+/// What stands for the inertia of every body in the text; the true one is written into the compiled model,
+/// where neither the compiler's rounding nor its idea of a real body get at it.
 ///
-/// The compiler must not think that a body's frame is its inertial frame, or it would never look at the latter again:
-/// hence a centre of mass and a turn that are not zero.
+/// The compiler must not think that a body's frame is its inertial frame, or it would never look at the
+/// latter again: hence a centre of mass and a turn that are not zero.
 pub(crate) mod placeholder {
     pub const CENTER: [f64; 3] = [0.125, 0.25, 0.5];
     pub const AXES: [f64; 4] = [0.5; 4];

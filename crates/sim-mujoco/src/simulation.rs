@@ -12,8 +12,8 @@ use std::ptr::{NonNull, null};
 
 /// Owns an `mjModel` and an `mjData`.
 ///
-/// Invariant of all that follows: both pointers are those of a model that [`Simulation::new`] has checked, nobody else
-/// has them, and the sizes are the model's.
+/// Invariant of all that follows: both pointers are those of a model that [`Simulation::new`] has checked,
+/// nobody else has them, and the sizes are the model's.
 pub(crate) struct Simulation {
     functions: &'static Functions,
     model: NonNull<Model>,
@@ -29,7 +29,8 @@ pub(crate) struct Sizes {
     pub bodies: usize,
 }
 
-// SAFETY: MuJoCo keeps nothing about a model or its data in threads; who owns them may use them from any one thread.
+// SAFETY: MuJoCo keeps nothing about a model or its data in threads; who owns them may use them from any one
+// thread.
 unsafe impl Send for Simulation {}
 
 impl Drop for Simulation {
@@ -76,7 +77,8 @@ impl Simulation {
     fn set_inertias(&mut self, inertias: &[PrincipalInertia]) {
         for (index, inertia) in inertias.iter().enumerate() {
             let body = index + 1; // body 0 is the world
-            // SAFETY: arrays of the model with one, three or four numbers for each body and the world, as checked.
+            // SAFETY: arrays of the model with one, three or four numbers for each body and the world, as
+            // checked.
             unsafe {
                 let array = |offset: usize| field::<*mut f64>(self.model.as_ptr(), offset).read();
                 array(model::BODY_MASS).add(body).write(inertia.mass);
@@ -195,7 +197,8 @@ impl Simulation {
         unsafe { (self.functions.mj_inverse)(self.model.as_ptr(), self.data.as_ptr()) };
     }
 
-    /// The acceleration under the applied force, and the contacts; `false` if the mass matrix is not positive definite.
+    /// The acceleration under the applied force, and the contacts; `false` if the mass matrix is not positive
+    /// definite.
     pub fn forward(&mut self) -> bool {
         let (model, data) = (self.model.as_ptr(), self.data.as_ptr());
         // SAFETY: the invariant; the count of warnings is a field inside the data.
@@ -226,7 +229,8 @@ impl Simulation {
         unsafe { (self.functions.mj_step)(self.model.as_ptr(), self.data.as_ptr()) };
     }
 
-    /// The accelerations of the bodies, for [`Self::body_acceleration`], in the motion of the last [`Self::inverse`].
+    /// The accelerations of the bodies, for [`Self::body_acceleration`], in the motion of the last
+    /// [`Self::inverse`].
     pub fn accelerate_bodies(&mut self) {
         // SAFETY: the invariant.
         unsafe { (self.functions.mj_rnePostConstraint)(self.model.as_ptr(), self.data.as_ptr()) };
@@ -248,7 +252,8 @@ impl Simulation {
         self.object_motion(self.functions.mj_objectVelocity, body)
     }
 
-    /// The acceleration of a body's frame, its origin's less gravity, along its own axes; after [`Self::accelerate_bodies`].
+    /// The acceleration of a body's frame, its origin's less gravity, along its own axes; after
+    /// [`Self::accelerate_bodies`].
     pub fn body_acceleration(&self, body: usize) -> Spatial<f64> {
         self.object_motion(self.functions.mj_objectAcceleration, body)
     }
@@ -262,11 +267,13 @@ impl Simulation {
         Spatial { linear: Vec3([x, y, z]), angular: Vec3([rx, ry, rz]) }
     }
 
-    /// The motion of a body's frame, along the world's axes, that unit velocity of a coordinate gives it. Allocates.
+    /// The motion of a body's frame, along the world's axes, that unit velocity of a coordinate gives it.
+    /// Allocates.
     pub fn body_jacobian_column(&self, body: usize, coordinate: usize) -> Spatial<f64> {
         let size = self.sizes.velocities;
         let (mut linear, mut angular) = (vec![0.0; 3 * size], vec![0.0; 3 * size]);
-        // SAFETY: the invariant; the body is one of the model's, and both matrices have three rows of `nv` numbers.
+        // SAFETY: the invariant; the body is one of the model's, and both matrices have three rows of `nv`
+        // numbers.
         unsafe {
             (self.functions.mj_jacBody)(
                 self.model.as_ptr(),
@@ -286,8 +293,8 @@ impl Simulation {
         body as i32 + 1
     }
 
-    /// The wrench that each root body gets through its joint, in the motion of the last call, summed: force and moment
-    /// about the world's origin.
+    /// The wrench that each root body gets through its joint, in the motion of the last call, summed: force
+    /// and moment about the world's origin.
     pub fn joint_wrench(&mut self, roots: impl Iterator<Item = usize>) -> [f64; 6] {
         self.accelerate_bodies();
         let centers = self.numbers(data::SUBTREE_COM, 3 * (self.sizes.bodies + 1));
@@ -303,8 +310,9 @@ impl Simulation {
         total
     }
 
-    /// Adds the wrenches of all contacts of the last [`Self::forward`] on the robot to those of its feet: force and moment about the world's
-    /// origin. `feet_of_shapes` says to which foot each shape belongs, the floor (the first shape) left out.
+    /// Adds the wrenches of all contacts of the last [`Self::forward`] on the robot to those of its feet:
+    /// force and moment about the world's origin. `feet_of_shapes` says to which foot each shape belongs, the
+    /// floor (the first shape) left out.
     pub fn add_contact_wrenches(&self, feet_of_shapes: &[usize], feet: &mut [[f64; 6]]) {
         let data = self.data.as_ptr();
         // SAFETY: fields inside the data; the contacts are an array of `ncon` structures.
@@ -313,7 +321,8 @@ impl Simulation {
         };
         for index in 0..count {
             let mut force = [0.0; 6];
-            // SAFETY: the index is below `ncon`, the result has six elements, and the structure is of this size.
+            // SAFETY: the index is below `ncon`, the result has six elements, and the structure is of this
+            // size.
             let (frame, point, shapes) = unsafe {
                 (self.functions.mj_contactForce)(self.model.as_ptr(), data, index, force.as_mut_ptr());
                 let this = contacts.add(index as usize * contact::SIZE);
@@ -397,13 +406,13 @@ fn compile(functions: &'static Functions, mjcf: &str) -> Result<Compiled, Mujoco
     }
 }
 
-/// The fields of the model hold what the text has put into them: its sizes, its time step, and the inertias that only
-/// this crate's text has.
+/// The fields of the model hold what the text has put into them: its sizes, its time step, and the inertias
+/// that only this crate's text has.
 fn check_model(compiled: NonNull<Model>, sizes: Sizes) -> Result<(), MujocoError> {
     let structure = compiled.as_ptr();
     let check = |what, right: bool| if right { Ok(()) } else { Err(MujocoError::Layout { what }) };
-    // SAFETY: numbers inside the model, which the library made and whose version has been checked; the arrays are read
-    // only once they are known to lie inside the model's own buffer.
+    // SAFETY: numbers inside the model, which the library made and whose version has been checked; the arrays
+    // are read only once they are known to lie inside the model's own buffer.
     unsafe {
         let size = |offset| field::<i64>(structure, offset).read() as usize;
         check("mjModel.nq", size(model::NQ) == sizes.positions)?;

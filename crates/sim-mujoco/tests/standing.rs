@@ -57,8 +57,8 @@ fn the_ground_carries_the_weight_below_the_center_of_mass() {
     }
 }
 
-/// The contact forces are what the motion that they cause needs: over each step, the ZMP of their mean is that of the
-/// motion seen, whose dynamics are phiw's own.
+/// The contact forces are what the motion that they cause needs: over each step, the ZMP of their mean is
+/// that of the motion seen, whose dynamics are phiw's own.
 #[test]
 fn the_measured_zmp_is_the_momentums() {
     let tree = robot();

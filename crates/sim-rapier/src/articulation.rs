@@ -10,8 +10,8 @@ use rapier3d_f64::utils::OrthonormalBasis;
 
 /// Stiffness of the springs that carry joint torques \[N·m/rad, N/m\].
 ///
-/// The engine takes no generalised force, but it has springs, `−k·(q − rest)`. One that is very soft and stretched very far pulls
-/// with the same force wherever the joint goes: over 100 rad it loses 1e-7 N·m.
+/// The engine takes no generalised force, but it has springs, `−k·(q − rest)`. One that is very soft and
+/// stretched very far pulls with the same force wherever the joint goes: over 100 rad it loses 1e-7 N·m.
 const SPRING: f64 = 1e-9;
 
 /// The engine's axes that joints slide along and turn about.
@@ -172,7 +172,8 @@ impl Articulation {
         self.world.multibody_joints.get_multibody(self.index).ok_or_else(lost)
     }
 
-    /// An error if the mass matrix of the last step was singular: the engine goes on with numbers that mean nothing.
+    /// An error if the mass matrix of the last step was singular: the engine goes on with numbers that mean
+    /// nothing.
     pub(crate) fn check_mass(&self) -> Result<(), BackendError> {
         let factors = self.multibody()?.inv_augmented_mass().lu_internal();
         let pivots = (0..factors.nrows()).map(|index| factors[(index, index)].abs());
@@ -219,7 +220,8 @@ impl Articulation {
         &all[self.base_center.map_or(0, |_| base)..]
     }
 
-    /// Takes the bodies to where the joints put them. A step does so by itself, but for the shapes that they carry.
+    /// Takes the bodies to where the joints put them. A step does so by itself, but for the shapes that they
+    /// carry.
     pub(crate) fn place_bodies(&mut self) -> Result<(), BackendError> {
         self.place_links()?;
         let PhysicsWorld { bodies, multibody_joints, .. } = &mut self.world;
@@ -247,8 +249,9 @@ impl Articulation {
         }
     }
 
-    /// Pose of a body's link, its centre of mass in the link's frame, and its Jacobian: 6 × the engine's coordinates, column by column,
-    /// the velocity of the centre of mass first. All are those of the last [`Self::place_links`].
+    /// Pose of a body's link, its centre of mass in the link's frame, and its Jacobian: 6 × the engine's
+    /// coordinates, column by column, the velocity of the centre of mass first. All are those of the last
+    /// [`Self::place_links`].
     pub(crate) fn link_state(&self, body: usize) -> Result<(&Pose, Vector, &[f64]), BackendError> {
         let (multibody, link) = (self.multibody()?, self.links[body]);
         let pose = multibody.link(link).ok_or_else(lost)?.local_to_world();

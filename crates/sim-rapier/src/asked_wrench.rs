@@ -1,6 +1,7 @@
 //! The wrench at the base in a motion that inverse dynamics was asked for: computed when somebody wants it.
 //!
-//! The engine has no inverse dynamics that would give it on the way, and a pass of this workspace's own takes a good part of the time that the engine needs.
+//! The engine has no inverse dynamics that would give it on the way, and a pass of this workspace's own takes
+//! a good part of the time that the engine needs.
 
 use phiw_dynamics::{AnalyticBackend, DynamicsBackend};
 use std::cell::RefCell;

@@ -14,32 +14,36 @@ use rapier3d_f64::prelude::PhysicsWorld;
 
 /// Iterations of a step unless [`RapierBackend::with_solver_iterations`] says otherwise.
 ///
-/// At steps of 1 ms an 18-joint robot in closed loop is then within 0.2 mrad of the exact motion, which is what encoders see.
-/// A robot with mimic joints has twice as many, as the engine finds the forces between them by iteration.
+/// At steps of 1 ms an 18-joint robot in closed loop is then within 0.2 mrad of the exact motion, which is
+/// what encoders see. A robot with mimic joints has twice as many, as the engine finds the forces between
+/// them by iteration.
 pub const DEFAULT_SOLVER_ITERATIONS: usize = 8;
 
 /// A robot in a [`World`], moved by Rapier's reduced-coordinate multibody.
 ///
-/// **Inverse and forward dynamics** are exact up to rounding: they come from the engine's mass matrix and accelerations, in
-/// empty worlds beside the one that is stepped.
+/// **Inverse and forward dynamics** are exact up to rounding: they come from the engine's mass matrix and
+/// accelerations, in empty worlds beside the one that is stepped.
 ///
-/// **The motion of bodies** ([`BodyKinematics`]) comes from the poses and Jacobians of the engine's links in such a world.
+/// **The motion of bodies** ([`BodyKinematics`]) comes from the poses and Jacobians of the engine's links in
+/// such a world.
 ///
-/// **A step** is made of as many smaller ones as there are solver iterations, semi-implicit Euler each, so its error is of
-/// first order in `dt` over their number. The crate's README has numbers.
+/// **A step** is made of as many smaller ones as there are solver iterations, semi-implicit Euler each, so
+/// its error is of first order in `dt` over their number. The crate's README has numbers.
 ///
-/// **[`World::rotor_inertia`]** is part of the mass matrix: of inverse and forward dynamics and of steps. It gives the base no
-/// wrench.
+/// **[`World::rotor_inertia`]** is part of the mass matrix: of inverse and forward dynamics and of steps. It
+/// gives the base no wrench.
 ///
-/// **Mimic joints** are exact in inverse and forward dynamics (the latter allocates for them, as the engine does in every step).
-/// In steps they are couplings that the engine solves iteratively, so few iterations let them stray.
+/// **Mimic joints** are exact in inverse and forward dynamics (the latter allocates for them, as the engine
+/// does in every step). In steps they are couplings that the engine solves iteratively, so few iterations let
+/// them stray.
 ///
 /// **The feet**: each corner of a sole is a contact point with Coulomb friction, on the floor `z = 0`.
 ///
-/// **[`base_wrench`](DynamicsBackend::base_wrench)**: after a step of a floating base, what the contacts gave, from the engine's
-/// impulses on average over the step. The engine does not tell what holds a fixed base, nor has it an inverse dynamics: there,
-/// and after `inverse_dynamics`, it is the Newton-Euler sum over the bodies, by this workspace's own algorithm, for the
-/// motion that the engine has made (its velocities' change over the step) or that was asked for.
+/// **[`base_wrench`](DynamicsBackend::base_wrench)**: after a step of a floating base, what the contacts
+/// gave, from the engine's impulses on average over the step. The engine does not tell what holds a fixed
+/// base, nor has it an inverse dynamics: there, and after `inverse_dynamics`, it is the Newton-Euler sum over
+/// the bodies, by this workspace's own algorithm, for the motion that the engine has made (its velocities'
+/// change over the step) or that was asked for.
 pub struct RapierBackend {
     /// Holds the state, and knows what a right state is.
     analytic: AnalyticBackend,
@@ -68,8 +72,8 @@ impl RapierBackend {
     /// The robot in its world, at rest in its neutral configuration.
     ///
     /// # Errors
-    /// The world does not fit the robot, or the robot is one that Rapier can not hold: no joints, a negative mass, or
-    /// principal moments of inertia that are not positive or more than a million apart.
+    /// The world does not fit the robot, or the robot is one that Rapier can not hold: no joints, a negative
+    /// mass, or principal moments of inertia that are not positive or more than a million apart.
     pub fn new(tree: &Tree, world: &World) -> Result<Self, BackendError> {
         world.check(tree)?;
         let mut articulation = Articulation::new(tree, &world.rotor_inertia, world.position_limits)?;

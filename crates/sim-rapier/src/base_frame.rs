@@ -1,8 +1,8 @@
-//! A floating base between two frames: ours, at the URDF's origin and moving with the base, and the engine's, at the base's
-//! centre of mass with velocities along the world's axes.
+//! A floating base between two frames: ours, at the URDF's origin and moving with the base, and the engine's,
+//! at the base's centre of mass with velocities along the world's axes.
 //!
-//! The engine takes the rate of its six base velocities for their acceleration; with the centre of mass at the root's origin
-//! that is true, elsewhere the base drifts.
+//! The engine takes the rate of its six base velocities for their acceleration; with the centre of mass at
+//! the root's origin that is true, elsewhere the base drifts.
 
 use phiw_dynamics::{Mat3, Placement, Spatial, Vec3};
 
@@ -37,7 +37,8 @@ pub(crate) fn own_velocity(rotation: Mat3<f64>, center: Vec3<f64>, engine: Spati
     Spatial { linear: rotation.transpose_mul(engine.linear) - angular.cross(center), angular }
 }
 
-/// Acceleration in the engine's coordinates: that of the centre of mass along the world's axes, from the base's spatial one.
+/// Acceleration in the engine's coordinates: that of the centre of mass along the world's axes, from the
+/// base's spatial one.
 pub(crate) fn engine_acceleration(
     rotation: Mat3<f64>,
     center: Vec3<f64>,

@@ -1,7 +1,8 @@
 //! How bodies move, by the engine's own kinematics: the poses of its links and their Jacobians.
 //!
-//! The engine keeps the accelerations of its links to itself. Here they follow from what it shows: a link's velocity is its Jacobian times
-//! the joints' velocities, and what a joint adds to the motion of its parent is its own column of that Jacobian.
+//! The engine keeps the accelerations of its links to itself. Here they follow from what it shows: a link's
+//! velocity is its Jacobian times the joints' velocities, and what a joint adds to the motion of its parent
+//! is its own column of that Jacobian.
 
 use crate::articulation::Articulation;
 use crate::base_frame::{self, engine_acceleration};
@@ -119,7 +120,8 @@ impl LinkMotions {
 struct Link<'a> {
     rotation: Mat3<f64>,
     origin: Vec3<f64>,
-    /// From the origin to the centre of mass, about which the engine takes its Jacobian, along the world's axes.
+    /// From the origin to the centre of mass, about which the engine takes its Jacobian, along the world's
+    /// axes.
     lever: Vec3<f64>,
     /// 6 × the engine's coordinates, column by column, linear first.
     jacobian: &'a [f64],

@@ -8,8 +8,8 @@ use rapier3d_f64::na::Unit;
 use rapier3d_f64::prelude::*;
 use rapier3d_f64::utils::{CrossProduct, OrthonormalBasis};
 
-/// Each corner of a sole is a ball of this radius \[m\] about the corner, and the floor lies as much below `z = 0`: a corner
-/// touches when it is at `z = 0`, however the foot is turned.
+/// Each corner of a sole is a ball of this radius \[m\] about the corner, and the floor lies as much below `z
+/// = 0`: a corner touches when it is at `z = 0`, however the foot is turned.
 const CORNER_RADIUS: f64 = 1e-3;
 
 /// Corners touch the floor, not each other.
@@ -57,11 +57,11 @@ impl Soles {
         Soles { corners }
     }
 
-    /// Force, then moment about the world's origin, that the contacts gave to each foot on average over the last step of `dt`,
-    /// which began with the bodies at `placements`.
+    /// Force, then moment about the world's origin, that the contacts gave to each foot on average over the
+    /// last step of `dt`, which began with the bodies at `placements`.
     ///
-    /// The engine gives impulses, added up over its iterations, along the normal and along two tangents that follow from it, and
-    /// the lever arms that it used from the body's centre of mass.
+    /// The engine gives impulses, added up over its iterations, along the normal and along two tangents that
+    /// follow from it, and the lever arms that it used from the body's centre of mass.
     pub(crate) fn wrenches(
         &self,
         articulation: &Articulation,

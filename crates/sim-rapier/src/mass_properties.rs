@@ -1,4 +1,5 @@
-//! A body's inertia as Rapier holds it: principal moments and axes about the centre of mass, by their inverses.
+//! A body's inertia as Rapier holds it: principal moments and axes about the centre of mass, by their
+//! inverses.
 
 use crate::error;
 use phiw_dynamics::{BackendError, Body, Inertia, Vec3};
@@ -17,8 +18,9 @@ pub(crate) fn center_of_mass(body: &Body) -> Vec3<f64> {
 
 /// The body's mass properties, its centre of mass at `center` of the rigid body's frame.
 ///
-/// The principal axes come from an iterative decomposition: Rapier's own solves a cubic and then for one axis after the other,
-/// and where two moments are close the tensor that it keeps is another one (by 39 % in the test below).
+/// The principal axes come from an iterative decomposition: Rapier's own solves a cubic and then for one axis
+/// after the other, and where two moments are close the tensor that it keeps is another one (by 39 % in the
+/// test below).
 pub(crate) fn mass_properties(body: &Body, center: Vec3<f64>) -> Result<MassProperties, BackendError> {
     let inertia = Inertia::from_parameters(&body.inertial);
     let [x, y, z] = center.0;

@@ -1,9 +1,10 @@
 //! The robot's own equation, read off the engine.
 //!
-//! A step treats the Coriolis forces semi-implicitly: what it accelerates with is off by a term in dt. In a second world, empty,
-//! one step of 1e-15 s leaves nothing of that term, and its generalised acceleration is the forward dynamics. Inverse dynamics
-//! is `M·a + h`: M = Σ Jᵀ·diag(m, I)·J over the bodies' Jacobians, and `h = −(M + B)·a₀` from the acceleration `a₀` without
-//! forces in a third world, whose coordinates have the inertia B on top.
+//! A step treats the Coriolis forces semi-implicitly: what it accelerates with is off by a term in dt. In a
+//! second world, empty, one step of 1e-15 s leaves nothing of that term, and its generalised acceleration is
+//! the forward dynamics. Inverse dynamics is `M·a + h`: M = Σ Jᵀ·diag(m, I)·J over the bodies' Jacobians, and
+//! `h = −(M + B)·a₀` from the acceleration `a₀` without forces in a third world, whose coordinates have the
+//! inertia B on top.
 
 use crate::articulation::Articulation;
 use crate::base_frame::{self, engine_acceleration, engine_force, own_acceleration, own_force};
@@ -17,7 +18,8 @@ const INSTANT: f64 = 1e-15;
 
 /// Inertia that the coordinates have on top in the world for inverse dynamics \[kg·m², kg\].
 ///
-/// The forces at rest do not depend on it, and with it the mass matrix is regular even where a joint moves nothing.
+/// The forces at rest do not depend on it, and with it the mass matrix is regular even where a joint moves
+/// nothing.
 const BALLAST: f64 = 1.0;
 
 /// Two worlds that are only asked, never moved on.
@@ -110,7 +112,8 @@ impl Probe {
         Ok(())
     }
 
-    /// Forward dynamics of a robot whose followers the engine does not know: `M·a = force − h`, with M from its Jacobians.
+    /// Forward dynamics of a robot whose followers the engine does not know: `M·a = force − h`, with M from
+    /// its Jacobians.
     fn solve_mass(
         &mut self,
         q: &[f64],

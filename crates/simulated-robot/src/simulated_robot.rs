@@ -13,8 +13,8 @@ pub type BuildBackend =
 
 /// A simulated robot: the plant of the paper's Figure 2, over any backend.
 ///
-/// Each trial builds it anew, so that nothing that an engine remembers goes from one trial to the next, and a run that is taken up again is
-/// the same run.
+/// Each trial builds it anew, so that nothing that an engine remembers goes from one trial to the next, and a
+/// run that is taken up again is the same run.
 pub struct SimulatedRobot {
     /// The robot as it truly is; its base may float where the world has a floor.
     pub tree: Tree,
@@ -26,7 +26,8 @@ pub struct SimulatedRobot {
     pub controller: Box<dyn Controller>,
     /// Standard deviation of δf over the torque limit: 0.05 in the paper.
     pub actuator_noise: f64,
-    /// What the log says of the motion and of the torques, a row every control period. The controller sees the encoders, too.
+    /// What the log says of the motion and of the torques, a row every control period. The controller sees
+    /// the encoders, too.
     pub sensors: Sensors,
     /// How time is cut.
     pub timing: Timing,
@@ -43,9 +44,11 @@ pub struct SimulatedRobot {
 pub struct Stillness {
     /// Turning rate of a base \[rad/s\]. Default: 0.01, what a gyroscope tells from its own noise.
     pub base_turning: f64,
-    /// Time around a movement of the base that does not count either, since it lands before it rests \[s\]. Default: 0.1.
+    /// Time around a movement of the base that does not count either, since it lands before it rests \[s\].
+    /// Default: 0.1.
     pub settles_s: f64,
-    /// Speed of a foot's sole \[m/s\]. Default: 0.005. A foot of a kilogram that goes through that within a millisecond takes 5 N.
+    /// Speed of a foot's sole \[m/s\]. Default: 0.005. A foot of a kilogram that goes through that within a
+    /// millisecond takes 5 N.
     pub foot_speed: f64,
     /// Turning rate of a foot \[rad/s\]. Default: 0.05, the same over a lever of 0.1 m.
     pub foot_turning: f64,
@@ -58,11 +61,13 @@ impl Default for Stillness {
 }
 
 impl SimulatedRobot {
-    /// The robot that `truth` describes, on its fixed base: what its bodies and its effects are is stated there alone. Its actuators add no noise, its sensors are
-    /// exact, and its time is cut as [`Timing::default`] says: set what should be otherwise.
+    /// The robot that `truth` describes, on its fixed base: what its bodies and its effects are is stated
+    /// there alone. Its actuators add no noise, its sensors are exact, and its time is cut as
+    /// [`Timing::default`] says: set what should be otherwise.
     ///
     /// # Errors
-    /// `truth` is not of this robot, or has an effect that no plant is built with from a model: add such a one to [`Self::effects`].
+    /// `truth` is not of this robot, or has an effect that no plant is built with from a model: add such a
+    /// one to [`Self::effects`].
     pub fn new(
         robot: &Robot,
         truth: &RobotModel,
@@ -124,7 +129,8 @@ impl SimulatedRobot {
         plant.run(&reference, motion.duration_s(), random).map_err(CurriculumError::of_experiment)
     }
 
-    /// For each row of the log, whether the base stood still until the next, as a gyroscope in it would tell; empty on a fixed base.
+    /// For each row of the log, whether the base stood still until the next, as a gyroscope in it would tell;
+    /// empty on a fixed base.
     fn still(&self, history: &History) -> Vec<bool> {
         let period_s = self.timing.control_period_s;
         let row = |t_s: f64| ((t_s - history.start_s) / history.step_s).round() as usize;

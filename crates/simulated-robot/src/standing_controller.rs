@@ -12,7 +12,8 @@ const BASE: usize = VIRTUAL_JOINTS.len();
 
 /// The belief's torque for the reference, what the feet carry taken off, and a PD on all motors.
 ///
-/// The reference of the motors says where the base is, as long as the first foot stays in its place. Of friction it knows the viscous.
+/// The reference of the motors says where the base is, as long as the first foot stays in its place. Of
+/// friction it knows the viscous.
 #[derive(Clone, Debug)]
 pub struct StandingFeedForward {
     /// K_p and K_d of the motors.

@@ -20,8 +20,9 @@ pub struct WrenchNoise {
 }
 
 impl WrenchNoise {
-    /// Standard deviation of the noise in the rows of the virtual joints \[N, N·m\], for so many feet with `lever_m` \[m\] between their soles and
-    /// the base: by this lever the forces' noise is noise of the moments at the base.
+    /// Standard deviation of the noise in the rows of the virtual joints \[N, N·m\], for so many feet with
+    /// `lever_m` \[m\] between their soles and the base: by this lever the forces' noise is noise of the
+    /// moments at the base.
     pub fn at_base(&self, feet: usize, lever_m: f64) -> [f64; BASE] {
         let feet = (feet as f64).sqrt();
         let force = feet * self.force_n;
@@ -32,11 +33,13 @@ impl WrenchNoise {
 
 /// A robot that stands on its feet, over any backend with contacts.
 ///
-/// Rows in which a foot moves (noise of the motors can lift an edge of a sole) are no rows of a robot whose feet stay, and do not count.
+/// Rows in which a foot moves (noise of the motors can lift an edge of a sole) are no rows of a robot whose
+/// feet stay, and do not count.
 ///
-/// Its motions have the coordinates of the tree with virtual joints. Measured are: positions and velocities of motors and base, exactly (encoders, and
-/// motion capture of the base); the commands; and what the floor gives to each foot, on average over each control period, with
-/// [`WrenchNoise`]. They enter the log as the generalised force u = \[0; command\] + J_cᵀ·f, of which Φ·w = u + \[0; δf\].
+/// Its motions have the coordinates of the tree with virtual joints. Measured are: positions and velocities
+/// of motors and base, exactly (encoders, and motion capture of the base); the commands; and what the floor
+/// gives to each foot, on average over each control period, with [`WrenchNoise`]. They enter the log as the
+/// generalised force u = \[0; command\] + J_cᵀ·f, of which Φ·w = u + \[0; δf\].
 pub struct StandingRobot {
     /// The robot, floating, with a floor under its feet.
     pub plant: SimulatedRobot,
@@ -84,10 +87,12 @@ fn of_motors(motion: &Motion) -> Result<Motion, CurriculumError> {
 
 /// How far an engine's positions are ahead of its velocities \[s\].
 ///
-/// A step is Δq = h·(v₁ − λ·(v₁ − v₀)). A semi-implicit one has λ = 0: read as what it is, a leapfrog, its velocities belong to the middles between its
-/// positions. Taken for those of one instant they do harm where noise moves the robot: the mean velocity over a period then follows the noise of the period by
-/// more than half of what the noise does to the velocity, and the estimate takes the difference for negative friction (−1.6 N·m·s/rad in a waist that has 1.3,
-/// from 4 N·m of noise and periods of two steps). The history tells λ.
+/// A step is Δq = h·(v₁ − λ·(v₁ − v₀)). A semi-implicit one has λ = 0: read as what it is, a leapfrog, its
+/// velocities belong to the middles between its positions. Taken for those of one instant they do harm where
+/// noise moves the robot: the mean velocity over a period then follows the noise of the period by more than
+/// half of what the noise does to the velocity, and the estimate takes the difference for negative friction
+/// (−1.6 N·m·s/rad in a waist that has 1.3, from 4 N·m of noise and periods of two steps). The history tells
+/// λ.
 fn position_lead_s(history: &History) -> f64 {
     let (mut along, mut square) = (0.0, 0.0);
     let next = history.link_speed.iter().zip(&history.link_angle).skip(history.joints);

@@ -127,7 +127,8 @@ fn what_rows_do_not_determine_keeps_its_present_value() {
     }
 }
 
-/// Without a log the estimate is the prior; what one log does not tell is the prior's, and logs that tell much overrule it.
+/// Without a log the estimate is the prior; what one log does not tell is the prior's, and logs that tell
+/// much overrule it.
 #[test]
 fn a_prior_decides_what_logs_do_not() {
     let noisy = Arm::new(0.05);

@@ -1,4 +1,5 @@
-//! The loop closed: what nobody declared enters the model, nothing does where there is nothing, and rivals are told apart.
+//! The loop closed: what nobody declared enters the model, nothing does where there is nothing, and rivals
+//! are told apart.
 
 mod arm;
 
@@ -36,7 +37,8 @@ fn found<'a>(arm: &Arm, model: &'a RobotModel) -> Vec<(&'a str, Vec<&'a str>)> {
         .collect()
 }
 
-/// RMS torque error of a belief on a motion that no run had, of the plant with its secret, which moves without noise.
+/// RMS torque error of a belief on a motion that no run had, of the plant with its secret, which moves
+/// without noise.
 fn torque_error(arm: &Arm, secret: &Effect, model: &RobotModel) -> f64 {
     let mut experiment = Arm::new(0.0).experiment();
     experiment.effects.push(secret.clone());
@@ -132,7 +134,8 @@ fn one_joint_each(joints: usize, amplitudes: &[f64]) -> Vec<Motion> {
     amplitudes.iter().enumerate().map(motion).collect()
 }
 
-/// Beliefs that differ in one joint's friction by `difference` N·m·s/rad differ in the torque by difference·q̇ there, and nowhere else.
+/// Beliefs that differ in one joint's friction by `difference` N·m·s/rad differ in the torque by
+/// difference·q̇ there, and nowhere else.
 #[test]
 fn rivals_are_told_apart_by_the_motion_on_which_they_differ() {
     let arm = Arm::new(0.01);

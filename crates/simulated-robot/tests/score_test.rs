@@ -80,7 +80,8 @@ fn an_effect_far_below_the_noise_of_a_row_is_found_in_many() {
             ranked.iter().take(3).map(|gain| (&gain.effect.kind, &gain.effect.joints, gain.merit)).collect();
         let found = test.look(&arm.robot, &declared, &logs, false, &[]).unwrap();
         let name = arm.tree.joint_names().nth(joint).unwrap();
-        // In 18 s of this noise Coulomb and quadratic friction are nearly as likely: then one is the other's rival.
+        // In 18 s of this noise Coulomb and quadratic friction are nearly as likely: then one is the other's
+        // rival.
         let is_it = |spec: &EffectSpec| spec.kind == kind && spec.joints == [name];
         let [effect] = found.effects.as_slice() else { panic!("{kind}: {found:?}, {best:?}") };
         assert_eq!(effect.joints, [name], "{kind}: {best:?}");
@@ -89,8 +90,8 @@ fn an_effect_far_below_the_noise_of_a_row_is_found_in_many() {
     }
 }
 
-/// Twice the gain of a right model's missing effect is χ²: of all kinds on all joints none is worth its price, and of an effect of one parameter the gain is ½
-/// on average.
+/// Twice the gain of a right model's missing effect is χ²: of all kinds on all joints none is worth its
+/// price, and of an effect of one parameter the gain is ½ on average.
 #[test]
 fn a_right_model_lacks_nothing() {
     let arm = Arm::new(NOISE);
@@ -116,8 +117,8 @@ fn a_right_model_lacks_nothing() {
     assert!((0.25..0.9).contains(&mean), "{mean} of {count}");
 }
 
-/// The offset of a spring is so nearly a weight that cond of all columns grew five-fold once the spring was found: the constraint was never relaxed again, and the
-/// same motion was chosen four times.
+/// The offset of a spring is so nearly a weight that cond of all columns grew five-fold once the spring was
+/// found: the constraint was never relaxed again, and the same motion was chosen four times.
 #[test]
 fn an_effect_that_was_found_does_not_change_what_cond_is_of() {
     let arm = Arm::new(0.02);

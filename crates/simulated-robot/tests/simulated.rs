@@ -23,7 +23,8 @@ fn no_gains() -> FeedForward {
     FeedForward { gains: Gains { position: vec![0.0; 7], velocity: vec![0.0; 7] } }
 }
 
-/// Friction was stated twice, for the plant and for the truth that scores are taken against, and nothing told when the two differed.
+/// Friction was stated twice, for the plant and for the truth that scores are taken against, and nothing told
+/// when the two differed.
 #[test]
 fn bodies_and_frictions_are_those_of_the_truth() {
     let tree = arm::tree();
@@ -53,7 +54,8 @@ fn an_effect_that_no_plant_has_is_named() {
     assert!(error.to_string().contains("torque_gain"), "{error}");
 }
 
-/// The plant's noise was stated for the plant and again for the estimator; with another number the estimate was quietly worse.
+/// The plant's noise was stated for the plant and again for the estimator; with another number the estimate
+/// was quietly worse.
 #[test]
 fn an_estimator_that_counts_on_another_noise_is_refused() {
     let arm = Arm::new(0.02);

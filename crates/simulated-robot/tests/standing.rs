@@ -114,7 +114,8 @@ fn mujoco(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, Back
     Ok(Box::new(backend.with_integrator(phiw_sim_mujoco::Integrator::Implicit)))
 }
 
-/// Feet that stay hide what they are made of: nine parameters each, of which the rest of the robot's cover none.
+/// Feet that stay hide what they are made of: nine parameters each, of which the rest of the robot's cover
+/// none.
 #[test]
 fn feet_on_the_floor_hide_parameters() {
     let humanoid = Humanoid::new();
@@ -200,7 +201,8 @@ fn legs_follow_the_base() {
     }
 }
 
-/// What the feet take of a load and what is left is all of it, and nothing is left for the joints without motors.
+/// What the feet take of a load and what is left is all of it, and nothing is left for the joints without
+/// motors.
 #[test]
 fn feet_carry_the_base() {
     let humanoid = Humanoid::new();
@@ -215,8 +217,8 @@ fn feet_carry_the_base() {
     assert!(force[knee].abs() > 5.0);
 }
 
-/// Φ·w is what is measured: the commands, and the wrenches under the feet through the feet's Jacobian. In both engines, on a robot that stands by
-/// itself.
+/// Φ·w is what is measured: the commands, and the wrenches under the feet through the feet's Jacobian. In
+/// both engines, on a robot that stands by itself.
 #[test]
 fn the_model_says_what_is_measured() {
     let humanoid = Humanoid::new();
@@ -262,8 +264,9 @@ fn the_model_says_what_is_measured() {
     }
 }
 
-/// Engines' steps are semi-implicit: Δq/T followed the noise of a period by three quarters of what it did to the velocity and not by half. The likelihood took
-/// the difference for friction: −1.6 N·m·s/rad in a waist that has 1.3.
+/// Engines' steps are semi-implicit: Δq/T followed the noise of a period by three quarters of what it did to
+/// the velocity and not by half. The likelihood took the difference for friction: −1.6 N·m·s/rad in a waist
+/// that has 1.3.
 #[test]
 fn positions_and_velocities_are_of_one_instant() {
     let humanoid = Humanoid::new();

@@ -2,7 +2,8 @@
 
 /// The most samples in a row that are taken for one spike.
 pub const LONGEST: usize = 5;
-/// Samples that a spike is judged by. Where a signal begins with one there are more behind it than another can have.
+/// Samples that a spike is judged by. Where a signal begins with one there are more behind it than another
+/// can have.
 pub const WINDOW: usize = 2 * LONGEST + 1;
 /// Fewer differences than this say nothing of what is usual in a signal.
 const FEWEST: usize = 16;
@@ -12,16 +13,18 @@ const OF_ONE_SPIKE: usize = 4;
 /// When a sample is a spike.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpikeSettings {
-    /// How far a signal must leave the line between the samples before and behind, and come back to it, to be a spike: a multiple of what is
-    /// usual, see [`SpikeSettings::usual_share`].
+    /// How far a signal must leave the line between the samples before and behind, and come back to it, to be
+    /// a spike: a multiple of what is usual, see [`SpikeSettings::usual_share`].
     ///
-    /// On six sets of real logs the largest multiple is 8.4 for a position, 13.0 for a velocity, 7.3 for a torque (`cargo test -p phiw-telemetry
-    /// real_logs -- --nocapture` prints them); normal noise reaches 2.5 in 10⁷ samples.
+    /// On six sets of real logs the largest multiple is 8.4 for a position, 13.0 for a velocity, 7.3 for a
+    /// torque (`cargo test -p phiw-telemetry real_logs -- --nocapture` prints them); normal noise reaches 2.5
+    /// in 10⁷ samples.
     pub multiple: f64,
-    /// What is usual: of the samples that differ from the mean of their neighbours, this share differs by less. What is left to 1 is the share
-    /// that spikes may have.
+    /// What is usual: of the samples that differ from the mean of their neighbours, this share differs by
+    /// less. What is left to 1 is the share that spikes may have.
     pub usual_share: f64,
-    /// An excursion that is no larger than this, in the signal's unit, is no spike, however smooth the signal is.
+    /// An excursion that is no larger than this, in the signal's unit, is no spike, however smooth the signal
+    /// is.
     pub smallest: f64,
 }
 
@@ -35,8 +38,8 @@ impl Default for SpikeSettings {
 const OF_FOUR_SPIKES: usize = 12;
 
 impl SpikeSettings {
-    /// What an excursion must exceed to be a spike. `count` samples of the signal differ from the mean of their neighbours, and `quantile` gives
-    /// what a share of them differ by at most.
+    /// What an excursion must exceed to be a spike. `count` samples of the signal differ from the mean of
+    /// their neighbours, and `quantile` gives what a share of them differ by at most.
     pub fn bound(&self, count: usize, quantile: impl FnOnce(f64) -> f64) -> f64 {
         match count {
             // Constant but for a spike.
@@ -46,8 +49,8 @@ impl SpikeSettings {
         }
     }
 
-    /// The share of `count` differences that tells what is usual: [`SpikeSettings::usual_share`], and in a short signal less, so that four
-    /// spikes are left out of it.
+    /// The share of `count` differences that tells what is usual: [`SpikeSettings::usual_share`], and in a
+    /// short signal less, so that four spikes are left out of it.
     pub fn share_of(&self, count: usize) -> f64 {
         let spared = 1.0 - OF_FOUR_SPIKES as f64 / count.max(1) as f64;
         self.usual_share.min(spared).max(0.5)
@@ -59,8 +62,9 @@ pub fn bend(samples: [f64; 3]) -> f64 {
     samples[1] - 0.5 * (samples[0] + samples[2])
 }
 
-/// By how much the samples behind the first of a window (of three or more) leave the line from it to the sample behind them, less what that
-/// line rises: the most of one to [`LONGEST`] samples, and of how many. A step gives less than nothing, since it does not come back.
+/// By how much the samples behind the first of a window (of three or more) leave the line from it to the
+/// sample behind them, less what that line rises: the most of one to [`LONGEST`] samples, and of how many. A
+/// step gives less than nothing, since it does not come back.
 pub fn excursion(window: &[f64]) -> (f64, usize) {
     let mut most = (f64::NEG_INFINITY, 1);
     let Some(&before) = window.first() else { return most };
@@ -79,8 +83,8 @@ pub fn excursion(window: &[f64]) -> (f64, usize) {
     most
 }
 
-/// The same for the first samples of a window where a signal begins (or, backwards, ends): by how much they are off all samples behind them,
-/// less what the signal can have moved meanwhile at its fastest step there.
+/// The same for the first samples of a window where a signal begins (or, backwards, ends): by how much they
+/// are off all samples behind them, less what the signal can have moved meanwhile at its fastest step there.
 pub fn excursion_at_edge(window: &[f64]) -> (f64, usize) {
     let mut most = (f64::NEG_INFINITY, 1);
     for length in 1..=LONGEST.min(window.len().saturating_sub(2)) {
@@ -97,8 +101,9 @@ pub fn excursion_at_edge(window: &[f64]) -> (f64, usize) {
     most
 }
 
-/// How many samples from the first of `ahead` on are a spike: excursions above `bound`. `before` are the last two good samples, the later
-/// first, where the signal has any; `ahead` is [`WINDOW`] samples, or as many as are left of the signal.
+/// How many samples from the first of `ahead` on are a spike: excursions above `bound`. `before` are the last
+/// two good samples, the later first, where the signal has any; `ahead` is [`WINDOW`] samples, or as many as
+/// are left of the signal.
 pub fn spike_length(before: [Option<f64>; 2], ahead: &[f64], bound: f64) -> usize {
     let mut window = [0.0; WINDOW];
     let over = |(most, length): (f64, usize)| if most > bound { length } else { 0 };

@@ -35,7 +35,8 @@ pub(crate) struct AlignmentCollector {
     rows_in_stretch: usize,
     resolution: f64,
     lags: usize,
-    /// The stretch that is under way: its first sample, the latest, ∫qd dt, samples, whether qd is 0 throughout.
+    /// The stretch that is under way: its first sample, the latest, ∫qd dt, samples, whether qd is 0
+    /// throughout.
     open: Option<Stretch>,
     /// Means of the latest stretches: `[qd, dq/dt]`, oldest first.
     recent: VecDeque<[f64; 2]>,
@@ -164,7 +165,8 @@ impl AlignmentCollector {
 mod tests {
     use super::*;
 
-    /// A column of `q(t) = sin 3t + 0.3 sin 11t` that is `lag` late, times `unit`, and 0 where it is below `dead_band`.
+    /// A column of `q(t) = sin 3t + 0.3 sin 11t` that is `lag` late, times `unit`, and 0 where it is below
+    /// `dead_band`.
     fn alignment(lag: f64, unit: f64, dead_band: f64, rate: f64) -> Alignment {
         let mut collector = AlignmentCollector::new(1.0 / rate);
         for k in 0..(20.0 * rate) as usize {

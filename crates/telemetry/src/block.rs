@@ -63,10 +63,11 @@ pub struct Signals<'a> {
 }
 
 impl Block {
-    /// Samples as they are, all of them outputs and none filtered: for signals that need no conditioning, such as those of a planned
-    /// motion or of a simulator.
+    /// Samples as they are, all of them outputs and none filtered: for signals that need no conditioning,
+    /// such as those of a planned motion or of a simulator.
     ///
-    /// `signals` are positions, velocities and accelerations, row-major `[sample × joints]`; `tau` likewise, or empty.
+    /// `signals` are positions, velocities and accelerations, row-major `[sample × joints]`; `tau` likewise,
+    /// or empty.
     pub fn unfiltered(joints: usize, t: Vec<f64>, signals: [Vec<f64>; 3], tau: Vec<f64>) -> Self {
         let [q, qd, qdd] = signals;
         let period = match t.as_slice() {

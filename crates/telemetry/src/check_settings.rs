@@ -2,10 +2,12 @@
 
 use crate::Alignment;
 
-/// From where on something is worth saying. What the real logs of the tests show lies below each of these unless it is truly there.
+/// From where on something is worth saying. What the real logs of the tests show lies below each of these
+/// unless it is truly there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CheckSettings {
-    /// Share of the velocity's power that a lag costs; 0.0025 is an error of 5 % of its root mean square, which is that of good frictions.
+    /// Share of the velocity's power that a lag costs; 0.0025 is an error of 5 % of its root mean square,
+    /// which is that of good frictions.
     pub lag_cost: f64,
     /// Distance of a velocity's scale from 1; gear ratios and radii are known better than this.
     pub scale_error: f64,
@@ -15,21 +17,25 @@ pub struct CheckSettings {
     pub zero_share: f64,
     /// Root mean square of motion while a velocity is 0, as a share of that of all.
     pub motion_at_zero: f64,
-    /// Smallest torque besides 0 in steps of the torque: 1 without a dead band, and 2 where one step is never met.
+    /// Smallest torque besides 0 in steps of the torque: 1 without a dead band, and 2 where one step is never
+    /// met.
     pub steps_across_zero: f64,
-    /// The same as a share of the torque's root mean square: values that come in no steps lie as near to 0 as there are rows.
+    /// The same as a share of the torque's root mean square: values that come in no steps lie as near to 0 as
+    /// there are rows.
     pub dead_band: f64,
     /// Steps of a torque over its root mean square: at 0.1 they add noise of 3 %.
     pub torque_step: f64,
     /// Steps of a position over its travel: at 1/500 a turn has 9 bits.
     pub position_step: f64,
-    /// Length of a stretch of one value in mean lengths of such stretches: more than torque in steps brings about.
+    /// Length of a stretch of one value in mean lengths of such stretches: more than torque in steps brings
+    /// about.
     pub still_runs: f64,
     /// Share of the rows near the top that are at exactly the top.
     pub flat_share: f64,
     /// Rows at exactly the top.
     pub flat_rows: u64,
-    /// How often a torque of one sign must come near 0 to be taken for a magnitude; gravity alone may keep one sign, but does not bounce.
+    /// How often a torque of one sign must come near 0 to be taken for a magnitude; gravity alone may keep
+    /// one sign, but does not bounce.
     pub touches: u64,
     /// Jitter of the stamps as a share of the period.
     pub jitter: f64,

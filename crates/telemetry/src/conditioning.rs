@@ -9,8 +9,8 @@ use std::fmt;
 pub struct ConditioningOptions {
     /// Cut-off of the positions' low-pass, in Hz.
     pub cutoff_hz: Option<f64>,
-    /// Cut-off of the parallel filter over columns and torque, in Hz; by default the motion's bandwidth, an eighth of the positions' cut-off, but at
-    /// least 10 Hz.
+    /// Cut-off of the parallel filter over columns and torque, in Hz; by default the motion's bandwidth, an
+    /// eighth of the positions' cut-off, but at least 10 Hz.
     pub parallel_cutoff_hz: Option<f64>,
     /// Samples from one output to the next; by default the output rate is about four times the parallel
     /// cut-off.
@@ -71,7 +71,8 @@ impl Conditioning {
         let suggested = suggestions.iter().map(|suggestion| suggestion.cutoff_hz).fold(0.0, f64::max);
         let from_data = if suggested > 0.0 { suggested.min(highest) } else { highest };
         let cutoff_hz = options.cutoff_hz.unwrap_or(from_data);
-        // The positions' filter must bend no acceleration; the parallel filter bends columns and torque alike and may stop where the motion ends.
+        // The positions' filter must bend no acceleration; the parallel filter bends columns and torque alike
+        // and may stop where the motion ends.
         let parallel = (cutoff_hz / BANDWIDTHS).max(LEAST_PARALLEL_HZ).min(cutoff_hz);
         let conditioning = Conditioning {
             cutoff_hz,

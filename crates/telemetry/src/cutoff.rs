@@ -52,8 +52,8 @@ const NEAR: f64 = 1.5;
 const NEGLIGIBLE: f64 = 1e-6;
 /// Share of the velocity's power that may lie above the motion's bandwidth.
 const VELOCITY_SHARE_ABOVE: f64 = 1e-3;
-/// Cut-off over the motion's bandwidth: above the five of Gautier, Janot and Vandanjon (2013), since trapezoidal and minimum-jerk motions have
-/// corners that those still round.
+/// Cut-off over the motion's bandwidth: above the five of Gautier, Janot and Vandanjon (2013), since
+/// trapezoidal and minimum-jerk motions have corners that those still round.
 pub(crate) const BANDWIDTHS: f64 = 8.0;
 
 /// A cut-off for each joint of a log that moves.

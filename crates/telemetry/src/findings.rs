@@ -1,4 +1,5 @@
-//! What should be known of a log before anything is fitted to it: what sensors, drives and loggers did to it, what follows, and how to mend it.
+//! What should be known of a log before anything is fitted to it: what sensors, drives and loggers did to it,
+//! what follows, and how to mend it.
 
 use crate::{Alignment, CheckSettings, JointSurvey, SignalShape, Survey, TorqueSurvey};
 use std::fmt;

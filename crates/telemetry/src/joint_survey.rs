@@ -89,7 +89,8 @@ pub struct DerivativeSurvey {
 }
 
 impl DerivativeSurvey {
-    /// Whether the column is the derivative that it says: not constant, not in degrees, not of the wrong sign, not late, not 0 where there is motion.
+    /// Whether the column is the derivative that it says: not constant, not in degrees, not of the wrong
+    /// sign, not late, not 0 where there is motion.
     pub fn plausible(&self) -> bool {
         let settings = CheckSettings::default();
         self.is_derivative() && !self.alignment.is_some_and(|alignment| settings.contradicts(&alignment))
@@ -113,7 +114,8 @@ pub(crate) struct JointCollector {
     q: Moments,
     tau: Option<(Moments, Histogram)>,
     misfit: Histogram,
-    /// Sum of squared slopes over four steps, their number, and the sum of 2 over the squared time that each took.
+    /// Sum of squared slopes over four steps, their number, and the sum of 2 over the squared time that each
+    /// took.
     slopes: [f64; 3],
     /// Misfits at places where the stamps are uneven: under equal distances, and under the stamps.
     uneven: [Histogram; 2],

@@ -102,8 +102,8 @@ fn bessel_ratios(z2: f64) -> [f64; 3] {
 /// sample has to be invented; it follows motion in the band better than any cut low-pass, and noise grows
 /// only in the last few samples.
 ///
-/// Up to 0.6 of the cut-off the gains are the ideal ones to about 1e-4, with 80 dB. Only the second derivative is worse where a cut-off
-/// above a tenth of the sample rate leaves few taps: 1e-3 at most.
+/// Up to 0.6 of the cut-off the gains are the ideal ones to about 1e-4, with 80 dB. Only the second
+/// derivative is worse where a cut-off above a tenth of the sample rate leaves few taps: 1e-3 at most.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SmoothingKernel {
     low_pass: LowPass,

@@ -1,4 +1,5 @@
-//! What a sensor or a logger made of a signal: steps, flat tops, dead bands, stretches in which nothing changes.
+//! What a sensor or a logger made of a signal: steps, flat tops, dead bands, stretches in which nothing
+//! changes.
 
 use crate::histogram::Histogram;
 

@@ -43,7 +43,8 @@ impl SpikeFinder {
         *most = most.max(excursion_at_edge(&window).0);
     }
 
-    /// What an excursion of each place must exceed to be a spike, where any does; infinite where spikes are not looked for.
+    /// What an excursion of each place must exceed to be a spike, where any does; infinite where spikes are
+    /// not looked for.
     pub fn bounds(&self, layout: &Layout, settings: SpikeSettings) -> Option<Vec<f64>> {
         let bound = |place: usize, (usual, _): &(Histogram, f64)| match place {
             // Stamps are judged by the segments; a temperature is no part of the fit.
@@ -56,7 +57,8 @@ impl SpikeFinder {
         self.columns.iter().zip(&bounds).any(|((_, most), bound)| most > bound).then_some(bounds)
     }
 
-    /// The largest excursion of each column but the time, as a multiple of what is usual; 0 where that is not known.
+    /// The largest excursion of each column but the time, as a multiple of what is usual; 0 where that is not
+    /// known.
     pub fn multiples(&self, settings: SpikeSettings) -> Vec<f64> {
         let multiple = |(usual, most): &(Histogram, f64)| {
             let bound = settings.bound(usual.total() as usize, |share| usual.quantile(share));

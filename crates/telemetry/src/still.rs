@@ -1,4 +1,5 @@
-//! Rows in which the drives had stopped logging: no torque changes though the robot moves. They say nothing, and are left out.
+//! Rows in which the drives had stopped logging: no torque changes though the robot moves. They say nothing,
+//! and are left out.
 
 use crate::columns::Layout;
 use crate::reader::{Row, Rows};
@@ -75,7 +76,8 @@ impl StillFinder {
         self.rows = 0;
     }
 
-    /// First and last stamp of each stretch, ascending; none where most of the log is such, since then there is more wrong than a pause.
+    /// First and last stamp of each stretch, ascending; none where most of the log is such, since then there
+    /// is more wrong than a pause.
     pub fn stretches(&self, settings: &CheckSettings) -> Vec<[f64; 2]> {
         let mean = self.all_rows as f64 / self.runs.max(1) as f64;
         let long = self.found.iter().filter(|(_, _, rows)| *rows as f64 > settings.still_runs * mean);

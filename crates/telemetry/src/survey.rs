@@ -34,12 +34,13 @@ pub struct Survey {
     pub gaps: Vec<GapCount>,
     /// Columns with spikes; their rows are counted as gaps, too.
     pub spikes: Vec<SpikeCount>,
-    /// The largest excursion of each column `q.<joint>`, `tau.<joint>`, … of a row, as a multiple of what is usual in it, see
-    /// [`SpikeSettings::multiple`]; without spikes that were left out.
+    /// The largest excursion of each column `q.<joint>`, `tau.<joint>`, … of a row, as a multiple of what is
+    /// usual in it, see [`SpikeSettings::multiple`]; without spikes that were left out.
     pub excursions: Vec<f64>,
     /// What an excursion must exceed to be a spike, by place in a row; empty where the log has none.
     pub(crate) spike_bounds: Vec<f64>,
-    /// First and last stamp of stretches in which no torque changes though the robot moves, in seconds: their rows are counted as gaps.
+    /// First and last stamp of stretches in which no torque changes though the robot moves, in seconds: their
+    /// rows are counted as gaps.
     pub still: Vec<[f64; 2]>,
     /// Columns in the header that are not used.
     pub ignored_columns: Vec<String>,

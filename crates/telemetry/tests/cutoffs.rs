@@ -70,8 +70,8 @@ fn the_error_is_near_the_best_that_any_cutoff_gives() {
                 "{rate} Hz, noise {noise:.0e}: {chosen:.1} Hz gives {got:.1e}, best {best:.1} Hz {least:.1e}"
             );
             assert!((2.5..41.0).contains(&chosen), "{chosen}");
-            // A thousandth of the acceleration, which is about 2 rms, is as good as none: on quiet data the cut-off stays above the best, since
-            // motions with corners need more than these sines.
+            // A thousandth of the acceleration, which is about 2 rms, is as good as none: on quiet data the
+            // cut-off stays above the best, since motions with corners need more than these sines.
             assert!(
                 got < 2.0 * least + 2e-3,
                 "{rate} Hz, noise {noise}: {got} by {chosen} Hz, {least} by {best} Hz"

@@ -70,7 +70,8 @@ proptest! {
     fn gains_are_those_of_ideal_filters(share in 0.01f64..0.35, frequency in 0.001f64..1.0) {
         let (rate, cutoff) = (1000.0, 1000.0 * share);
         let kernel = SmoothingKernel::new(LowPass::new(cutoff, 80.0), 1.0 / rate);
-        // Few taps leave a step at the ends of the second derivative's window, found by a scan to cost 1.1e-3 at most.
+        // Few taps leave a step at the ends of the second derivative's window, found by a scan to cost 1.1e-3
+        // at most.
         let tolerance = |order: usize| if order == 2 && share > 0.1 { 1.3e-3 } else { 2e-4 };
         // In the band: 1, iω, −ω²; far outside: nothing, relative to the band's edge. No phase, or exactly a
         // quarter turn.

@@ -1,4 +1,5 @@
-//! Each class of what sensors, drives and loggers do to a log is found, and nothing is found where there is nothing.
+//! Each class of what sensors, drives and loggers do to a log is found, and nothing is found where there is
+//! nothing.
 
 use phiw_telemetry::{
     CheckSettings, Conditioning, ConditioningOptions, FindingKind, GapReason, TorqueColumns, findings,
@@ -76,7 +77,8 @@ fn every_class_is_found() {
     check(move |k, [t, q, qd, tau]| [t + late_stamp(k), q, qd, tau], &[Clock]);
 }
 
-/// A velocity that lags was trusted where its slope against dq/dt was near 1, and four false delays came of it.
+/// A velocity that lags was trusted where its slope against dq/dt was near 1, and four false delays came of
+/// it.
 #[test]
 fn a_velocity_that_lags_is_not_used() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -97,7 +99,8 @@ fn a_velocity_that_lags_is_not_used() {
     }
 }
 
-/// Where the drives of all joints stop logging, the rows say nothing: they are left out of both passes, and counted.
+/// Where the drives of all joints stop logging, the rows say nothing: they are left out of both passes, and
+/// counted.
 #[test]
 fn rows_in_which_no_torque_changes_are_left_out_and_counted() {
     let folder = tempfile::tempdir().expect("a folder");

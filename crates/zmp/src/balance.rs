@@ -7,7 +7,8 @@ use crate::{CenterOfMass, ZmpModel, multi_body_zmp, point_mass_zmp};
 pub struct Balance {
     /// The centre of mass.
     pub center_of_mass: CenterOfMass,
-    /// What the floor must give: force \[N\], then moment about the world's origin \[N·m\], along the world's axes.
+    /// What the floor must give: force \[N\], then moment about the world's origin \[N·m\], along the world's
+    /// axes.
     pub wrench: [f64; 6],
     /// Gravity in the world \[m/s²\].
     pub gravity: [f64; 3],

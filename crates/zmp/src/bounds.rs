@@ -12,8 +12,8 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// h_ZMP, the left hand side of the constraint (7): `p⁻ − p` and `p − p⁺`, x before y \[m\]. None is positive for a
-    /// ZMP that is allowed.
+    /// h_ZMP, the left hand side of the constraint (7): `p⁻ − p` and `p − p⁺`, x before y \[m\]. None is
+    /// positive for a ZMP that is allowed.
     pub fn constraint(&self, zmp: [f64; 2]) -> [f64; 4] {
         let ([low_x, low_y], [high_x, high_y], [x, y]) = (self.lower, self.upper, zmp);
         [low_x - x, low_y - y, x - high_x, y - high_y]

@@ -55,7 +55,8 @@ pub enum FeetError {
 /// ```
 ///
 /// # Errors
-/// The text is not of this form, a link is not there, or a sole has fewer than three corners, is not flat or has no area.
+/// The text is not of this form, a link is not there, or a sole has fewer than three corners, is not flat or
+/// has no area.
 pub fn feet_from_toml(text: &str, tree: &Tree) -> Result<Vec<Foot>, FeetError> {
     let syntax = |error: toml::de::Error| {
         let before = error.span().map_or("", |span| text.get(..span.start).unwrap_or_default());

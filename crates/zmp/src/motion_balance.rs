@@ -15,8 +15,8 @@ pub struct Stance {
 }
 
 impl Stance {
-    /// A floor at `floor_height` \[m\] in the world, the region of it that carries, and the point that the region shrinks to when it is
-    /// reduced (the origin in the paper's equation 10).
+    /// A floor at `floor_height` \[m\] in the world, the region of it that carries, and the point that the
+    /// region shrinks to when it is reduced (the origin in the paper's equation 10).
     ///
     /// # Errors
     /// The region cannot shrink to a point outside it.
@@ -51,7 +51,8 @@ pub struct WorstZmp {
     pub sample: usize,
     /// The ZMP there \[m\]; none where the robot does not press on the floor.
     pub zmp: Option<[f64; 2]>,
-    /// The largest α at which the region reduced by (10) still contains the whole motion; negative if the whole region does not.
+    /// The largest α at which the region reduced by (10) still contains the whole motion; negative if the
+    /// whole region does not.
     pub largest_reduction: f64,
 }
 
@@ -99,7 +100,8 @@ impl MotionBalance {
         largest_difference: 0.0,
     };
 
-    /// Of a motion, sample by sample `[q, v, a]` as in [`ZmpWorkspace::evaluate`], for the standing parameters `parameters`.
+    /// Of a motion, sample by sample `[q, v, a]` as in [`ZmpWorkspace::evaluate`], for the standing
+    /// parameters `parameters`.
     ///
     /// # Errors
     /// A slice or the workspace does not fit the robot, or the robot's motion can not be computed.

@@ -11,8 +11,9 @@ const ROWS: usize = 9;
 
 /// Y of one sample: mass, first moment and the floor's wrench are Y·w, with w the standing parameters.
 ///
-/// Rows, each of [`BalanceRows::parameter_count`] numbers: first moment x, y, z \[kg·m\]; then the wrench about the world's
-/// origin, force x, y, z \[N\] and moment x, y, z \[N·m\]. (The mass needs no row: it is the sum of every tenth parameter.)
+/// Rows, each of [`BalanceRows::parameter_count`] numbers: first moment x, y, z \[kg·m\]; then the wrench
+/// about the world's origin, force x, y, z \[N\] and moment x, y, z \[N·m\]. (The mass needs no row: it is
+/// the sum of every tenth parameter.)
 #[derive(Clone, Debug)]
 pub struct BalanceRows {
     parameters: usize,
@@ -21,7 +22,8 @@ pub struct BalanceRows {
 }
 
 impl BalanceRows {
-    /// Room for the rows of one sample of a robot: `&tree`, or whatever else knows how the robot's bodies hang together.
+    /// Room for the rows of one sample of a robot: `&tree`, or whatever else knows how the robot's bodies
+    /// hang together.
     pub fn new(robot: impl BodyKinematics) -> Self {
         let parameters = parameter_count(&robot);
         BalanceRows { parameters, rows: vec![0.0; ROWS * parameters], gravity: robot.gravity() }
@@ -75,7 +77,8 @@ impl BalanceRows {
         }
     }
 
-    /// The ten columns of a body: in its frame force = m a + α × mc + ω × (ω × mc), moment = mc × a + I α + ω × I ω.
+    /// The ten columns of a body: in its frame force = m a + α × mc + ω × (ω × mc), moment = mc × a + I α + ω
+    /// × I ω.
     #[inline(always)]
     fn body(&mut self, start: usize, placement: Placement<f64>, motion: &BodyMotion<f64>) {
         let (omega, alpha) = (motion.angular_velocity, motion.angular_acceleration);
@@ -124,8 +127,8 @@ impl BalanceRows {
         }
     }
 
-    /// The balance of this sample for the standing parameters `parameters`: the same as [`ZmpWorkspace::evaluate`], quicker
-    /// where many parameters are tried on one sample.
+    /// The balance of this sample for the standing parameters `parameters`: the same as
+    /// [`ZmpWorkspace::evaluate`], quicker where many parameters are tried on one sample.
     ///
     /// # Errors
     /// `parameters` do not fit the robot.
@@ -140,8 +143,9 @@ impl BalanceRows {
         Ok(Balance::of_sums(mass, [hx, hy, hz], [fx, fy, fz, mx, my, mz], self.gravity))
     }
 
-    /// ∂ZMP/∂w at the balance `balance` of this sample: row x, then row y, each of [`Self::parameter_count`] numbers
-    /// \[m per unit of the parameter\], into `gradient`. Returns the ZMP; none, with `gradient` zero, where there is none.
+    /// ∂ZMP/∂w at the balance `balance` of this sample: row x, then row y, each of [`Self::parameter_count`]
+    /// numbers \[m per unit of the parameter\], into `gradient`. Returns the ZMP; none, with `gradient` zero,
+    /// where there is none.
     ///
     /// The floor is `z = floor_height` \[m\]. Allocates nothing.
     ///
@@ -188,8 +192,8 @@ impl BalanceRows {
     }
 }
 
-/// Standard deviation of a number that has this gradient with respect to the parameters, when these have this covariance (row by
-/// row): √(gᵀ Σ g), to first order.
+/// Standard deviation of a number that has this gradient with respect to the parameters, when these have this
+/// covariance (row by row): √(gᵀ Σ g), to first order.
 ///
 /// # Errors
 /// The covariance is not square of the gradient's size.

@@ -14,7 +14,8 @@ const SMALLEST_AREA: f64 = 1e-8;
 pub struct SupportPolygon {
     /// Counter-clockwise.
     corners: Vec<[f64; 2]>,
-    /// Outward unit normal of the edge from each corner to the next; kept apart, so that they outlive shrinking to a point.
+    /// Outward unit normal of the edge from each corner to the next; kept apart, so that they outlive
+    /// shrinking to a point.
     normals: Vec<[f64; 2]>,
 }
 
@@ -23,7 +24,8 @@ pub struct SupportPolygon {
 pub struct NearestEdge {
     /// Distance to the polygon's border \[m\], positive inside.
     pub margin: f64,
-    /// Its gradient with respect to the point: the unit vector away from the nearest point of the border inside, towards it outside.
+    /// Its gradient with respect to the point: the unit vector away from the nearest point of the border
+    /// inside, towards it outside.
     pub gradient: [f64; 2],
 }
 
@@ -67,11 +69,12 @@ impl SupportPolygon {
         Ok(SupportPolygon { normals: normals.collect(), corners })
     }
 
-    /// The hull of the soles' corners that touch the floor `z = floor_height` \[m\]: those not higher above it than
-    /// `contact_height` \[m\].
+    /// The hull of the soles' corners that touch the floor `z = floor_height` \[m\]: those not higher above
+    /// it than `contact_height` \[m\].
     ///
-    /// `placements` are those of all bodies in the world ([`phiw_dynamics::Tree::forward_kinematics`]). A robot on a fixed base has its
-    /// soles on the base link, which is no body: give their corners to [`SupportPolygon::from_points`].
+    /// `placements` are those of all bodies in the world ([`phiw_dynamics::Tree::forward_kinematics`]). A
+    /// robot on a fixed base has its soles on the base link, which is no body: give their corners to
+    /// [`SupportPolygon::from_points`].
     ///
     /// # Errors
     /// A foot is on a body that is not there, or too few corners touch the floor.
@@ -158,8 +161,8 @@ impl SupportPolygon {
         }
     }
 
-    /// The polygon with the part `alpha` taken away: each corner moves that part of its way to `about`. What equation (10) does to
-    /// the bounds, done to the polygon itself.
+    /// The polygon with the part `alpha` taken away: each corner moves that part of its way to `about`. What
+    /// equation (10) does to the bounds, done to the polygon itself.
     ///
     /// # Errors
     /// `alpha` is not in \[0, 1\], or `about` is outside.
@@ -172,8 +175,8 @@ impl SupportPolygon {
         })
     }
 
-    /// The largest `alpha` at which [`SupportPolygon::reduced`] about this point still contains `zmp`; negative where the whole
-    /// polygon does not.
+    /// The largest `alpha` at which [`SupportPolygon::reduced`] about this point still contains `zmp`;
+    /// negative where the whole polygon does not.
     ///
     /// It settles at once for every α whether a motion is allowed. `about` must be inside.
     pub fn largest_reduction(&self, zmp: [f64; 2], about: [f64; 2]) -> f64 {

@@ -6,12 +6,14 @@ use phiw_dynamics::{
     Spatial, Vec3, check_size,
 };
 
-/// The parameters of everything that stands, in one vector: those of the base link, then those of the moving bodies.
+/// The parameters of everything that stands, in one vector: those of the base link, then those of the moving
+/// bodies.
 ///
-/// Joint torques of a robot on a fixed base do not feel its base link, so a [`Tree`](phiw_dynamics::Tree) on a fixed base does not hold it; the ZMP does
-/// feel it. `base_link` are its ten standard parameters in the world frame, which is the base's frame; whoever has the URDF
-/// finds them as body 0 of the tree that is read with `floating_base`. For a tree that floats, the base is a body like any other: give the
-/// parameters of its bodies as they are, this function is not needed.
+/// Joint torques of a robot on a fixed base do not feel its base link, so a [`Tree`](phiw_dynamics::Tree) on
+/// a fixed base does not hold it; the ZMP does feel it. `base_link` are its ten standard parameters in the
+/// world frame, which is the base's frame; whoever has the URDF finds them as body 0 of the tree that is read
+/// with `floating_base`. For a tree that floats, the base is a body like any other: give the parameters of
+/// its bodies as they are, this function is not needed.
 pub fn standing_parameters(base_link: &InertialParameters, bodies: &[f64]) -> Vec<f64> {
     [base_link, bodies].concat()
 }
@@ -59,7 +61,8 @@ impl Load {
     }
 }
 
-/// How many parameters the balance of a robot takes: ten for each body, and ten for the base link unless the base floats.
+/// How many parameters the balance of a robot takes: ten for each body, and ten for the base link unless the
+/// base floats.
 pub(crate) fn parameter_count(robot: &impl BodyKinematics) -> usize {
     PARAMETERS_PER_BODY * (robot.body_count() + usize::from(!robot.has_floating_base()))
 }
@@ -86,11 +89,12 @@ impl ZmpWorkspace {
 
     /// The balance of the motion `(q, v, a)` \[rad, m, s\] for the standard parameters `parameters`.
     ///
-    /// `robot` is the one that this scratch is for: `&tree`, or `&mut backend` of another library, whose own kinematics are then used.
-    /// `q`, `v`, `a` are its coordinates (see [`BodyKinematics`]). `parameters` are ten for each body, in the order and frames of the
-    /// robot's bodies (for a tree: of [`Tree::inertial_parameters`](phiw_dynamics::Tree::inertial_parameters)), with the base link's ten
-    /// before them on a fixed base ([`standing_parameters`]); those that the robot itself may hold are not looked at. One inverse
-    /// dynamics that carries mass and first moment along; allocates nothing.
+    /// `robot` is the one that this scratch is for: `&tree`, or `&mut backend` of another library, whose own
+    /// kinematics are then used. `q`, `v`, `a` are its coordinates (see [`BodyKinematics`]). `parameters` are
+    /// ten for each body, in the order and frames of the robot's bodies (for a tree: of
+    /// [`Tree::inertial_parameters`](phiw_dynamics::Tree::inertial_parameters)), with the base link's ten
+    /// before them on a fixed base ([`standing_parameters`]); those that the robot itself may hold are not
+    /// looked at. One inverse dynamics that carries mass and first moment along; allocates nothing.
     ///
     /// # Errors
     /// A slice or this workspace does not fit the robot, or the robot's motion can not be computed.

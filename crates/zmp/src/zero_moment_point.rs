@@ -15,8 +15,8 @@ pub enum ZmpModel {
 /// The ZMP of a point mass on the floor `z = floor_height` \[m\], paper's equation (8):
 /// `x − (z − l_z) ẍ / (z̈ + g)`, and so for y.
 ///
-/// `gravity` is in the world frame \[m/s²\], usually `[0, 0, −9.81]`; a level component of it counts like an acceleration.
-/// None where the robot does not press on the floor (`z̈ + g ≤ 0`) or has no centre of mass.
+/// `gravity` is in the world frame \[m/s²\], usually `[0, 0, −9.81]`; a level component of it counts like an
+/// acceleration. None where the robot does not press on the floor (`z̈ + g ≤ 0`) or has no centre of mass.
 #[inline]
 pub fn point_mass_zmp(center: &CenterOfMass, gravity: [f64; 3], floor_height: f64) -> Option<[f64; 2]> {
     let push = |axis: usize| center.acceleration[axis] - gravity[axis];
@@ -27,11 +27,12 @@ pub fn point_mass_zmp(center: &CenterOfMass, gravity: [f64; 3], floor_height: f6
     })
 }
 
-/// The ZMP on the floor `z = floor_height` \[m\] of the wrench that the floor gives to the robot: force \[N\], then moment about the
-/// world's origin \[N·m\], along the world's axes.
+/// The ZMP on the floor `z = floor_height` \[m\] of the wrench that the floor gives to the robot: force
+/// \[N\], then moment about the world's origin \[N·m\], along the world's axes.
 ///
-/// It is the point of the floor about which the moment has no level component (Vukobratović and Borovac 2004); as
-/// long as it is inside the support polygon it is the centre of pressure. None where the robot does not press on the floor.
+/// It is the point of the floor about which the moment has no level component (Vukobratović and Borovac
+/// 2004); as long as it is inside the support polygon it is the centre of pressure. None where the robot does
+/// not press on the floor.
 #[inline]
 pub fn multi_body_zmp(wrench: [f64; 6], floor_height: f64) -> Option<[f64; 2]> {
     let [force_x, force_y, force_z, moment_x, moment_y, _] = wrench;

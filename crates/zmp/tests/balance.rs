@@ -12,8 +12,8 @@ fn evaluate(tree: &Tree, parameters: &[f64], [q, v, a]: [&[f64]; 3]) -> Balance 
     ZmpWorkspace::new(tree).evaluate(tree, parameters, q, v, a).unwrap()
 }
 
-/// Mass, first moment, and linear and angular momentum about the world's origin, of bodies (and a base link at rest) by
-/// Jacobians: nothing of the recursion that is tested.
+/// Mass, first moment, and linear and angular momentum about the world's origin, of bodies (and a base link
+/// at rest) by Jacobians: nothing of the recursion that is tested.
 fn momentum(tree: &Tree, parameters: &[f64], q: &[f64], v: &[f64]) -> (f64, [f64; 3], [f64; 6]) {
     let mut placements = vec![Placement::identity(); tree.bodies().len()];
     tree.forward_kinematics(q, &mut placements).unwrap();
@@ -67,14 +67,15 @@ proptest! {
         assert_close(&balance.wrench, &expected, 1e-11);
     }
 
-    /// Newton and Euler for the whole: what the floor and gravity give is the rate of the momentum, by central differences.
+    /// Newton and Euler for the whole: what the floor and gravity give is the rate of the momentum, by
+    /// central differences.
     #[test]
     fn floor_and_gravity_change_the_momentum(robot in robot()) {
         const STEP: f64 = 1e-5;
         let Built { tree, state, parameters } = robot.build();
         let balance = evaluate(&tree, &parameters, [&state.q, &state.v, &state.a]);
-        // Two instants of a motion that has this velocity and acceleration in its middle: the configuration moves by
-        // v·t ± a·t²/2, for which the mean velocity until then is taken.
+        // Two instants of a motion that has this velocity and acceleration in its middle: the configuration
+        // moves by v·t ± a·t²/2, for which the mean velocity until then is taken.
         let at = |time: f64| {
             let velocity: Vec<f64> = state.v.iter().zip(&state.a).map(|(v, a)| v + a * time).collect();
             let mean: Vec<f64> = state.v.iter().zip(&state.a).map(|(v, a)| v + 0.5 * a * time).collect();
@@ -93,7 +94,8 @@ proptest! {
         let gravity = [weight[0], weight[1], weight[2], pull[0], pull[1], pull[2]];
         let expected: Vec<f64> = rate.iter().zip(gravity).map(|(rate, gravity)| rate - gravity).collect();
         assert_close(&balance.wrench, &expected, 1e-6);
-        // The centre of mass's acceleration is the second difference of its place, and the first of its momentum.
+        // The centre of mass's acceleration is the second difference of its place, and the first of its
+        // momentum.
         let second = [0, 1, 2].map(|i| (after[i] - 2.0 * moment[i] + before[i]) / (mass * STEP * STEP));
         assert_close(&center.acceleration, &second, 2e-3);
         assert_close(&center.acceleration, &[0, 1, 2].map(|i| rate[i] / mass), 1e-6);

@@ -171,8 +171,8 @@ fn simulated_swing(amplitude: f64, frequency: f64, duration_s: f64) -> PlantRun 
     Plant::new(&tree, &world, setup, rapier).unwrap().run(&reference, duration_s, &mut random).unwrap()
 }
 
-/// The force plate of a simulated floor sees the ZMP with angular momentum, computed here from the joints' motion alone; the
-/// point mass's is somewhere else.
+/// The force plate of a simulated floor sees the ZMP with angular momentum, computed here from the joints'
+/// motion alone; the point mass's is somewhere else.
 #[test]
 fn a_force_plate_measures_the_multi_body_zmp() {
     let run = simulated_swing(0.4, 1.0, 3.0);

@@ -181,7 +181,8 @@ fn margins_of_a_sole_are_in_metres() {
     assert_eq!(polygon.largest_reduction([0.2, 0.0], [0.19, 0.0]), f64::NEG_INFINITY);
 }
 
-/// A corner was skipped as "not outside its own edges, no distance to them", and the margin became that to the far edge.
+/// A corner was skipped as "not outside its own edges, no distance to them", and the margin became that to
+/// the far edge.
 #[test]
 fn a_corner_that_rounding_puts_outside_is_on_the_border() {
     let contacts = [[-0.9271744011236952, 0.0], [0.0, 0.0], [0.5278918185756957, 0.639166385478268]];

@@ -5,8 +5,8 @@ const SKIPPED: &str = "skipped: ";
 
 /// What became of the tests so far.
 ///
-/// A test that passes but prints a line `skipped: …` has not shown anything: it counts as skipped, not as passed. So
-/// does an ignored one.
+/// A test that passes but prints a line `skipped: …` has not shown anything: it counts as skipped, not as
+/// passed. So does an ignored one.
 #[derive(Debug, Default, PartialEq)]
 pub struct Tally {
     passed: u64,

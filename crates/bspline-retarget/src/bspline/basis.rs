@@ -2,9 +2,9 @@
 
 /// B-spline basis functions of one degree over one knot vector.
 ///
-/// At any time only `degree + 1` neighbouring functions differ from zero: those of the control points
-/// `first ..= first + degree`, where `first` is what [`Basis::derivative`] returns. Inside the domain they are ≥ 0 and sum
-/// to one, so a curve stays inside the hull of its control points.
+/// At any time only `degree + 1` neighbouring functions differ from zero: those of the control points `first
+/// ..= first + degree`, where `first` is what [`Basis::derivative`] returns. Inside the domain they are ≥ 0
+/// and sum to one, so a curve stays inside the hull of its control points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Basis {
     degree: usize,
@@ -44,7 +44,8 @@ pub enum BasisError {
 }
 
 impl Basis {
-    /// Equally spaced knots that run `degree` spans beyond both ends of the domain: every function is a shifted copy of the same one.
+    /// Equally spaced knots that run `degree` spans beyond both ends of the domain: every function is a
+    /// shifted copy of the same one.
     ///
     /// # Errors
     /// Too few control points, or an empty domain.
@@ -56,8 +57,8 @@ impl Basis {
         Ok(Basis { degree, knots })
     }
 
-    /// Equally spaced knots with the outermost ones `degree + 1` fold: the curve starts at its first control point and
-    /// ends at its last.
+    /// Equally spaced knots with the outermost ones `degree + 1` fold: the curve starts at its first control
+    /// point and ends at its last.
     ///
     /// # Errors
     /// Too few control points, or an empty domain.
@@ -126,8 +127,8 @@ impl Basis {
         span - self.degree
     }
 
-    /// Derivatives of the given order (0: the values) at time `t` \[s\] of the `degree + 1` functions that are not zero
-    /// there, into `values`; returns the control point of the first. Units: s^−order.
+    /// Derivatives of the given order (0: the values) at time `t` \[s\] of the `degree + 1` functions that
+    /// are not zero there, into `values`; returns the control point of the first. Units: s^−order.
     ///
     /// `values` must have `degree + 1` elements; more are left as they are.
     ///

@@ -25,7 +25,8 @@ pub struct CurveError {
 }
 
 impl Curve {
-    /// A curve with the given control points, point by point: `control[j * dimension + i]` is coordinate `i` of point `j`.
+    /// A curve with the given control points, point by point: `control[j * dimension + i]` is coordinate `i`
+    /// of point `j`.
     ///
     /// # Errors
     /// The number of values is not that of the basis' control points times `dimension`.
@@ -50,8 +51,8 @@ impl Curve {
         &self.control
     }
 
-    /// The derivative of the given order (0: the curve itself) at time `t` \[s\], into `point`. `scratch` needs
-    /// `degree + 1` elements. Units: those of the control points, per s^order.
+    /// The derivative of the given order (0: the curve itself) at time `t` \[s\], into `point`. `scratch`
+    /// needs `degree + 1` elements. Units: those of the control points, per s^order.
     ///
     /// # Panics
     /// If `point` is shorter than the dimension or `scratch` than `degree + 1`.

@@ -1,8 +1,8 @@
 //! C3D files of any make: Intel, DEC and SGI numbers, integers and reals.
 //!
-//! Layout after the C3D manual: a header of 512 bytes, a section of named parameters, then for each frame the points (four numbers
-//! each) and the analog channels. A reader should trust none of the counts, of which a file holds several; this one takes
-//! the first that the length of the file bears out.
+//! Layout after the C3D manual: a header of 512 bytes, a section of named parameters, then for each frame the
+//! points (four numbers each) and the analog channels. A reader should trust none of the counts, of which a
+//! file holds several; this one takes the first that the length of the file bears out.
 
 mod error;
 mod file;

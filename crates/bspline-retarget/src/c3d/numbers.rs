@@ -50,7 +50,8 @@ impl Processor {
             Processor::Intel => f32::from_le_bytes(bytes),
             Processor::Sgi => f32::from_be_bytes(bytes),
             Processor::Dec => {
-                // Its 16-bit halves are swapped and its exponent is two higher; exponent zero is the number zero.
+                // Its 16-bit halves are swapped and its exponent is two higher; exponent zero is the number
+                // zero.
                 let [a, b, c, d] = bytes;
                 let bits = u32::from_le_bytes([c, d, a, b]);
                 if bits & 0x7f80_0000 == 0 { 0.0 } else { (f64::from(f32::from_bits(bits)) / 4.0) as f32 }
@@ -76,7 +77,8 @@ mod tests {
 
     #[test]
     fn vax_numbers_of_the_manual() {
-        // VAX F of 1.0 is 0x4080 in the first half, of −1 with the sign bit; 0 has exponent zero whatever its fraction.
+        // VAX F of 1.0 is 0x4080 in the first half, of −1 with the sign bit; 0 has exponent zero whatever its
+        // fraction.
         for (bytes, value) in [
             ([0x80, 0x40, 0, 0], 1.0),
             ([0x80, 0xc0, 0, 0], -1.0),

@@ -74,7 +74,8 @@ impl Parameters {
     }
 }
 
-/// Reads the section that starts at block `first_block` (1-based); also gives the processor and the section's end (byte).
+/// Reads the section that starts at block `first_block` (1-based); also gives the processor and the section's
+/// end (byte).
 pub(super) fn read(bytes: &[u8], first_block: u8) -> Result<(Parameters, Processor, usize), C3dError> {
     let start = usize::from(first_block.saturating_sub(1)) * BLOCK;
     if start < BLOCK {
@@ -88,7 +89,8 @@ pub(super) fn read(bytes: &[u8], first_block: u8) -> Result<(Parameters, Process
         length: bytes.len(),
     })?;
     let processor = Processor::from_code(head[3], start + 3)?;
-    // The number of blocks is a byte, and wrong in many files: the chain of entries says where the section ends.
+    // The number of blocks is a byte, and wrong in many files: the chain of entries says where the section
+    // ends.
     let mut reader = Reader { bytes, at: start + 4 };
     let mut groups: Vec<(u8, String)> = Vec::new();
     let mut entries: Vec<(u8, String, ParameterValue)> = Vec::new();

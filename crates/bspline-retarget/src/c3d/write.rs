@@ -20,7 +20,8 @@ pub struct C3dFormat {
 pub enum Storage {
     /// 32-bit reals.
     Real,
-    /// 16-bit integers; one count is this long, in the file's unit. What is out of their range is written as missing.
+    /// 16-bit integers; one count is this long, in the file's unit. What is out of their range is written as
+    /// missing.
     Integer {
         /// Length of a count.
         scale: f32,
@@ -34,7 +35,8 @@ impl Default for C3dFormat {
     }
 }
 
-/// The content of a C3D file with the points of a recording and the notes given: parameters `(group, name, text)`.
+/// The content of a C3D file with the points of a recording and the notes given: parameters `(group, name,
+/// text)`.
 ///
 /// Missing points (NaN) get a negative residual. Labels are cut at 127 bytes; texts of notes at 255.
 pub fn write_c3d(recording: &MarkerRecording, format: C3dFormat, notes: &[(&str, &str, &str)]) -> Vec<u8> {
@@ -169,7 +171,8 @@ impl Section {
         id
     }
 
-    /// Name, group and offset of an entry with `content` bytes, to which the description's length (zero) comes.
+    /// Name, group and offset of an entry with `content` bytes, to which the description's length (zero)
+    /// comes.
     fn entry(&mut self, id: i8, name: &str, content: usize) {
         self.bytes.extend([name.len() as u8, id as u8]);
         self.bytes.extend(name.as_bytes());

@@ -1,8 +1,10 @@
-//! Synthetic motions for a machine without data: the tasks of the paper's Table 1 with its counts and durations.
+//! Synthetic motions for a machine without data: the tasks of the paper's Table 1 with its counts and
+//! durations.
 //!
-//! **These are not measured on people.** Joint angles are smooth patterns that resemble each task (stirring circles, cutting strokes, …),
-//! on bodies of different size, with markers misplaced on the skin, noise of the cameras, and occlusions. They exercise the
-//! whole way from a C3D file to a robot's motion, and excite a robot's joints broadly; they say nothing about people.
+//! **These are not measured on people.** Joint angles are smooth patterns that resemble each task (stirring
+//! circles, cutting strokes, …), on bodies of different size, with markers misplaced on the skin, noise of
+//! the cameras, and occlusions. They exercise the whole way from a C3D file to a robot's motion, and excite a
+//! robot's joints broadly; they say nothing about people.
 
 mod task;
 

@@ -55,8 +55,9 @@ pub struct HumanBody {
 }
 
 impl HumanBody {
-    /// The body for a recording. `calibrated` are places of markers that a static trial told, and the lengths it told (one for each
-    /// of [`SEGMENT_PARAMETERS`]); `robot_coordinates` columns are left free between trajectories and parameters.
+    /// The body for a recording. `calibrated` are places of markers that a static trial told, and the lengths
+    /// it told (one for each of [`SEGMENT_PARAMETERS`]); `robot_coordinates` columns are left free between
+    /// trajectories and parameters.
     pub(crate) fn new(
         map: &MarkerMap,
         recording: &MarkerRecording,
@@ -147,7 +148,8 @@ impl HumanBody {
         for (name, markers) in &map.segments {
             let Some(segment) = Segment::from_name(name) else { continue };
             for name in &markers.cluster {
-                // Whether it is placed is asked after it has been found: an absent marker should be called that.
+                // Whether it is placed is asked after it has been found: an absent marker should be called
+                // that.
                 let index = map.find(name, recording)?;
                 match calibrated.get(name) {
                     Some(&placed) => self.place(name, index, placed, map, first_parameter),

@@ -1,7 +1,7 @@
 //! Markers' cost, gradient and normal equations by one sweep from the leaves to the root.
 //!
-//! J'J of all markers is the mass matrix of unit points at the markers, and J'r what residuals as forces at the markers do to the
-//! joints: composite sums give both without ever forming J.
+//! J'J of all markers is the mass matrix of unit points at the markers, and J'r what residuals as forces at
+//! the markers do to the joints: composite sums give both without ever forming J.
 
 use super::kinematics::{HumanScratch, Kinematics, Source};
 use super::masses::Masses;
@@ -19,7 +19,8 @@ impl Kinematics {
         cost
     }
 
-    /// The same, and the residuals as wrenches on the nodes; other wrenches may be added before [`Self::gradient`].
+    /// The same, and the residuals as wrenches on the nodes; other wrenches may be added before
+    /// [`Self::gradient`].
     #[inline(always)]
     pub fn pull<S: Scalar>(&self, measured: &[Vec3<S>], weights: &[S], scratch: &mut HumanScratch<S>) -> S {
         scratch.wrenches.fill(Spatial::zero());
@@ -63,8 +64,8 @@ impl Kinematics {
         }
     }
 
-    /// J'J of all loads, added to the upper triangle of `normal` (row by row, `size` columns); after [`Self::twist`]. It uses the
-    /// loads up.
+    /// J'J of all loads, added to the upper triangle of `normal` (row by row, `size` columns); after
+    /// [`Self::twist`]. It uses the loads up.
     #[inline(always)]
     pub fn normal_equations<S: Scalar>(&self, scratch: &mut HumanScratch<S>, normal: &mut [S], size: usize) {
         for (index, node) in self.nodes().iter().enumerate().rev().filter(|(_, node)| node.carries) {

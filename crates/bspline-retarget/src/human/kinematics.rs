@@ -1,7 +1,7 @@
 //! Kinematics of a tree in which lengths are joints too.
 //!
-//! Each node moves by one coordinate: an angle of θ^h, or a length of ξ^h, which is a slide that all samples share. All of it is
-//! generic over the scalar: a number, or a SIMD register of samples.
+//! Each node moves by one coordinate: an angle of θ^h, or a length of ξ^h, which is a slide that all samples
+//! share. All of it is generic over the scalar: a number, or a SIMD register of samples.
 
 use phiw_dynamics::{Mat3, Scalar, Spatial, Vec3};
 
@@ -24,7 +24,8 @@ impl Source {
     }
 }
 
-/// How a node moves along or about a coordinate axis (0 x, 1 y, 2 z) of its parent's frame, in the sense of the sign.
+/// How a node moves along or about a coordinate axis (0 x, 1 y, 2 z) of its parent's frame, in the sense of
+/// the sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct NodeMotion {
     pub kind: MotionKind,

@@ -11,14 +11,16 @@ use std::collections::BTreeMap;
 pub struct MarkerMap {
     /// Name of the map.
     pub name: String,
-    /// Unit of length of the recordings (m, dm, cm, mm, in, ft), if they do not say it or say it wrong. A CSV is in metres without it.
+    /// Unit of length of the recordings (m, dm, cm, mm, in, ft), if they do not say it or say it wrong. A CSV
+    /// is in metres without it.
     #[serde(default)]
     pub units: Option<String>,
-    /// How names of static trials end (`_static`); they calibrate the recordings that share the name before it.
+    /// How names of static trials end (`_static`); they calibrate the recordings that share the name before
+    /// it.
     #[serde(default)]
     pub static_suffix: Option<String>,
-    /// Standard deviation \[m\] of markers from where the map or the static trial puts them on their segment; with more than zero
-    /// their positions are estimated jointly with the motion.
+    /// Standard deviation \[m\] of markers from where the map or the static trial puts them on their segment;
+    /// with more than zero their positions are estimated jointly with the motion.
     #[serde(default)]
     pub marker_spread_m: f64,
     /// How joints move, by segment; `free` where nothing is said.
@@ -104,10 +106,12 @@ pub enum MapError {
 }
 
 impl MarkerMap {
-    /// The map for the set `ue_adl`: seated, arms and shoulders in clusters of four, one marker on the sternum.
+    /// The map for the set `ue_adl`: seated, arms and shoulders in clusters of four, one marker on the
+    /// sternum.
     ///
     /// # Errors
-    /// None, as long as the file in the crate is a map, which is tested; like [`MarkerMap::from_toml`] otherwise.
+    /// None, as long as the file in the crate is a map, which is tested; like [`MarkerMap::from_toml`]
+    /// otherwise.
     pub fn ue_adl() -> Result<Self, MapError> {
         Self::from_toml(include_str!("../../maps/ue_adl.toml"))
     }

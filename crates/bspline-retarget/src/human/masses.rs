@@ -2,7 +2,8 @@
 
 use phiw_dynamics::{Scalar, Spatial, Vec3};
 
-/// Points in sum: their weight, first moment, and second moment about the world's origin (xx, xy, yy, xz, yz, zz).
+/// Points in sum: their weight, first moment, and second moment about the world's origin (xx, xy, yy, xz, yz,
+/// zz).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Masses<S> {
     pub weight: S,

@@ -5,7 +5,8 @@ use super::kinematics::{MotionKind, Source};
 use super::skeleton::{Segment, length_to_end};
 use phiw_dynamics::Vec3;
 
-/// A joint with one coordinate, or a length: it turns about an axis of its parent's frame, or slides along it.
+/// A joint with one coordinate, or a length: it turns about an axis of its parent's frame, or slides along
+/// it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyJoint {
     /// The joint before it, as an index; `None` is the world.
@@ -14,7 +15,8 @@ pub struct BodyJoint {
     pub turns: bool,
     /// Its axis in its parent's frame, a unit vector.
     pub axis: [f64; 3],
-    /// Index of the coordinate that moves it over time (see [`HumanBody::trajectory_names`]); `None`: it stays at `value`.
+    /// Index of the coordinate that moves it over time (see [`HumanBody::trajectory_names`]); `None`: it
+    /// stays at `value`.
     pub coordinate: Option<usize>,
     /// Where it stays \[rad, m\]; 0 if it moves.
     pub value: f64,
@@ -69,7 +71,8 @@ impl HumanBody {
         self.segment_nodes[segment.index()]
     }
 
-    /// Beginning and end of each segment \[m\], in the order of [`Segment::ALL`], for values of the coordinates and of ξ^h.
+    /// Beginning and end of each segment \[m\], in the order of [`Segment::ALL`], for values of the
+    /// coordinates and of ξ^h.
     pub fn sticks(&self, coordinates: &[f64], parameters: &[f64]) -> Vec<[[f64; 3]; 2]> {
         let mut columns = vec![0.0; self.first_parameter + parameters.len()];
         columns[..coordinates.len()].copy_from_slice(coordinates);

@@ -1,8 +1,8 @@
 //! Segments, joints and lengths of the human upper body.
 //!
-//! Frames of all segments are alike when all angles are zero: x forward, y left, z up, arms hanging. A segment's frame is at the joint
-//! before it; its end is where the next one begins. Lengths are round numbers for an adult 1.75 m tall: starting values with a spread, which the
-//! recording corrects.
+//! Frames of all segments are alike when all angles are zero: x forward, y left, z up, arms hanging. A
+//! segment's frame is at the joint before it; its end is where the next one begins. Lengths are round numbers
+//! for an adult 1.75 m tall: starting values with a spread, which the recording corrects.
 
 /// A rigid part of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -196,7 +196,8 @@ pub(crate) struct Joint {
     pub rest: f64,
     /// How far it is usually from there \[rad, m\]; infinite if it may be anywhere.
     pub spread: f64,
-    /// What is anatomically possible, generously \[rad, m\]; infinite where it is not needed to tell a pose from its double.
+    /// What is anatomically possible, generously \[rad, m\]; infinite where it is not needed to tell a pose
+    /// from its double.
     pub range: (f64, f64),
 }
 

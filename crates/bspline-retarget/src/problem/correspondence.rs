@@ -90,7 +90,8 @@ fn axes(tree: &Tree, correspondence: &Correspondence) -> Vec<Axis> {
 }
 
 impl Problem<'_> {
-    /// w_g ‖P^r − P^h‖² of a batch of samples, each counted `count` times; if wanted, with what the residuals pull at human and robot.
+    /// w_g ‖P^r − P^h‖² of a batch of samples, each counted `count` times; if wanted, with what the residuals
+    /// pull at human and robot.
     #[inline(always)]
     pub(super) fn correspondence(
         &self,

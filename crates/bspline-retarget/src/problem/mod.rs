@@ -1,6 +1,7 @@
 //! Problem (15): its variables, its cost, gradient and normal equations.
 //!
-//! `pass.rs` and `correspondence.rs` are methods of [`Problem`] and name it; it names their scratch and their lines: one type in three files.
+//! `pass.rs` and `correspondence.rs` are methods of [`Problem`] and name it; it names their scratch and their
+//! lines: one type in three files.
 
 mod correspondence;
 mod pass;
@@ -21,8 +22,8 @@ use correspondence::Line;
 use phiw_dynamics::Vec3;
 use samples::{Samples, Windows};
 
-/// Retargeting of one recording: variables are the control points (each: human coordinates, then robot coordinates), then the
-/// parameters ξ^h.
+/// Retargeting of one recording: variables are the control points (each: human coordinates, then robot
+/// coordinates), then the parameters ξ^h.
 pub struct Problem<'a> {
     pub(crate) body: &'a HumanBody,
     pub(crate) robot: Option<&'a RobotModel>,
@@ -41,7 +42,8 @@ pub struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    /// The problem for a recording that `body` was made for; the basis' domain is in seconds from the first frame.
+    /// The problem for a recording that `body` was made for; the basis' domain is in seconds from the first
+    /// frame.
     pub fn new(
         body: &'a HumanBody,
         robot: Option<&'a RobotModel>,
@@ -136,7 +138,8 @@ impl<'a> Problem<'a> {
         replaced.map(|(_, vectors)| &vectors[..])
     }
 
-    /// Everything at rest: the human's coordinates and lengths at their means, the robot's at zero or the limit next to it.
+    /// Everything at rest: the human's coordinates and lengths at their means, the robot's at zero or the
+    /// limit next to it.
     pub fn rest(&self) -> Vec<f64> {
         let robot = self.robot.map(RobotModel::rest);
         let point: Vec<f64> =
@@ -176,8 +179,8 @@ impl<'a> Problem<'a> {
 
     /// J'J, with the derivatives taken at one sample of each window.
     ///
-    /// The basis is exact in every sample: only that the pose within a window is that of its middle. J changes little there, the
-    /// gradient does not come from here, and so the minimum is the same.
+    /// The basis is exact in every sample: only that the pose within a window is that of its middle. J
+    /// changes little there, the gradient does not come from here, and so the minimum is the same.
     pub(crate) fn normal_equations(&self, variables: &[f64], scratch: &mut Scratch, arrow: &mut Arrow) {
         arrow.clear();
         self.over_windows(variables, scratch, arrow);

@@ -55,7 +55,8 @@ impl Problem<'_> {
         })
     }
 
-    /// The human's vectors of all correspondences in a sample that has been placed, or those that replace them \[m\].
+    /// The human's vectors of all correspondences in a sample that has been placed, or those that replace
+    /// them \[m\].
     pub(crate) fn human_vectors(
         &self,
         robot: &RobotModel,

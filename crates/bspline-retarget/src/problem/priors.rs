@@ -67,7 +67,8 @@ impl Problem<'_> {
         cost
     }
 
-    /// w_η η: a curve stays inside the hull of its control points, so it is they that are kept inside the limits.
+    /// w_η η: a curve stays inside the hull of its control points, so it is they that are kept inside the
+    /// limits.
     pub(super) fn limits(&self, variables: &[f64], collect: &mut Collect<'_>) -> f64 {
         let Some(robot) = self.robot else { return 0.0 };
         let (n, first) = (self.coordinates(), self.body.trajectories.len());
@@ -104,7 +105,8 @@ impl Problem<'_> {
         cost
     }
 
-    /// What the difference of control points `point` and the one before is to be multiplied with, to be one of the velocity \[1/s\].
+    /// What the difference of control points `point` and the one before is to be multiplied with, to be one
+    /// of the velocity \[1/s\].
     pub(crate) fn slope(&self, point: usize) -> f64 {
         let degree = self.basis.degree();
         let knots = self.basis.knots();

@@ -76,13 +76,14 @@ impl Samples {
     }
 }
 
-/// Stretches of samples inside a span of the basis, each with a sample that stands for it: as many to a span as there are lanes, fewer
-/// where a span has not as many samples.
+/// Stretches of samples inside a span of the basis, each with a sample that stands for it: as many to a span
+/// as there are lanes, fewer where a span has not as many samples.
 pub(super) struct Windows {
     pub spans: Vec<Span>,
     /// For each span, in how many samples each point is seen.
     pub seen: Vec<Lane>,
-    /// For each span, Σ b_i b_j over its samples (row by row, i and j from the first control point on) and Σ b_i, per sample.
+    /// For each span, Σ b_i b_j over its samples (row by row, i and j from the first control point on) and Σ
+    /// b_i, per sample.
     pub products: Vec<Lane>,
     pub sums: Vec<Lane>,
 }

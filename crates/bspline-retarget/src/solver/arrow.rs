@@ -1,7 +1,9 @@
-//! Block-banded matrices with a dense border: the normal equations of a spline, and their Cholesky factor in O(N).
+//! Block-banded matrices with a dense border: the normal equations of a spline, and their Cholesky factor in
+//! O(N).
 //!
-//! A spline of degree p makes a control point meet the p after it; parameters that all samples share are a dense border. What stands
-//! in a control point's columns on and below the diagonal, border included, is a dense panel, and the factor of the matrix has the same panels.
+//! A spline of degree p makes a control point meet the p after it; parameters that all samples share are a
+//! dense border. What stands in a control point's columns on and below the diagonal, border included, is a
+//! dense panel, and the factor of the matrix has the same panels.
 
 use super::Pattern;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -23,8 +25,8 @@ pub(crate) struct Arrow {
     points: usize,
     degree: usize,
     border: usize,
-    /// For each control point a column-major panel, [`Self::height`] × `point`: its own block, those of the `degree` points after it,
-    /// the border. Blocks of points that there are not stay zero.
+    /// For each control point a column-major panel, [`Self::height`] × `point`: its own block, those of the
+    /// `degree` points after it, the border. Blocks of points that there are not stay zero.
     panels: Vec<f64>,
     corner: Vec<f64>,
 }
@@ -62,9 +64,10 @@ impl Arrow {
         self.corner.copy_from_slice(&other.corner);
     }
 
-    /// Adds `K` samples of the same control points: of each, `normals` has the upper triangle, row by row, of `point` rows with
-    /// `point + border` numbers, with respect to the sample's coordinates and the border's, as far as `pattern` goes; `products` are what the weights of the control
-    /// points `first ..` come to in pairs (row by row, `degree + 1` numbers each), `sums` what they come to by themselves.
+    /// Adds `K` samples of the same control points: of each, `normals` has the upper triangle, row by row, of
+    /// `point` rows with `point + border` numbers, with respect to the sample's coordinates and the border's,
+    /// as far as `pattern` goes; `products` are what the weights of the control points `first ..` come to in
+    /// pairs (row by row, `degree + 1` numbers each), `sums` what they come to by themselves.
     ///
     /// [`Self::mirror`] has to come after the last.
     #[inline(always)]
@@ -98,7 +101,8 @@ impl Arrow {
         }
     }
 
-    /// Completes the blocks below the diagonal ones, of which [`Self::add_windows`] fills the lower triangles: they are symmetric.
+    /// Completes the blocks below the diagonal ones, of which [`Self::add_windows`] fills the lower
+    /// triangles: they are symmetric.
     pub fn mirror(&mut self) {
         let (n, height) = (self.point, self.height());
         for panel in self.panels.chunks_exact_mut((height * n).max(1)) {
@@ -261,8 +265,9 @@ fn add_all<const K: usize>(target: &mut [f64], Lanes(factors): Lanes<K>, values:
     }
 }
 
-/// faer's, in place: the blocks are parts of panels whose columns lie further apart than they are long, and a step of the solver factors hundreds of them
-/// with one allocation. (`phiw_dynamics::dense::Cholesky` owns its triangle.)
+/// faer's, in place: the blocks are parts of panels whose columns lie further apart than they are long, and a
+/// step of the solver factors hundreds of them with one allocation. (`phiw_dynamics::dense::Cholesky` owns
+/// its triangle.)
 fn cholesky(matrix: MatMut<'_, f64>, stack: &mut MemStack) -> bool {
     cholesky_in_place(matrix, LltRegularization::default(), Par::Seq, stack, Spec::default()).is_ok()
 }

@@ -5,7 +5,8 @@ use phiw_dynamics::dense::dot;
 
 /// How often the variables at their bounds are revised for a step.
 const REVISIONS: usize = 3;
-/// The largest number of variables that are pulled to their bounds for a step; what is still outside is cut off.
+/// The largest number of variables that are pulled to their bounds for a step; what is still outside is cut
+/// off.
 const MOST_PULLS: usize = 24;
 /// Added to the diagonal where a variable is to stay.
 const STIFF: f64 = 1e12;
@@ -52,8 +53,9 @@ impl BoundedStep {
 
     /// Finds the step for J'J and J'r at `variables`; false if there is none.
     ///
-    /// Variables that the gradient pushes against a bound stay there. Others that the step would carry out go to their bound, and
-    /// the rest is found again around them: the same factor serves, with a pull at each of them.
+    /// Variables that the gradient pushes against a bound stay there. Others that the step would carry out go
+    /// to their bound, and the rest is found again around them: the same factor serves, with a pull at each
+    /// of them.
     pub fn find(&mut self, arrow: &Arrow, variables: &[f64], gradient: &[f64], damping: f64) -> bool {
         self.factor.copy_from(arrow);
         self.step.copy_from_slice(gradient);

@@ -12,7 +12,8 @@ pub struct Iterations {
     pub most: usize,
     /// The relative decrease of the cost at which it is found.
     pub tolerance: f64,
-    /// Whether the robot's control points are held inside the joint limits, on top of η: then the motion never leaves them.
+    /// Whether the robot's control points are held inside the joint limits, on top of η: then the motion
+    /// never leaves them.
     pub hard_limits: bool,
 }
 
@@ -56,7 +57,8 @@ const SHORTENED: f64 = 0.4;
 const FIRST_DAMPING: f64 = 1e-5;
 const LEAST_DAMPING: f64 = 1e-8;
 const LEAST_RISE: f64 = 1e-6;
-/// A step whose decrease is less of what it promised than the first share was bad, one with more than the second was good.
+/// A step whose decrease is less of what it promised than the first share was bad, one with more than the
+/// second was good.
 const BAD_GOOD: (f64, f64) = (0.25, 0.7);
 
 /// Solves (15) from `start` by damped Gauss-Newton steps, O(N) each.

@@ -51,8 +51,9 @@ impl Gradient for Objective<'_> {
     }
 }
 
-/// Solves (15) from `start` by L-BFGS with the line search of Moré and Thuente. Over the control points of a spline it is the paper's
-/// method; over a basis of degree 1 with a control point for each sample it is the one without splines.
+/// Solves (15) from `start` by L-BFGS with the line search of Moré and Thuente. Over the control points of a
+/// spline it is the paper's method; over a basis of degree 1 with a control point for each sample it is the
+/// one without splines.
 ///
 /// `seen` is told the objective whenever it is computed: how far one is at what time.
 pub fn quasi_newton(

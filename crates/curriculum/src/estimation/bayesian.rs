@@ -16,29 +16,34 @@ use phiw_regressor::least_squares::{Group, GroupedFactor};
 pub struct LogNoise {
     /// Standard deviation of each torque's residual \[N·m, N\], one for each group of the evidence.
     pub std: Vec<f64>,
-    /// How many times wider standard deviations are than those of independent rows: samples of a log are correlated. At least 1.
+    /// How many times wider standard deviations are than those of independent rows: samples of a log are
+    /// correlated. At least 1.
     pub correlation: f64,
 }
 
 impl LogNoise {
-    /// Independent rows of unit variance in `groups` groups: of rows that have been weighted, or where there are none.
+    /// Independent rows of unit variance in `groups` groups: of rows that have been weighted, or where there
+    /// are none.
     pub fn unit(groups: usize) -> Self {
         LogNoise { std: vec![1.0; groups], correlation: 1.0 }
     }
 
-    /// The noise that a fit has found. Its standard deviations come from leaving out folds, so that correlated samples count as what they are.
+    /// The noise that a fit has found. Its standard deviations come from leaving out folds, so that
+    /// correlated samples count as what they are.
     pub fn of_fit(fit: &Fit) -> Self {
         let correlation = correlation(&fit.factor, &fit.determined(), &fit.standard_deviations);
         LogNoise { std: fit.residual_std.clone(), correlation }
     }
 
-    /// The noise behind a factor of weighted rows over the `parameters`, of all of which the standard deviations are known.
+    /// The noise behind a factor of weighted rows over the `parameters`, of all of which the standard
+    /// deviations are known.
     pub fn of_weighted_rows(factor: &Factor, parameters: &[usize], standard_deviations: &[f64]) -> Self {
         LogNoise { std: vec![1.0], correlation: correlation(factor, parameters, standard_deviations) }
     }
 }
 
-/// The median over the parameters of their standard deviation over that of independent rows; 1 where nothing tells.
+/// The median over the parameters of their standard deviation over that of independent rows; 1 where nothing
+/// tells.
 fn correlation(factor: &Factor, parameters: &[usize], deviations: &[f64]) -> f64 {
     let Ok(independent) = factor.standard_deviations(1.0) else { return 1.0 };
     let ratios = parameters
@@ -52,8 +57,9 @@ fn correlation(factor: &Factor, parameters: &[usize], deviations: &[f64]) -> f64
 
 /// The mean and the covariance of the parameters given logs with Gaussian noise and a Gaussian prior.
 ///
-/// With the URDF as the prior, each standard parameter within a share of its body's magnitude: without it, one short log would leave the parameters of an arm
-/// that rests to the noise. For logs of a real robot, whose noise is in the logged torques; where noise moves the robot, [`super::MotionLikelihood`] is right.
+/// With the URDF as the prior, each standard parameter within a share of its body's magnitude: without it,
+/// one short log would leave the parameters of an arm that rests to the noise. For logs of a real robot,
+/// whose noise is in the logged torques; where noise moves the robot, [`super::MotionLikelihood`] is right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BayesianLeastSquares {
     /// How uncertain the measured rows are.
@@ -67,7 +73,8 @@ impl Estimator for BayesianLeastSquares {
         "bayesian_least_squares"
     }
 
-    /// Parameters of which neither the logs nor the prior say anything stay as they are in `present`; their deviations and covariances are NaN.
+    /// Parameters of which neither the logs nor the prior say anything stay as they are in `present`; their
+    /// deviations and covariances are NaN.
     fn estimate(
         &self,
         design: &Design,
@@ -107,13 +114,15 @@ impl Estimator for BayesianLeastSquares {
 }
 
 impl Evidence {
-    /// What somebody else has reduced: rows of \[Φ f\] of logs that were conditioned, as `phiw identify` has them, `rate_hz` of each torque a second \[Hz\].
+    /// What somebody else has reduced: rows of \[Φ f\] of logs that were conditioned, as `phiw identify` has
+    /// them, `rate_hz` of each torque a second \[Hz\].
     pub fn of_factor(factor: GroupedFactor, rate_hz: Option<f64>) -> Self {
         let settings = super::RowsAt::Stamps.into();
         Evidence { settings, factor, instants: Vec::new(), foreseen: Vec::new(), rate_hz }
     }
 
-    /// The same of rows that have been weighted and taken together, over these `parameters` of `count`: what a `model.json` keeps.
+    /// The same of rows that have been weighted and taken together, over these `parameters` of `count`: what
+    /// a `model.json` keeps.
     ///
     /// # Errors
     /// The factor has not one column for each of the parameters.

@@ -15,9 +15,10 @@ use serde::{Deserialize, Serialize};
 pub enum RowsAt {
     /// The stamps: position, velocity and acceleration as they were measured there, as the paper has it.
     Stamps,
-    /// The middle of each period: what the motion was on average while one command was held. Position by Hermite's cubic, velocity
-    /// Δq/T, acceleration Δq̇/T, so that inertia and viscous friction balance the command exactly, however fast the motion changes within a period. Effects that are not
-    /// linear in the motion are taken as they were when the period began, so that its noise is not in them.
+    /// The middle of each period: what the motion was on average while one command was held. Position by
+    /// Hermite's cubic, velocity Δq/T, acceleration Δq̇/T, so that inertia and viscous friction balance the
+    /// command exactly, however fast the motion changes within a period. Effects that are not linear in the
+    /// motion are taken as they were when the period began, so that its noise is not in them.
     #[default]
     Periods,
 }
@@ -28,8 +29,8 @@ pub enum RowsAt {
 pub struct EvidenceSettings {
     /// Which instants become rows.
     pub rows_at: RowsAt,
-    /// Time between two instants at which the motion's sensitivity to noise is looked at \[s\]. Shorter costs time in each estimate. Default: 0.4, in which the inertia of a robot
-    /// moved by a person changes little.
+    /// Time between two instants at which the motion's sensitivity to noise is looked at \[s\]. Shorter costs
+    /// time in each estimate. Default: 0.4, in which the inertia of a robot moved by a person changes little.
     pub instant_every_s: f64,
 }
 
@@ -56,7 +57,8 @@ pub struct Instant {
     pub state: [Vec<f64>; 3],
 }
 
-/// What was measured, reduced to what estimators and selections need; it depends on the length of the logs by some instants only.
+/// What was measured, reduced to what estimators and selections need; it depends on the length of the logs by
+/// some instants only.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(into = "StoredEvidence", try_from = "StoredEvidence")]
 pub struct Evidence {
@@ -148,7 +150,8 @@ impl Evidence {
         &self.factor
     }
 
-    /// Rows a second of each torque \[Hz\]; none where they are as dense in time as those of the motions to choose from.
+    /// Rows a second of each torque \[Hz\]; none where they are as dense in time as those of the motions to
+    /// choose from.
     pub fn rate_hz(&self) -> Option<f64> {
         self.rate_hz
     }
@@ -158,7 +161,8 @@ impl Evidence {
         &self.instants
     }
 
-    /// Whether a parameter's columns are those of the periods' beginnings, which their own noise has not moved.
+    /// Whether a parameter's columns are those of the periods' beginnings, which their own noise has not
+    /// moved.
     pub(super) fn is_foreseen(&self, parameter: usize) -> bool {
         self.foreseen.get(parameter).copied().unwrap_or(false)
     }

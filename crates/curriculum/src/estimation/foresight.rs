@@ -1,19 +1,23 @@
 //! Columns that a period's own noise has not touched.
 //!
-//! Noise in a torque moves the robot within the period, and so is in the mean speed and the mean acceleration of that period. Where a column is linear in both
-//! (rigid body, viscous friction, rotor inertia) the log-determinant of the likelihood accounts for it exactly. Where it is not (a friction that turns with the sign),
-//! nothing simple does: near a reversal the sign is the noise's own, and the slope of a column that turns within 0.01 rad/s can not be told from an instant of many rows. Such a
-//! column is taken of what was known when the period began: then its product with the noise is nothing on average, whatever its form.
+//! Noise in a torque moves the robot within the period, and so is in the mean speed and the mean acceleration
+//! of that period. Where a column is linear in both (rigid body, viscous friction, rotor inertia) the
+//! log-determinant of the likelihood accounts for it exactly. Where it is not (a friction that turns with the
+//! sign), nothing simple does: near a reversal the sign is the noise's own, and the slope of a column that
+//! turns within 0.01 rad/s can not be told from an instant of many rows. Such a column is taken of what was
+//! known when the period began: then its product with the noise is nothing on average, whatever its form.
 
 use crate::{CurriculumError, Measured};
 use phiw_identification::{Design, Effect};
 use phiw_regressor::factor::FactorBuilder;
 use phiw_regressor::least_squares::{Group, GroupedFactor};
 
-/// For each parameter, whether its columns are taken of the beginning of a period: those of effects, unless they are linear in the motion. (A torque of the position alone is
-/// taken so as well: what half a period of noise adds to a position is little, but a ripple is steep.)
+/// For each parameter, whether its columns are taken of the beginning of a period: those of effects, unless
+/// they are linear in the motion. (A torque of the position alone is taken so as well: what half a period of
+/// noise adds to a position is little, but a ripple is steep.)
 ///
-/// What looks ahead can not be foreseen: a delay's rate of change has the noise of the next period in it, whenever it is taken.
+/// What looks ahead can not be foreseen: a delay's rate of change has the noise of the next period in it,
+/// whenever it is taken.
 pub(super) fn foreseen(design: &Design) -> Vec<bool> {
     of_parameters(design, |effect, parameter| effect.is_causal() && !effect.is_linear_in_motion(parameter))
 }
@@ -23,7 +27,8 @@ pub(super) fn looking_ahead(design: &Design) -> Vec<bool> {
     of_parameters(design, |effect, _| !effect.is_causal())
 }
 
-/// What is asked of each effect and each of its parameters; no for the rigid body's parameters, which come first.
+/// What is asked of each effect and each of its parameters; no for the rigid body's parameters, which come
+/// first.
 fn of_parameters(design: &Design, asked: impl Fn(&dyn Effect, usize) -> bool) -> Vec<bool> {
     let mut answers = vec![false; design.base().count()];
     for (index, effect) in design.effects().iter().enumerate() {
@@ -33,8 +38,8 @@ fn of_parameters(design: &Design, asked: impl Fn(&dyn Effect, usize) -> bool) ->
     answers
 }
 
-/// Rows of a log over its periods, columns of foreseen parameters taken of the periods' beginnings, `[row × evaluation width]`, one after the other to
-/// `take`.
+/// Rows of a log over its periods, columns of foreseen parameters taken of the periods' beginnings, `[row ×
+/// evaluation width]`, one after the other to `take`.
 ///
 /// # Errors
 /// The log is not of this robot; what `take` returns.

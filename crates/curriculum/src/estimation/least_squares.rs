@@ -9,14 +9,15 @@ use phiw_regressor::least_squares::{Group, GroupedFactor, ordinary_least_squares
 
 /// Equation (4): least squares with all rows alike.
 ///
-/// Right where the noise is in the logged torque. Where it is in the delivered one, and moves the robot, the columns of Φ
-/// are correlated with it, and the estimate is biased however long the log: inertia towards zero, friction towards the controller's
-/// own gains.
+/// Right where the noise is in the logged torque. Where it is in the delivered one, and moves the robot, the
+/// columns of Φ are correlated with it, and the estimate is biased however long the log: inertia towards
+/// zero, friction towards the controller's own gains.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LeastSquares;
 
-/// Least squares with each torque's rows weighted by the inverse of its own residual, iterated: what a robot wants whose torques
-/// differ by a factor of fifty. Biased like [`LeastSquares`] where the noise moves the robot.
+/// Least squares with each torque's rows weighted by the inverse of its own residual, iterated: what a robot
+/// wants whose torques differ by a factor of fifty. Biased like [`LeastSquares`] where the noise moves the
+/// robot.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WeightedLeastSquares;
 

@@ -38,8 +38,8 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// √(tr(R·C·Rᵀ)/rows): RMS of the standard deviation of Φ·w over the `rows` rows that the triangle R stands for. Directions of w that these rows do
-    /// not feel do not count, however little is known of them.
+    /// √(tr(R·C·Rᵀ)/rows): RMS of the standard deviation of Φ·w over the `rows` rows that the triangle R
+    /// stands for. Directions of w that these rows do not feel do not count, however little is known of them.
     pub(crate) fn uncertainty_along(&self, triangle: &Triangle, rows: usize) -> Option<f64> {
         let covariance =
             self.covariance.as_ref().filter(|covariance| covariance.nrows() == triangle.size())?;
@@ -60,7 +60,8 @@ pub trait Estimator: Send + Sync {
 
     /// The parameters of `design`.
     ///
-    /// `present` is what was believed before, with the parameters of the design: what the evidence does not determine stays as it is there.
+    /// `present` is what was believed before, with the parameters of the design: what the evidence does not
+    /// determine stays as it is there.
     ///
     /// # Errors
     /// The evidence is not of this design, or can not be solved.
@@ -72,13 +73,15 @@ pub trait Estimator: Send + Sync {
         present_parameters: &[f64],
     ) -> Result<Estimate, CurriculumError>;
 
-    /// Standard deviation of each torque's noise that it counts on \[N·m, N\]; none from an estimator that is not told.
+    /// Standard deviation of each torque's noise that it counts on \[N·m, N\]; none from an estimator that is
+    /// not told.
     fn torque_noise(&self) -> Option<&[f64]> {
         None
     }
 
-    /// −log L of parameters, but for a constant that is the same for all models of the same logs; none from an estimator that knows no
-    /// likelihood. The smaller, the better the model: effects that were found are confirmed by it.
+    /// −log L of parameters, but for a constant that is the same for all models of the same logs; none from
+    /// an estimator that knows no likelihood. The smaller, the better the model: effects that were found are
+    /// confirmed by it.
     ///
     /// # Errors
     /// The evidence is not of this design.

@@ -8,13 +8,16 @@ use phiw_regressor::least_squares::{Group, GroupedFactor};
 
 /// A Gaussian belief about parameters: those of a model, give or take a share of their magnitudes.
 ///
-/// Many a robot has combinations of parameters that its motions hardly excite. The noise then decides them, and what was believed at first, bad as it
-/// was, is nearer to the truth than what is estimated. With a prior the estimate is the mean of what the logs and the first belief say, each counted by its
-/// own certainty: where logs tell much it is theirs, where they tell nothing it is the first belief, and nothing has to decide which is which.
+/// Many a robot has combinations of parameters that its motions hardly excite. The noise then decides them,
+/// and what was believed at first, bad as it was, is nearer to the truth than what is estimated. With a prior
+/// the estimate is the mean of what the logs and the first belief say, each counted by its own certainty:
+/// where logs tell much it is theirs, where they tell nothing it is the first belief, and nothing has to
+/// decide which is which.
 ///
-/// Of a body, a mass m is uncertain by `share`·m, a first moment by `share`·m·0.2 m and a moment of inertia by `share`·m·(0.2 m)²
-/// ([`phiw_regressor::parameter_scales`]), whatever its own value: one that is zero in the model may still be wrong. Of an effect's parameter it is `share`
-/// times its value, or times the mean of its kind where that is larger. Effects that the model has not are free.
+/// Of a body, a mass m is uncertain by `share`·m, a first moment by `share`·m·0.2 m and a moment of inertia
+/// by `share`·m·(0.2 m)² ([`phiw_regressor::parameter_scales`]), whatever its own value: one that is zero in
+/// the model may still be wrong. Of an effect's parameter it is `share` times its value, or times the mean of
+/// its kind where that is larger. Effects that the model has not are free.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prior {
     /// What was believed.
@@ -23,14 +26,17 @@ pub struct Prior {
     pub share: f64,
 }
 
-/// The standard deviation of a number uniform between 0 and 2, over its mean: how wrong the paper's bad initial model is (section 5.2.1).
+/// The standard deviation of a number uniform between 0 and 2, over its mean: how wrong the paper's bad
+/// initial model is (section 5.2.1).
 const UNIFORM_SHARE: f64 = 0.577_350_269_189_625_8;
 
 impl Prior {
-    /// For the paper's bad initial model, each of whose parameters is drawn uniformly between zero and twice the truth.
+    /// For the paper's bad initial model, each of whose parameters is drawn uniformly between zero and twice
+    /// the truth.
     ///
-    /// The magnitudes are those of the draw, as nobody knows the true ones. A friction that was drawn much too small is therefore believed too firmly: single
-    /// frictions are let go by more logs only. A larger `share` lets go earlier, and guards less against the noise of few logs.
+    /// The magnitudes are those of the draw, as nobody knows the true ones. A friction that was drawn much
+    /// too small is therefore believed too firmly: single frictions are let go by more logs only. A larger
+    /// `share` lets go earlier, and guards less against the noise of few logs.
     pub fn unreliable(model: RobotModel) -> Self {
         Prior { model, share: UNIFORM_SHARE }
     }

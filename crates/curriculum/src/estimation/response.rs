@@ -1,9 +1,10 @@
 //! What the noise of one period does to the motion in it.
 //!
-//! Over a period T a torque δ that is held moves a robot with inertia A and damping F by Δq̇/T = A⁻¹·φ₁(X)·δ and Δq/T = F⁻¹·(1 − φ₁(X))·δ, X = T·A⁻¹F,
-//! φ₁(x) = (1 − e^−x)/x. These are in the columns, and the mean of a column's product with δ is what the log-determinant must have for its
-//! slope: log det A + Σ p(x) over the eigenvalues x of X, p′(x) = (1 − φ₁(x))/x. A forearm behind a large gear has an x of a half. Half a period of friction alone, log(1 + x/2), is then
-//! so far off that a thousand rows take the difference for friction.
+//! Over a period T a torque δ that is held moves a robot with inertia A and damping F by Δq̇/T = A⁻¹·φ₁(X)·δ
+//! and Δq/T = F⁻¹·(1 − φ₁(X))·δ, X = T·A⁻¹F, φ₁(x) = (1 − e^−x)/x. These are in the columns, and the mean of
+//! a column's product with δ is what the log-determinant must have for its slope: log det A + Σ p(x) over the
+//! eigenvalues x of X, p′(x) = (1 − φ₁(x))/x. A forearm behind a large gear has an x of a half. Half a period
+//! of friction alone, log(1 + x/2), is then so far off that a thousand rows take the difference for friction.
 
 use super::sensitivity::{Sensitivity, element, packed, place};
 use faer::{Mat, Side};
@@ -44,7 +45,8 @@ pub(super) struct Response {
     pub factor: Cholesky,
 }
 
-/// Inertia and damping of an instant as their eigenvectors see them: Cholesky's factor of A, x and the vectors in its frame.
+/// Inertia and damping of an instant as their eigenvectors see them: Cholesky's factor of A, x and the
+/// vectors in its frame.
 struct Modes {
     factor: Cholesky,
     values: Vec<f64>,
@@ -199,7 +201,8 @@ mod tests {
         }
     }
 
-    /// One joint with noise and nothing else, its motion solved in closed form: at the truth the slopes are the means of the columns' products with the noise.
+    /// One joint with noise and nothing else, its motion solved in closed form: at the truth the slopes are
+    /// the means of the columns' products with the noise.
     #[test]
     fn slopes_are_the_means_of_what_the_noise_does_to_the_columns() {
         for (inertia, damping, period_s) in [(0.002, 0.125, 0.01), (3.0, 0.01, 0.01), (0.01, 20.0, 0.01)] {

@@ -1,8 +1,10 @@
 //! What an effect beside the model would save of −log L, before it is fitted: the score test (Rao 1948).
 //!
-//! With g the gradient of −log L in the new parameters θ at θ = 0, and S what of their Fisher information the model's own parameters w do not take up,
-//! S = H_θθ − H_θw·H_ww⁻¹·H_wθ, −log L falls by ½gᵀS⁻¹g at θ = −S⁻¹g, once w has settled too. Under a right model twice that is χ² with as many
-//! degrees of freedom as θ has. All that it asks of a candidate are its products with what the model leaves, with the model's columns and with itself.
+//! With g the gradient of −log L in the new parameters θ at θ = 0, and S what of their Fisher information the
+//! model's own parameters w do not take up, S = H_θθ − H_θw·H_ww⁻¹·H_wθ, −log L falls by ½gᵀS⁻¹g at θ =
+//! −S⁻¹g, once w has settled too. Under a right model twice that is χ² with as many degrees of freedom as θ
+//! has. All that it asks of a candidate are its products with what the model leaves, with the model's columns
+//! and with itself.
 
 use super::foresight;
 use super::likelihood::column;
@@ -22,12 +24,13 @@ use std::ops::Range;
 pub struct Gain {
     /// The effect.
     pub effect: EffectSpec,
-    /// −log L that it saves; twice its root is how many standard deviations an effect of one parameter is from nothing.
+    /// −log L that it saves; twice its root is how many standard deviations an effect of one parameter is
+    /// from nothing.
     pub gain: f64,
     /// What its parameters would be.
     pub parameters: Vec<f64>,
-    /// What it saves less the price of its parameters; where constants were chosen, the mean over all of them (as likelihoods, not as logarithms), so
-    /// that a constant on which nothing depends costs nothing.
+    /// What it saves less the price of its parameters; where constants were chosen, the mean over all of them
+    /// (as likelihoods, not as logarithms), so that a constant on which nothing depends costs nothing.
     pub merit: f64,
 }
 
@@ -35,8 +38,9 @@ pub struct Gain {
 const CHUNK: usize = 256;
 
 impl MotionLikelihood {
-    /// What each of the `candidates` would save beside a model that has been fitted to these logs with this estimator. None for one that the model already
-    /// contains, that would break its own bounds, or whose columns look ahead in time: of those, noise that the future holds can not be told.
+    /// What each of the `candidates` would save beside a model that has been fitted to these logs with this
+    /// estimator. None for one that the model already contains, that would break its own bounds, or whose
+    /// columns look ahead in time: of those, noise that the future holds can not be told.
     ///
     /// # Errors
     /// A log or a candidate is not of this robot.
@@ -287,7 +291,8 @@ impl<'a> Score<'a> {
     }
 }
 
-/// ½gᵀS⁻¹g and −S⁻¹g; none where the model leaves less than `least_left` of a column (`squares` are those of the whole columns).
+/// ½gᵀS⁻¹g and −S⁻¹g; none where the model leaves less than `least_left` of a column (`squares` are those of
+/// the whole columns).
 fn newton(s: &Mat<f64>, g: &[f64], squares: &[f64], least_left: f64) -> Option<(f64, Vec<f64>)> {
     let factor = Cholesky::of(g.len(), |row, column| s[(row, column)])?;
     let leaves_enough = |(row, square): (usize, &f64)| factor.entry(row, row).powi(2) > least_left * square;

@@ -7,12 +7,14 @@ use faer::Mat;
 use phiw_identification::Design;
 use phiw_telemetry::Block;
 
-/// Change of speed for a central difference \[rad/s, m/s\]. Any is exact for Coriolis' terms, which are quadratic, and for viscous friction. Of a friction that
-/// turns with the sign it takes the mean slope over speeds that noise reaches within a period: an instant stands for the rows around it.
+/// Change of speed for a central difference \[rad/s, m/s\]. Any is exact for Coriolis' terms, which are
+/// quadratic, and for viscous friction. Of a friction that turns with the sign it takes the mean slope over
+/// speeds that noise reaches within a period: an instant stands for the rows around it.
 const SPEED_STEP: f64 = 0.1;
 
-/// How the torque of an instant depends on the motion: inertia A = Σ w_k·A_k = ∂τ/∂q̈ and damping T·F = Σ w_k·T·F_k = T·∂τ/∂q̇. Only the symmetric parts are
-/// kept: what Coriolis' term adds beside them is a thousandth.
+/// How the torque of an instant depends on the motion: inertia A = Σ w_k·A_k = ∂τ/∂q̈ and damping T·F = Σ
+/// w_k·T·F_k = T·∂τ/∂q̇. Only the symmetric parts are kept: what Coriolis' term adds beside them is a
+/// thousandth.
 ///
 /// Where bodies stand still, they are those of the directions N that are left: Nᵀ·A·N.
 pub(super) struct Sensitivity {
@@ -20,8 +22,8 @@ pub(super) struct Sensitivity {
     pub weight: f64,
     /// Number n of directions: all joints, or those that the standing bodies leave.
     pub directions: usize,
-    /// `packed(n)` × parameters: the lower triangle of each A_k, elements beside the diagonal times √2, so that products of columns are
-    /// traces of products.
+    /// `packed(n)` × parameters: the lower triangle of each A_k, elements beside the diagonal times √2, so
+    /// that products of columns are traces of products.
     pub inertia: Mat<f64>,
     /// The same of each T·F_k.
     pub damping: Mat<f64>,
@@ -37,15 +39,17 @@ pub(super) fn place(row: usize, column: usize) -> usize {
     row * (row + 1) / 2 + column
 }
 
-/// The element of a symmetric matrix in a packed column, in which the elements beside the diagonal are times √2; `row` ≥ `column`.
+/// The element of a symmetric matrix in a packed column, in which the elements beside the diagonal are times
+/// √2; `row` ≥ `column`.
 pub(super) fn element(packed: &[f64], row: usize, column: usize) -> f64 {
     let scale = if row == column { 1.0 } else { std::f64::consts::FRAC_1_SQRT_2 };
     scale * packed[place(row, column)]
 }
 
 impl Sensitivity {
-    /// By evaluating the design's columns around the instant: exact in the acceleration, in which they are linear. `standing` bodies do not move.
-    /// Columns that `foreseen` has are of the period's beginning, and do not move with its noise.
+    /// By evaluating the design's columns around the instant: exact in the acceleration, in which they are
+    /// linear. `standing` bodies do not move. Columns that `foreseen` has are of the period's beginning, and
+    /// do not move with its noise.
     pub fn of(
         design: &Design,
         instant: &Instant,
@@ -102,7 +106,8 @@ impl Sensitivity {
     }
 }
 
-/// The instant, then the acceleration one up along each direction, then the velocity a step up, then a step down.
+/// The instant, then the acceleration one up along each direction, then the velocity a step up, then a step
+/// down.
 fn around(directions: &Mat<f64>, instant: &Instant) -> Vec<[Vec<f64>; 3]> {
     let with = |signal: usize, direction: usize, change: f64| {
         let mut state = instant.state.clone();

@@ -36,7 +36,8 @@ pub struct MeasuredSoFar<'a> {
     pub triangle: Option<&'a Triangle>,
     /// cond(Φ) of all that had been measured after each iteration; none where something was not determined.
     pub condition_numbers: &'a [Option<f64>],
-    /// How uncertain the torques were after each iteration ([`crate::IterationRecord::torque_uncertainty`]); may be empty.
+    /// How uncertain the torques were after each iteration ([`crate::IterationRecord::torque_uncertainty`]);
+    /// may be empty.
     pub torque_uncertainties: &'a [Option<f64>],
     /// α of the first iteration; none if this is the first.
     pub first_alpha: Option<f64>,
@@ -68,7 +69,8 @@ pub struct Policy<'a> {
 pub struct Plan {
     /// The motion, and why.
     pub choice: Choice,
-    /// The two beliefs that it is to tell apart, in words; none if it is chosen for what it tells of the parameters.
+    /// The two beliefs that it is to tell apart, in words; none if it is chosen for what it tells of the
+    /// parameters.
     pub separates: Option<[String; 2]>,
     /// The motions that could be chosen, ascending.
     pub allowed: Vec<usize>,
@@ -82,12 +84,15 @@ pub struct Plan {
     pub safety: Safety,
 }
 
-/// What to do next: the constraint judges all motions, the relaxation gives α, and the selection takes one of the motions that are allowed then.
+/// What to do next: the constraint judges all motions, the relaxation gives α, and the selection takes one of
+/// the motions that are allowed then.
 ///
-/// It changes nothing and reads nothing: the same belief, measurements and policy give the same plan. [`crate::Curriculum`] and `phiw next` both follow it.
+/// It changes nothing and reads nothing: the same belief, measurements and policy give the same plan.
+/// [`crate::Curriculum`] and `phiw next` both follow it.
 ///
 /// # Errors
-/// [`CurriculumError::NothingSafe`] or [`CurriculumError::FellOnAll`] where the policy refuses; the belief or a motion is of another robot.
+/// [`CurriculumError::NothingSafe`] or [`CurriculumError::FellOnAll`] where the policy refuses; the belief or
+/// a motion is of another robot.
 pub fn plan(
     belief: &Belief<'_>,
     measured: &MeasuredSoFar<'_>,

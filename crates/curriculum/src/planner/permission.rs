@@ -7,12 +7,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NoneAllowed {
-    /// The safest motion is taken if it keeps the ZMP inside the whole region, and no motion otherwise. The default, since what is planned
-    /// may be run by a real robot.
+    /// The safest motion is taken if it keeps the ZMP inside the whole region, and no motion otherwise. The
+    /// default, since what is planned may be run by a real robot.
     #[default]
     Refuse,
-    /// The safest motion is taken even if the robot is expected to fall. For simulated robots only: the paper's experiments start from
-    /// models so wrong that nothing looks safe.
+    /// The safest motion is taken even if the robot is expected to fall. For simulated robots only: the
+    /// paper's experiments start from models so wrong that nothing looks safe.
     LeastViolation,
 }
 
@@ -27,9 +27,11 @@ pub enum Permission {
     Refused(Option<usize>),
 }
 
-/// Decides which motions may be chosen at the reduction coefficient `alpha`, from how safe each is. The robot has fallen on the `excluded` ones.
+/// Decides which motions may be chosen at the reduction coefficient `alpha`, from how safe each is. The robot
+/// has fallen on the `excluded` ones.
 ///
-/// A motion whose safety is not a number is never allowed. Of motions that are equally safe the first is forced.
+/// A motion whose safety is not a number is never allowed. Of motions that are equally safe the first is
+/// forced.
 pub fn permission(motions: &[Safety], excluded: &[usize], alpha: f64, policy: NoneAllowed) -> Permission {
     let fell = |motion: &usize| excluded.contains(motion);
     let mut open: Vec<usize> = (0..motions.len()).filter(|motion| !fell(motion)).collect();

@@ -77,7 +77,8 @@ pub enum Best {
     Largest,
 }
 
-/// The motion with the best score, and the next best. Of equals the one with the lower index comes first; scores that are not a number come last. None of no motions.
+/// The motion with the best score, and the next best. Of equals the one with the lower index comes first;
+/// scores that are not a number come last. None of no motions.
 pub fn decide(motions: &[Scored], best: Best) -> Option<Choice> {
     let mut order = motions.to_vec();
     order.sort_by(|a, b| {

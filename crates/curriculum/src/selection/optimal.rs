@@ -18,7 +18,8 @@ impl Selection for DOptimal {
     }
 }
 
-/// The smallest trace of (ΦᵀΦ)⁻¹: the smallest mean variance of the parameters, which is what RMSE_w (17) measures.
+/// The smallest trace of (ΦᵀΦ)⁻¹: the smallest mean variance of the parameters, which is what RMSE_w (17)
+/// measures.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AOptimal;
 
@@ -32,11 +33,14 @@ impl Selection for AOptimal {
     }
 }
 
-/// The smallest variance of the torques that the model will predict, on average over all motions of the dataset: what the torque error (19) measures.
+/// The smallest variance of the torques that the model will predict, on average over all motions of the
+/// dataset: what the torque error (19) measures.
 ///
-/// The paper's cond does not change when Φ is done again, so that where one motion keeps it small it is chosen again and again, though another sample of it
-/// tells little. The variance of the predictions counts both: each direction of w as much as the motions feel it, and how often it was seen. It is the
-/// I- or V-optimality of the design of experiments (Atkinson, Donev and Tobias, Optimum Experimental Designs, 2007, §10.6), over a finite set of motions.
+/// The paper's cond does not change when Φ is done again, so that where one motion keeps it small it is
+/// chosen again and again, though another sample of it tells little. The variance of the predictions counts
+/// both: each direction of w as much as the motions feel it, and how often it was seen. It is the I- or
+/// V-optimality of the design of experiments (Atkinson, Donev and Tobias, Optimum Experimental Designs, 2007,
+/// §10.6), over a finite set of motions.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TorqueOptimal;
 

@@ -11,10 +11,12 @@ const PROBES: usize = 16;
 
 /// Equation (11): the motion with which cond of all measured rows and its own is smallest.
 ///
-/// Exact, but most candidates are never merged. σ_min of the stack is at most what the stack does to any unit vector, and at most
-/// the smallest Ritz value over a subspace; the few weakest directions of what has been measured span one in which σ_min nearly lies.
-/// σ_max is at least what the stack does to the measured strongest direction. So each candidate has a lower bound of its cond for the price of
-/// a few products; candidates are merged in the order of their bounds, until the next bound is no better than the best cond found.
+/// Exact, but most candidates are never merged. σ_min of the stack is at most what the stack does to any unit
+/// vector, and at most the smallest Ritz value over a subspace; the few weakest directions of what has been
+/// measured span one in which σ_min nearly lies. σ_max is at least what the stack does to the measured
+/// strongest direction. So each candidate has a lower bound of its cond for the price of a few products;
+/// candidates are merged in the order of their bounds, until the next bound is no better than the best cond
+/// found.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SmallestCondition;
 

@@ -12,7 +12,8 @@ const CLOSED: f64 = 1e-13;
 const NEARLY_CLOSED: f64 = 1e-10;
 /// Longest Newton step \[m, rad\].
 const LONGEST: f64 = 0.3;
-/// Lever by which moments at a foot count beside its forces when a load is shared \[m\]: half of a foot's width.
+/// Lever by which moments at a foot count beside its forces when a load is shared \[m\]: half of a foot's
+/// width.
 const LEVER_M: f64 = 0.05;
 
 /// A foot that stays where it is.
@@ -34,7 +35,8 @@ pub struct Feet {
 }
 
 impl Feet {
-    /// `feet` (their bodies counted in `tree`, which has virtual joints) where the configuration `q` puts them.
+    /// `feet` (their bodies counted in `tree`, which has virtual joints) where the configuration `q` puts
+    /// them.
     ///
     /// # Errors
     /// The configuration does not fit the tree, or a foot's body is none of it.
@@ -72,7 +74,8 @@ impl Feet {
         joints
     }
 
-    /// Velocity of the soles' middles and angular velocity of the feet (six rows a foot, along the world's axes) for unit velocities of all joints.
+    /// Velocity of the soles' middles and angular velocity of the feet (six rows a foot, along the world's
+    /// axes) for unit velocities of all joints.
     fn jacobian(&self, placements: &[Placement<f64>], feet: &[usize]) -> Result<Mat<f64>, DimensionError> {
         let size = self.tree.velocity_size();
         let mut rows = vec![0.0; 6 * size];
@@ -89,8 +92,8 @@ impl Feet {
         Ok(jacobian)
     }
 
-    /// Changes the coordinates `unknown` of `[q, v, a]` so that these `feet` stay where they are: six coordinates for each. What is in them at first
-    /// is where the search begins.
+    /// Changes the coordinates `unknown` of `[q, v, a]` so that these `feet` stay where they are: six
+    /// coordinates for each. What is in them at first is where the search begins.
     ///
     /// # Errors
     /// The feet can not be there.
@@ -195,7 +198,8 @@ impl Feet {
         accelerations
     }
 
-    /// Adds J_cᵀ·f to the generalised force `force`, for what the floor gives to each foot: force, then moment about the world's origin.
+    /// Adds J_cᵀ·f to the generalised force `force`, for what the floor gives to each foot: force, then
+    /// moment about the world's origin.
     ///
     /// # Errors
     /// A slice does not fit the robot.
@@ -225,8 +229,9 @@ impl Feet {
         Ok(())
     }
 
-    /// Takes from the generalised force `force` what the feet carry of it: the virtual joints keep nothing, and of all shares between the feet that
-    /// is taken which asks least of them, moments counted over half of a foot's width. What is left is the torque of the motors.
+    /// Takes from the generalised force `force` what the feet carry of it: the virtual joints keep nothing,
+    /// and of all shares between the feet that is taken which asks least of them, moments counted over half
+    /// of a foot's width. What is left is the torque of the motors.
     ///
     /// # Errors
     /// A slice does not fit the robot.

@@ -42,7 +42,8 @@ pub struct StandingStates {
 }
 
 impl Default for StandingStates {
-    /// For a humanoid of human size. `cargo xtask paper --robot whole-body` uses them: its 30 joints give the same rank from 120 states on.
+    /// For a humanoid of human size. `cargo xtask paper --robot whole-body` uses them: its 30 joints give the
+    /// same rank from 120 states on.
     fn default() -> Self {
         StandingStates {
             count: 200,
@@ -57,11 +58,13 @@ impl Default for StandingStates {
 }
 
 impl Legs {
-    /// The robot `tree`, with virtual joints, in the configuration `posture` \[m, rad\]: its height is changed so that the first sole lies on the floor.
-    /// `feet` are counted as in the floating tree, which has no virtual joints.
+    /// The robot `tree`, with virtual joints, in the configuration `posture` \[m, rad\]: its height is
+    /// changed so that the first sole lies on the floor. `feet` are counted as in the floating tree, which
+    /// has no virtual joints.
     ///
     /// # Errors
-    /// The posture does not fit the tree, a foot is of no body, there are no feet, or a leg has not six joints.
+    /// The posture does not fit the tree, a foot is of no body, there are no feet, or a leg has not six
+    /// joints.
     pub fn new(tree: &Tree, feet: &[Foot], posture: Vec<f64>) -> Result<Self, CurriculumError> {
         check_size("the posture", posture.len(), tree.joint_count())?;
         let bodies = tree.bodies().len();
@@ -119,8 +122,9 @@ impl Legs {
             .collect()
     }
 
-    /// The motion of all joints in which the upper joints do `upper`, and the base goes against the stance as `base` says for a time \[s\]: positions
-    /// \[m, rad\], velocities and accelerations of the virtual joints. None where a leg would go beyond its limits.
+    /// The motion of all joints in which the upper joints do `upper`, and the base goes against the stance as
+    /// `base` says for a time \[s\]: positions \[m, rad\], velocities and accelerations of the virtual
+    /// joints. None where a leg would go beyond its limits.
     ///
     /// # Errors
     /// `upper` is not a motion of the [upper joints](Self::upper_joints).
@@ -159,7 +163,8 @@ impl Legs {
         Ok(Some(Motion::new(&upper.name, &upper.task, joints, upper.period_s(), signals)?))
     }
 
-    /// What motions with all feet on the floor can tell apart: less than those of a robot that may move its feet.
+    /// What motions with all feet on the floor can tell apart: less than those of a robot that may move its
+    /// feet.
     ///
     /// # Errors
     /// The legs can reach too few of the states.
@@ -189,7 +194,8 @@ impl Legs {
         Ok(BaseParameters::of_states(self.feet.tree(), reached, &MASSLESS, Default::default())?)
     }
 
-    /// Base and upper body anywhere within their reach; the legs as in the stance, from where they are to follow.
+    /// Base and upper body anywhere within their reach; the legs as in the stance, from where they are to
+    /// follow.
     fn random_state(&self, states: &StandingStates, random: &mut ChaCha8Rng) -> [Vec<f64>; 3] {
         let tree = self.feet.tree();
         let joints = tree.joint_count();
@@ -207,7 +213,8 @@ impl Legs {
     }
 }
 
-/// Anywhere between the limits \[rad, m\]; for a joint without them, half a turn or half a metre to both sides.
+/// Anywhere between the limits \[rad, m\]; for a joint without them, half a turn or half a metre to both
+/// sides.
 fn random_position(tree: &Tree, joint: usize, random: &mut ChaCha8Rng) -> f64 {
     let body = tree.joint(joint);
     let most = if body.joint_type == JointType::Prismatic { 0.5 } else { PI };

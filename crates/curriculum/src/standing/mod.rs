@@ -1,4 +1,5 @@
-//! A robot on its feet: its base is six more joints that nothing drives, and what the floor gives to its feet is measured.
+//! A robot on its feet: its base is six more joints that nothing drives, and what the floor gives to its feet
+//! is measured.
 
 mod feet;
 mod legs;

@@ -1,8 +1,9 @@
 //! A floating base as a chain of six joints without motors (Mistry, Schaal & Yamane 2009).
 //!
-//! A base that floats has seven coordinates and six velocities in its own frame. As a chain of three slides and three hinges without mass it has six of each,
-//! like all other joints, and everything that is made for a robot on a fixed base works for it: the "torque" of a virtual joint is the
-//! part of the floor's wrench along it. The price is a singularity where the base leans by 90°, long after a fall.
+//! A base that floats has seven coordinates and six velocities in its own frame. As a chain of three slides
+//! and three hinges without mass it has six of each, like all other joints, and everything that is made for a
+//! robot on a fixed base works for it: the "torque" of a virtual joint is the part of the floor's wrench
+//! along it. The price is a singularity where the base leans by 90°, long after a fall.
 
 use phiw_dynamics::Mat3;
 use std::fmt::Write;
@@ -12,7 +13,8 @@ pub const VIRTUAL_JOINTS: [&str; 6] = ["base_x", "base_y", "base_z", "base_yaw",
 
 const AXES: [&str; 6] = ["1 0 0", "0 1 0", "0 0 1", "0 0 1", "0 1 0", "1 0 0"];
 
-/// The URDF with the virtual joints before its root link, to be read with a fixed base. Bodies 0 to 4 of the tree have no mass, body 5 is the root.
+/// The URDF with the virtual joints before its root link, to be read with a fixed base. Bodies 0 to 4 of the
+/// tree have no mass, body 5 is the root.
 ///
 /// None if the text does not end like a URDF, or has such joints already.
 pub fn with_virtual_base(urdf: &str, root_link: &str) -> Option<String> {
@@ -39,7 +41,8 @@ pub fn with_virtual_base(urdf: &str, root_link: &str) -> Option<String> {
     Some(text + "</robot>" + rest)
 }
 
-/// Positions and velocities of the virtual joints for the seven coordinates of a floating base and its velocity in its own frame, linear then angular.
+/// Positions and velocities of the virtual joints for the seven coordinates of a floating base and its
+/// velocity in its own frame, linear then angular.
 pub fn base_coordinates(base: &[f64; 7], velocity: &[f64; 6]) -> [[f64; 6]; 2] {
     let [x, y, z, quaternion @ ..] = *base;
     let Mat3(r) = Mat3::from_quaternion(quaternion);
@@ -62,7 +65,8 @@ mod tests {
 
     const URDF: &str = include_str!("../../../../models/humanoid30.urdf");
 
-    /// The chain and the floating base are the same robot: places of all links, and the torques of its joints.
+    /// The chain and the floating base are the same robot: places of all links, and the torques of its
+    /// joints.
     #[test]
     fn the_chain_moves_like_a_floating_base() {
         let floating =
@@ -88,7 +92,8 @@ mod tests {
             for (one, other) in places.iter().zip(&others[5..]) {
                 assert!((0..3).all(|k| (one.translation.0[k] - other.translation.0[k]).abs() < 1e-9));
             }
-            // Velocity products and gravity: with the accelerations that the free fall of one gives, the other needs no force either.
+            // Velocity products and gravity: with the accelerations that the free fall of one gives, the
+            // other needs no force either.
             let mut falling = vec![0.0; floating.velocity_size()];
             let still = vec![0.0; floating.velocity_size()];
             floating

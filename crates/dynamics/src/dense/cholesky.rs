@@ -14,7 +14,8 @@ fn place(row: usize, column: usize) -> usize {
 }
 
 impl Cholesky {
-    /// Of the matrix whose elements on and below the diagonal are `entry(row, column)`; none if it is not positive definite.
+    /// Of the matrix whose elements on and below the diagonal are `entry(row, column)`; none if it is not
+    /// positive definite.
     pub fn of(size: usize, entry: impl Fn(usize, usize) -> f64) -> Option<Self> {
         let mut lower = vec![0.0; size * (size + 1) / 2];
         for row in 0..size {

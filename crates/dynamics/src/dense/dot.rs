@@ -1,6 +1,7 @@
 //! The scalar product.
 
-/// Numbers that are summed side by side: two registers of four, since one sum alone would have to wait for itself.
+/// Numbers that are summed side by side: two registers of four, since one sum alone would have to wait for
+/// itself.
 const LANES: usize = 8;
 
 /// Σ left·right, as far as both go.

@@ -1,8 +1,10 @@
-//! A = L·D·Lᵀ of a symmetric positive definite matrix: Cholesky without square roots, so that it runs on any scalar.
+//! A = L·D·Lᵀ of a symmetric positive definite matrix: Cholesky without square roots, so that it runs on any
+//! scalar.
 
 use crate::Scalar;
 
-/// Solves `A·x = b`: `x` replaces `b`; the factor replaces the lower triangle of `A` (size × size, row by row).
+/// Solves `A·x = b`: `x` replaces `b`; the factor replaces the lower triangle of `A` (size × size, row by
+/// row).
 ///
 /// A singular matrix gives infinities or NaN.
 #[inline(always)]

@@ -1,7 +1,7 @@
 //! What a text asks for, before any parser sees it: sizes, depth and counts in one pass without memory.
 //!
-//! A parser that recurses, compares every attribute with every other, or expands entities is at the mercy of the text. This pass over-estimates where the
-//! text is no XML: the parser then says what is wrong with it.
+//! A parser that recurses, compares every attribute with every other, or expands entities is at the mercy of
+//! the text. This pass over-estimates where the text is no XML: the parser then says what is wrong with it.
 
 use super::UrdfError;
 use phiw_limits::Limits;

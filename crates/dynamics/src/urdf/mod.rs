@@ -1,8 +1,8 @@
 //! Robots from URDF files, and back.
 //!
-//! [`read_urdf`] builds the [`Tree`] and tells what in the file should not be trusted ([`Finding`]): a URDF without
-//! inertials, with massless links or impossible inertias is read all the same. [`write_identified_urdf`] writes the
-//! tree's parameters into the URDF that it came from.
+//! [`read_urdf`] builds the [`Tree`] and tells what in the file should not be trusted ([`Finding`]): a URDF
+//! without inertials, with massless links or impossible inertias is read all the same.
+//! [`write_identified_urdf`] writes the tree's parameters into the URDF that it came from.
 
 mod assemble;
 mod error;
@@ -31,8 +31,8 @@ use std::path::Path;
 /// How to read a URDF.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct UrdfOptions {
-    /// The root link floats: it becomes body 0 and keeps its inertia. A `floating` joint alone behind the root link
-    /// has the same effect.
+    /// The root link floats: it becomes body 0 and keeps its inertia. A `floating` joint alone behind the
+    /// root link has the same effect.
     pub floating_base: bool,
     /// Joints that are fixed, and at which position \[rad, m\]; what they carry is merged into their parent.
     pub held: Vec<(String, f64)>,
@@ -49,12 +49,13 @@ pub struct UrdfReading {
 
 /// Reads a robot from the text of a URDF.
 ///
-/// Joints are in depth-first order, children in the order of the file. Links behind fixed and held joints are merged
-/// into the moving link before them; on a fixed base what is fixed to the world is left out, since no joint feels it.
+/// Joints are in depth-first order, children in the order of the file. Links behind fixed and held joints are
+/// merged into the moving link before them; on a fixed base what is fixed to the world is left out, since no
+/// joint feels it.
 ///
 /// # Errors
-/// The text is not a URDF, its links are not a tree, a joint is of a type that is not supported, a name is unknown, a
-/// number is not finite, or nothing moves.
+/// The text is not a URDF, its links are not a tree, a joint is of a type that is not supported, a name is
+/// unknown, a number is not finite, or nothing moves.
 pub fn read_urdf(xml: &str, options: &UrdfOptions) -> Result<UrdfReading, UrdfError> {
     let limits = Limits::default();
     guard::check(xml, &limits)?;

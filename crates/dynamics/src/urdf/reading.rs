@@ -1,7 +1,7 @@
 //! From the document to the robot that it describes.
 //!
-//! Only what the dynamics need is read: a `<visual>` or a `<transmission>` may hold anything. What the format lets a
-//! file leave out has the format's default.
+//! Only what the dynamics need is read: a `<visual>` or a `<transmission>` may hold anything. What the format
+//! lets a file leave out has the format's default.
 
 use super::UrdfError;
 use super::robot::{Inertial, Joint, JointKind, Limit, Link, Mimic, Pose, Robot, TENSOR};
@@ -11,7 +11,8 @@ use roxmltree::{Document, Node};
 /// The axis of a joint that gives none.
 const DEFAULT_AXIS: [f64; 3] = [1.0, 0.0, 0.0];
 
-/// Above this sine of the pitch, roll and yaw turn about the same axis, and roll is taken as zero; as urdfdom does.
+/// Above this sine of the pitch, roll and yaw turn about the same axis, and roll is taken as zero; as urdfdom
+/// does.
 const VERTICAL_PITCH: f64 = 0.99999;
 
 /// Reads the robot's links and joints.
@@ -223,7 +224,8 @@ fn pose(element: Part) -> Result<Pose, UrdfError> {
     }
 }
 
-/// The angles of a quaternion (x, y, z, w) of any length, with urdfdom's formulas; zero for a quaternion of zeros.
+/// The angles of a quaternion (x, y, z, w) of any length, with urdfdom's formulas; zero for a quaternion of
+/// zeros.
 fn roll_pitch_yaw(quaternion: [f64; 4]) -> [f64; 3] {
     let norm = quaternion.iter().map(|x| x * x).sum::<f64>().sqrt();
     if !norm.is_finite() {

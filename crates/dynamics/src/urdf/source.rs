@@ -41,7 +41,8 @@ pub(super) fn line(element: Node) -> u32 {
     element.document().text_pos_at(element.range().start).row
 }
 
-/// The element's children of that tag, each with the line at which it starts: [`line`] of one after the other would go through the text each time.
+/// The element's children of that tag, each with the line at which it starts: [`line`] of one after the other
+/// would go through the text each time.
 pub(super) fn children_with_lines<'a, 'input>(
     element: Node<'a, 'input>,
     tag: &str,

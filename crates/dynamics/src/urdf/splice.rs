@@ -92,7 +92,8 @@ impl<'a> Splices<'a> {
         })
     }
 
-    /// Line break and indentation for a new child: that of the first child, or one level more than the element.
+    /// Line break and indentation for a new child: that of the first child, or one level more than the
+    /// element.
     fn line_break_inside(&self, element: Node) -> Option<String> {
         match element.first_element_child() {
             Some(sibling) => self.line_break_before(sibling).map(str::to_owned),

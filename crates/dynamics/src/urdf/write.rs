@@ -23,13 +23,13 @@ pub struct JointFriction {
 
 /// The URDF with the tree's parameters in the place of its own, and with the frictions given.
 ///
-/// The parameters of a body go to the link that its joint carries. Links merged into it, behind fixed or held joints,
-/// lose their `<inertial>`, as they are counted there. Everything else (comments, meshes, white space) stays as it is.
-/// Read again with the same options, the result gives the same tree.
+/// The parameters of a body go to the link that its joint carries. Links merged into it, behind fixed or held
+/// joints, lose their `<inertial>`, as they are counted there. Everything else (comments, meshes, white
+/// space) stays as it is. Read again with the same options, the result gives the same tree.
 ///
 /// # Errors
-/// The text is not the URDF that the tree was read from, a number is not finite, or a body has a first moment but no
-/// mass: URDF has a centre of mass instead, and cannot express that.
+/// The text is not the URDF that the tree was read from, a number is not finite, or a body has a first moment
+/// but no mass: URDF has a centre of mass instead, and cannot express that.
 pub fn write_identified_urdf(
     original_xml: &str,
     tree: &Tree,

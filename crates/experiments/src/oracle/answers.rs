@@ -4,8 +4,8 @@ use phiw_dynamics::random_tree::{RandomNumbers, random_state};
 use phiw_dynamics::{DimensionError, PARAMETERS_PER_BODY, Placement, Tree, Workspace};
 use phiw_regressor::JointTorqueRegressor;
 
-/// What is compared: total mass and standard parameters as read from the URDF; joint torque regressor, inverse
-/// dynamics, mass matrix, forward dynamics and centre of mass in every state.
+/// What is compared: total mass and standard parameters as read from the URDF; joint torque regressor,
+/// inverse dynamics, mass matrix, forward dynamics and centre of mass in every state.
 pub const QUANTITIES: [&str; 7] = ["mass", "parameters", "regressor", "rnea", "crba", "aba", "com"];
 
 /// Numbers, row by row: a row is what one state (or one body) has.

@@ -63,7 +63,8 @@ pub fn from_files(workspace: &Path) -> anyhow::Result<Vec<Case>> {
     Ok(cases)
 }
 
-/// Random robots of 5 to 30 joints with fixed links, every other one with mimic joints; their files go into `folder`.
+/// Random robots of 5 to 30 joints with fixed links, every other one with mimic joints; their files go into
+/// `folder`.
 ///
 /// # Errors
 /// A file cannot be written.

@@ -5,7 +5,8 @@ use super::answers::Answer;
 /// Scale below which numbers are compared absolutely, so that a zero can be compared at all.
 const SMALL: f64 = 1e-12;
 
-/// Largest over all rows of |ours − theirs|max over |theirs|max; infinite if the sizes differ or a number is not finite.
+/// Largest over all rows of |ours − theirs|max over |theirs|max; infinite if the sizes differ or a number is
+/// not finite.
 pub fn relative_difference(ours: &Answer, theirs: &[f64]) -> f64 {
     if ours.values.len() != theirs.len() {
         return f64::INFINITY;

@@ -1,18 +1,22 @@
-//! `cargo xtask oracle`: this workspace's dynamics against Pinocchio's, robot by robot, and its C3D reader against ezc3d's.
+//! `cargo xtask oracle`: this workspace's dynamics against Pinocchio's, robot by robot, and its C3D reader
+//! against ezc3d's.
 //!
 //! # What it asks
 //!
-//! Whether independent programs compute the same. Regressor, inverse dynamics, mass matrix, forward dynamics and centre of mass are compared at random states of
-//! every robot at hand and of random ones, on fixed and floating bases; C3D files coordinate by coordinate.
+//! Whether independent programs compute the same. Regressor, inverse dynamics, mass matrix, forward dynamics
+//! and centre of mass are compared at random states of every robot at hand and of random ones, on fixed and
+//! floating bases; C3D files coordinate by coordinate.
 //!
 //! # How it is run
 //!
-//! `cargo xtask oracle`, or one part of it: `cargo xtask oracle dynamics`, `cargo xtask oracle c3d`. It needs Python 3.10 or later, and a network the first time:
-//! Pinocchio and ezc3d are installed from PyPI, pinned. For this reason it is not part of `cargo xtask test`.
+//! `cargo xtask oracle`, or one part of it: `cargo xtask oracle dynamics`, `cargo xtask oracle c3d`. It needs
+//! Python 3.10 or later, and a network the first time: Pinocchio and ezc3d are installed from PyPI, pinned.
+//! For this reason it is not part of `cargo xtask test`.
 //!
 //! # What it prints
 //!
-//! A table of the largest relative differences, by robot and quantity. The exit status is not 0 if one is above 1e-9, or a C3D file is not read alike.
+//! A table of the largest relative differences, by robot and quantity. The exit status is not 0 if one is
+//! above 1e-9, or a C3D file is not read alike.
 //!
 //! # Where results go
 //!

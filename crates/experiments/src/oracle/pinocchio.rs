@@ -44,7 +44,8 @@ impl Oracle {
         &self.version
     }
 
-    /// Pinocchio's answers, one for each of [`QUANTITIES`]; `None` for the accelerations of a singular mass matrix.
+    /// Pinocchio's answers, one for each of [`QUANTITIES`]; `None` for the accelerations of a singular mass
+    /// matrix.
     ///
     /// # Errors
     /// The script fails, or a file cannot be written or read.

@@ -12,8 +12,8 @@ pub struct Python {
 }
 
 impl Python {
-    /// Makes an environment of this name in the build folder, or completes the one that is there, with the packages that `pinned`
-    /// lists as pip does.
+    /// Makes an environment of this name in the build folder, or completes the one that is there, with the
+    /// packages that `pinned` lists as pip does.
     ///
     /// # Errors
     /// There is no Python, or pip cannot install.

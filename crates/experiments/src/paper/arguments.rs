@@ -56,7 +56,8 @@ pub struct RunArguments {
     /// The motions: those embedded, or the seated set of the shared data.
     #[arg(long, default_value = "embedded", conflicts_with = "motions")]
     pub dataset: Source,
-    /// A folder of motions of this robot, as `phiw retarget` writes them; what is before the first `_` in a name is its task.
+    /// A folder of motions of this robot, as `phiw retarget` writes them; what is before the first `_` in a
+    /// name is its task.
     #[arg(long, value_name = "DIR")]
     pub motions: Option<PathBuf>,
     /// So many of the embedded motions of each task; all of them without it.
@@ -80,11 +81,12 @@ pub struct RunArguments {
     /// How parameters are estimated.
     #[arg(long, default_value = "likelihood")]
     pub estimator: EstimatorName,
-    /// What the estimate falls back on where the logs tell little. Without it: the initial model for the robot on its feet, nothing for the others, as in the
-    /// paper. For the likelihood only.
+    /// What the estimate falls back on where the logs tell little. Without it: the initial model for the
+    /// robot on its feet, nothing for the others, as in the paper. For the likelihood only.
     #[arg(long)]
     pub prior: Option<PriorName>,
-    /// What α follows. Without it: the torques' uncertainty for the robot on its feet, cond(Φ) for the others, as in the paper.
+    /// What α follows. Without it: the torques' uncertainty for the robot on its feet, cond(Φ) for the
+    /// others, as in the paper.
     #[arg(long)]
     pub relaxation: Option<RelaxationName>,
     /// Standard deviation of the torque noise over the torque limit.

@@ -41,7 +41,8 @@ pub enum Outcome {
     Stopped,
 }
 
-/// All runs that the arguments ask for, seed by seed, so that an interrupted experiment has some of every arm.
+/// All runs that the arguments ask for, seed by seed, so that an interrupted experiment has some of every
+/// arm.
 pub fn all(arguments: &RunArguments) -> Vec<Job> {
     let mut jobs = Vec::new();
     let kinds = arguments.secret.iter().copied().map(Some);

@@ -19,7 +19,8 @@ use std::path::{Path, PathBuf};
 pub enum Source {
     /// The synthetic motions of the paper's twelve tasks.
     Embedded,
-    /// The seated set of the shared data: two-handed motions made of its trials, and single trials up to the paper's 110.
+    /// The seated set of the shared data: two-handed motions made of its trials, and single trials up to the
+    /// paper's 110.
     UeAdl,
 }
 

@@ -46,7 +46,8 @@ impl Results {
         self.runs.iter().filter(move |run| run.footing == footing && run.arm == arm && run.secret.is_none())
     }
 
-    /// Whether there are runs that are comparable with the paper's: of a plant without a secret, and with a model that does not grow.
+    /// Whether there are runs that are comparable with the paper's: of a plant without a secret, and with a
+    /// model that does not grow.
     pub fn compared(&self) -> bool {
         self.runs.iter().any(|run| run.secret.is_none() && run.arm != Arm::Closed)
     }

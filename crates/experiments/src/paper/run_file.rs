@@ -55,8 +55,8 @@ impl RunFile {
         }
     }
 
-    /// Writes the run. JSON, since its numbers come back to the last bit (the shortest digits that do), every tool reads it, and what is
-    /// large in it goes when the run is done.
+    /// Writes the run. JSON, since its numbers come back to the last bit (the shortest digits that do), every
+    /// tool reads it, and what is large in it goes when the run is done.
     ///
     /// # Errors
     /// The file can not be written.
@@ -87,7 +87,8 @@ pub fn all(out: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Writes a file under another name and renames it: whoever finds it finds all of it, whenever this program is killed.
+/// Writes a file under another name and renames it: whoever finds it finds all of it, whenever this program
+/// is killed.
 ///
 /// # Errors
 /// The file can not be written.

@@ -56,7 +56,8 @@ impl Setup {
         Ok(torque_error(std::slice::from_ref(evidence.factor()), &model.parameters(&self.robot)?)?)
     }
 
-    /// Scores a belief, and what simpler estimators would make of the same logs. `validation` are the held-out motions of the plant.
+    /// Scores a belief, and what simpler estimators would make of the same logs. `validation` are the
+    /// held-out motions of the plant.
     ///
     /// # Errors
     /// The belief is not of this robot.

@@ -136,7 +136,8 @@ const SECRET_STREAM: u64 = 1;
 const SILENT: f64 = 1e-3;
 
 impl Setup {
-    /// Reads robot and motions, retargets what is not there, and measures the validation motions. `console` shows how far that is.
+    /// Reads robot and motions, retargets what is not there, and measures the validation motions. `console`
+    /// shows how far that is.
     ///
     /// # Errors
     /// Something is not there or does not read.
@@ -223,7 +224,8 @@ impl Setup {
         Ok(Validation { logs, declared })
     }
 
-    /// Where motions are tried: the robot in an engine with noise, and with what is in it that nobody declared. One with legs always stands.
+    /// Where motions are tried: the robot in an engine with noise, and with what is in it that nobody
+    /// declared. One with legs always stands.
     pub fn trial_ground(
         &self,
         backend: Engine,
@@ -295,7 +297,8 @@ impl Setup {
         }
     }
 
-    /// The held-out motions, run with the true model and without noise (section 5.1, equation 19): what is left of the error is the model's.
+    /// The held-out motions, run with the true model and without noise (section 5.1, equation 19): what is
+    /// left of the error is the model's.
     ///
     /// # Errors
     /// The robot can not be run.
@@ -354,7 +357,8 @@ impl Setup {
     }
 }
 
-/// What the estimate falls back on and what α follows, unless they are asked for. The paper's robot is excited well, and its method is the paper's.
+/// What the estimate falls back on and what α follows, unless they are asked for. The paper's robot is
+/// excited well, and its method is the paper's.
 fn method(arguments: &RunArguments, subject: &Subject) -> (PriorName, RelaxationName) {
     let (prior, relaxation) = match subject.standing {
         Some(_) => (PriorName::Initial, RelaxationName::Uncertainty),

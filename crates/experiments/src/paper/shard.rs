@@ -38,7 +38,8 @@ pub fn part<T>(jobs: Vec<T>, shard: Option<Shard>) -> Vec<T> {
 /// Copies the runs of all shards into one folder.
 ///
 /// # Errors
-/// The shards are of different settings, have the same run with different content, or a file can not be copied.
+/// The shards are of different settings, have the same run with different content, or a file can not be
+/// copied.
 pub fn merge(shards: &[PathBuf], out: &Path) -> anyhow::Result<()> {
     let settings = Settings::read(&shards[0])?;
     for shard in shards {
@@ -67,7 +68,8 @@ pub fn merge(shards: &[PathBuf], out: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes a job array to standard output: each task is a shard in the same folder, and a last job takes them together.
+/// Writes a job array to standard output: each task is a shard in the same folder, and a last job takes them
+/// together.
 ///
 /// # Errors
 /// The command line of this program is not text.

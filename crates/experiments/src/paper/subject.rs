@@ -18,8 +18,8 @@ use std::path::PathBuf;
 pub enum SubjectName {
     /// models/upper_body18.urdf, on a pedestal that stands free.
     UpperBody18,
-    /// The Torobo of the shared data, as in the paper. Its file knows neither the weight of its base nor what it stands on: 25 kg on a square of
-    /// 0.4 m are taken.
+    /// The Torobo of the shared data, as in the paper. Its file knows neither the weight of its base nor what
+    /// it stands on: 25 kg on a square of 0.4 m are taken.
     Torobo,
     /// models/humanoid30.urdf on its own feet, with a base that floats.
     WholeBody,
@@ -27,7 +27,8 @@ pub enum SubjectName {
 
 /// Joints of the 20-joint Torobo that the paper's robot has not.
 const HELD: [&str; 2] = ["torso/joint_3", "head/joint_1"];
-/// Viscous friction: share of the torque limit that it takes at the speed limit. A real drive has some percent.
+/// Viscous friction: share of the torque limit that it takes at the speed limit. A real drive has some
+/// percent.
 pub const VISCOUS_SHARE: f64 = 0.02;
 /// The fastest that a joint is taken to be [rad/s]; the Torobo's file has placeholders.
 pub const FASTEST: f64 = 4.0;
@@ -54,7 +55,8 @@ pub struct Subject {
     pub viscous: Vec<f64>,
     /// K_p and K_d.
     pub gains: Gains,
-    /// Its legs on the floor, for a robot with legs. `tree` then has virtual joints for the base; `viscous` and `gains` are of the motors.
+    /// Its legs on the floor, for a robot with legs. `tree` then has virtual joints for the base; `viscous`
+    /// and `gains` are of the motors.
     pub standing: Option<Standing>,
 }
 
@@ -144,7 +146,8 @@ impl Subject {
         World { feet: self.feet.clone(), ..World::default() }
     }
 
-    /// Standard deviation of the torques' noise \[N·m\], as a share of the limits; of virtual joints that of the sensors under the feet.
+    /// Standard deviation of the torques' noise \[N·m\], as a share of the limits; of virtual joints that of
+    /// the sensors under the feet.
     pub fn torque_noise(&self, share: f64) -> Vec<f64> {
         let base = self.standing.as_ref().map(Standing::base_noise);
         let noise = |joint: usize| match base.as_ref().and_then(|base| base.get(joint)) {
@@ -154,8 +157,9 @@ impl Subject {
         (0..self.tree.joint_count()).map(noise).collect()
     }
 
-    /// What the rows of each torque are multiplied with before motions are compared: 1 as in the paper. On feet the rows of the base are of other
-    /// units and a hundred times sharper, so there each is counted in its own noise.
+    /// What the rows of each torque are multiplied with before motions are compared: 1 as in the paper. On
+    /// feet the rows of the base are of other units and a hundred times sharper, so there each is counted in
+    /// its own noise.
     pub fn row_weights(&self, share: f64) -> Vec<f64> {
         match self.standing {
             Some(_) => self.torque_noise(share).iter().map(|noise| 1.0 / noise).collect(),

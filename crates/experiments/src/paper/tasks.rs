@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 /// Initial models that are asked.
 const INITIAL_MODELS: u64 = 20;
 
-/// The paper's open and scoop where there are such. Else, as the paper chose them, two that could be selected in the first iteration: of those motions that initial models
-/// allow, most belong to them.
+/// The paper's open and scoop where there are such. Else, as the paper chose them, two that could be selected
+/// in the first iteration: of those motions that initial models allow, most belong to them.
 ///
 /// # Errors
 /// The motions are not of this robot.

@@ -11,7 +11,8 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Writes `iterations.csv`, `parameters.csv`, `motions.csv`, `numbers.csv`, `secrets.csv` and `detection.csv`.
+/// Writes `iterations.csv`, `parameters.csv`, `motions.csv`, `numbers.csv`, `secrets.csv` and
+/// `detection.csv`.
 ///
 /// # Errors
 /// A file can not be written.

@@ -26,7 +26,8 @@ const USED: [f64; 2] = [0.6, 0.7];
 /// Gains that are small, so that tracking is poor.
 const GAINS: GainSettings =
     GainSettings { bandwidth: 8.0, stiffness: 0.15, held_inertia: 0.04, held_friction: 0.0 };
-/// Least inertia of a rotor behind its gear, over the effort limit \[kg·m²/(N·m)\]: in light joints it outweighs the link.
+/// Least inertia of a rotor behind its gear, over the effort limit \[kg·m²/(N·m)\]: in light joints it
+/// outweighs the link.
 const ROTOR: f64 = 1e-3;
 /// Postures over which a joint's least inertia is sought.
 const POSES: usize = 50;
@@ -140,7 +141,8 @@ impl Case {
     /// Simulates, traces and scores.
     ///
     /// # Errors
-    /// The plant can not be built or run, or a file cannot be written. A tracer that fails is a score, not an error.
+    /// The plant can not be built or run, or a file cannot be written. A tracer that fails is a score, not an
+    /// error.
     pub fn run(&self, robot: &Robot, tracer: &Tracer, arguments: &Arguments) -> anyhow::Result<Scored> {
         let temporary = tempfile::tempdir()?;
         let name = format!("{:?}_{}_{}", self.engine, self.kind.name(), self.seed).to_lowercase();
@@ -180,7 +182,8 @@ impl Case {
         Ok(score(self, &secret_joints, report, tracking, [simulated_s, traced_s]))
     }
 
-    /// Runs a plant through the motions and writes its logs. Returns the largest RMS tracking error of a joint \[rad\].
+    /// Runs a plant through the motions and writes its logs. Returns the largest RMS tracking error of a
+    /// joint \[rad\].
     #[allow(clippy::too_many_arguments, reason = "what a log is made of")]
     fn log(
         &self,

@@ -2,25 +2,27 @@
 //!
 //! # What it asks
 //!
-//! Whether `phiw explain` finds an undeclared effect where robots are robots: in the closed loop of a physics engine, where the controller tracks poorly, the
-//! actuators add noise that no log shows, and the effect changes the motion itself. Each case is the 18-joint upper body with one secret effect of 12 to 30 %
-//! of a joint's RMS torque; kind, joint and size follow from the seed, the same in all engines. The answer of `phiw explain`, a program of its own that sees
-//! files only, is held against the truth.
+//! Whether `phiw explain` finds an undeclared effect where robots are robots: in the closed loop of a physics
+//! engine, where the controller tracks poorly, the actuators add noise that no log shows, and the effect
+//! changes the motion itself. Each case is the 18-joint upper body with one secret effect of 12 to 30 % of a
+//! joint's RMS torque; kind, joint and size follow from the seed, the same in all engines. The answer of
+//! `phiw explain`, a program of its own that sees files only, is held against the truth.
 //!
 //! # How it is run
 //!
-//! `cargo xtask plant` takes twelve kinds, two cases of each, in MuJoCo and Rapier. MuJoCo's library must be there (`cargo xtask mujoco`); `--engine rapier` does
-//! without. `--all-kinds` adds the kinds that show against a model from before only.
+//! `cargo xtask plant` takes twelve kinds, two cases of each, in MuJoCo and Rapier. MuJoCo's library must be
+//! there (`cargo xtask mujoco`); `--engine rapier` does without. `--all-kinds` adds the kinds that show
+//! against a model from before only.
 //!
 //! # What it prints
 //!
-//! A table of the kinds: how often kind and joints were named, what else was named, the error over the noise floor before and after; then every case that
-//! went wrong.
+//! A table of the kinds: how often kind and joints were named, what else was named, the error over the noise
+//! floor before and after; then every case that went wrong.
 //!
 //! # Where results go
 //!
-//! Into `target/plant` below the working directory, or where `--out` says: `score.md` (what is printed), `cases.json` and `cases.csv`. `--keep DIR` keeps each
-//! case's files.
+//! Into `target/plant` below the working directory, or where `--out` says: `score.md` (what is printed),
+//! `cases.json` and `cases.csv`. `--keep DIR` keeps each case's files.
 
 pub(crate) mod case;
 pub(crate) mod engine;
@@ -54,8 +56,8 @@ pub struct Arguments {
     /// Cases of each kind and engine.
     #[arg(long, default_value_t = 2)]
     count: u64,
-    /// Standard deviation of the torque that actuators add unlogged, over the effort limit. (A wrist's usual torque is a hundredth of its limit: a few thousandths
-    /// of the limit are a good part of that.)
+    /// Standard deviation of the torque that actuators add unlogged, over the effort limit. (A wrist's usual
+    /// torque is a hundredth of its limit: a few thousandths of the limit are a good part of that.)
     #[arg(long, default_value_t = 0.002)]
     noise: f64,
     /// Time between two rows of the log, and between two commands of the controller, in seconds.

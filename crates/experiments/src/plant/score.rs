@@ -44,7 +44,8 @@ pub struct Scored {
     pub named: Vec<String>,
     /// The verdict, or why the tracer failed.
     pub verdict: String,
-    /// Held-out RMSE over the noise floor before and after, of the secret's joint that was farthest over its floor before.
+    /// Held-out RMSE over the noise floor before and after, of the secret's joint that was farthest over its
+    /// floor before.
     pub over_floor: Option<[f64; 2]>,
     /// That joint.
     pub worst_joint: Option<String>,
@@ -92,7 +93,8 @@ pub fn score(
     scored
 }
 
-/// The named effects; a kind named on several joints one after another is one effect, but for those of pairs of joints.
+/// The named effects; a kind named on several joints one after another is one effect, but for those of pairs
+/// of joints.
 fn merged(report: &Report) -> Vec<(String, BTreeSet<String>)> {
     let mut all: Vec<(String, BTreeSet<String>)> = Vec::new();
     for effect in &report.effects {
@@ -126,8 +128,8 @@ fn outcome(kind: &str, joints: &[String], report: &Report) -> Outcome {
     }
 }
 
-/// The joint, of these or of all if there are none, whose held-out error was the most times its floor, and that error over the
-/// floor before and after.
+/// The joint, of these or of all if there are none, whose held-out error was the most times its floor, and
+/// that error over the floor before and after.
 fn worst(report: &Report, joints: &[String]) -> Option<(String, [f64; 2])> {
     let over = |errors: &BTreeMap<String, f64>, joint: &str| -> Option<f64> {
         Some(errors.get(joint)? / report.noise_floor.get(joint)?)

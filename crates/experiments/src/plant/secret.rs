@@ -35,7 +35,8 @@ pub enum SecretKind {
     GravityTilt,
 }
 
-/// The experiment of the issue: twelve kinds that show in logs of one motion each, without a model from before.
+/// The experiment of the issue: twelve kinds that show in logs of one motion each, without a model from
+/// before.
 pub const TWELVE: [SecretKind; 12] = [
     SecretKind::CoulombFriction,
     SecretKind::AsymmetricFriction,
@@ -87,7 +88,8 @@ impl SecretKind {
         matches!(self, SecretKind::Payload | SecretKind::GravityTilt)
     }
 
-    /// Draws an effect for motions that go through `samples` (`[q, v, a, torque]` of all joints, from the references).
+    /// Draws an effect for motions that go through `samples` (`[q, v, a, torque]` of all joints, from the
+    /// references).
     pub fn draw(self, robot: &Robot, samples: &[Sample], random: &mut ChaCha8Rng) -> Effect {
         let place = Place::draw(robot, samples, random);
         match self {

@@ -1,4 +1,5 @@
-//! Whole databases through `phiw retarget`: the seated set, two-handed motions made from it, the embedded motions.
+//! Whole databases through `phiw retarget`: the seated set, two-handed motions made from it, the embedded
+//! motions.
 
 use super::Scene;
 use super::page::Page;
@@ -118,7 +119,8 @@ pub fn embedded(seed: u64, folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
         .collect()
 }
 
-/// Each left trial played with the right trial of the same subject and task, as C3D files beside the static trials.
+/// Each left trial played with the right trial of the same subject and task, as C3D files beside the static
+/// trials.
 ///
 /// # Errors
 /// A recording cannot be read or written.

@@ -1,5 +1,5 @@
-//! Figure 9: time and final cost of retargeting one motion of T = 740 from several starts, without and with splines by quasi-Newton, and
-//! by the solver that knows the structure.
+//! Figure 9: time and final cost of retargeting one motion of T = 740 from several starts, without and with
+//! splines by quasi-Newton, and by the solver that knows the structure.
 
 use super::page::Page;
 use super::{Example, Scene};
@@ -131,7 +131,8 @@ impl Subject<'_> {
         Ok(solver(&problem, first))
     }
 
-    /// The first number of steps of the structured solver that gives a cost as low, from the recording on, against the `time` \[s\] of another.
+    /// The first number of steps of the structured solver that gives a cost as low, from the recording on,
+    /// against the `time` \[s\] of another.
     fn say_when_as_low(&self, time: f64, cost: f64, page: &mut Page) -> anyhow::Result<()> {
         for most in 0..self.iterations.most {
             let begin = Instant::now();

@@ -3,7 +3,8 @@
 use phiw_bspline_retarget::human::{BodyJoint, HumanBody};
 use std::fmt::Write;
 
-/// Every joint and length of the body as a body of its own, `joint_<index>`, and the markers as sites, `marker_<index>`.
+/// Every joint and length of the body as a body of its own, `joint_<index>`, and the markers as sites,
+/// `marker_<index>`.
 pub fn human(body: &HumanBody, parameters: &[f64]) -> String {
     let joints = body.joints(parameters);
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); joints.len()];

@@ -2,14 +2,16 @@
 //!
 //! # What it asks
 //!
-//! How fast and how close the robot follows recordings of people. `databases`: whole databases through `phiw retarget`, with marker error, hands, elbows, jerk
-//! and time. `animation`: a film of person and robot. `mink`: the same markers through mink, frame by frame. `figure9`: the paper's figure 9, time and final
+//! How fast and how close the robot follows recordings of people. `databases`: whole databases through `phiw
+//! retarget`, with marker error, hands, elbows, jerk and time. `animation`: a film of person and robot.
+//! `mink`: the same markers through mink, frame by frame. `figure9`: the paper's figure 9, time and final
 //! cost of the solvers from several starts.
 //!
 //! # How it is run
 //!
-//! `cargo xtask retarget` measures everything, `cargo xtask retarget figure9 databases` some parts. mink is installed from PyPI into a private environment, only
-//! if `--mink python3` names a Python. The robot is Torobo and the recordings are the seated set where `../shared/data` has them; otherwise the embedded
+//! `cargo xtask retarget` measures everything, `cargo xtask retarget figure9 databases` some parts. mink is
+//! installed from PyPI into a private environment, only if `--mink python3` names a Python. The robot is
+//! Torobo and the recordings are the seated set where `../shared/data` has them; otherwise the embedded
 //! motions and `models/upper_body18.urdf` stand in, and it is said.
 //!
 //! # What it prints
@@ -18,7 +20,8 @@
 //!
 //! # Where results go
 //!
-//! Into `retarget` in the build folder, or where `--out` says: `retarget.html` with pictures, and the retargeted motions of each database.
+//! Into `retarget` in the build folder, or where `--out` says: `retarget.html` with pictures, and the
+//! retargeted motions of each database.
 
 mod animation;
 pub(crate) mod database;

@@ -1,7 +1,8 @@
 //! The first part of `cargo xtask run`: a curriculum over a robot that has something nobody declared.
 //!
-//! Marker recordings become motions of an 18-joint upper body; a model that is anything between nothing and twice the truth chooses among
-//! them, five times, and after each the residual is traced. Beside it the same without tracing, on the same noise.
+//! Marker recordings become motions of an 18-joint upper body; a model that is anything between nothing and
+//! twice the truth chooses among them, five times, and after each the residual is traced. Beside it the same
+//! without tracing, on the same noise.
 
 use super::curriculum_page;
 use crate::paper::{
@@ -18,14 +19,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What nobody declares. On which joint and how large follows from the seed.
 const SECRET: SecretKind = SecretKind::CoulombFriction;
-/// Seed of the initial model, the noise and the secret: one that puts it into the right elbow, which works against more than the actuators' noise. (In a
-/// neck that hardly moves it would stay hidden.)
+/// Seed of the initial model, the noise and the secret: one that puts it into the right elbow, which works
+/// against more than the actuators' noise. (In a neck that hardly moves it would stay hidden.)
 const SEED: u64 = 4;
-/// Embedded motions of each of the twelve tasks: half of them, to be done in minutes. One of each is held out.
+/// Embedded motions of each of the twelve tasks: half of them, to be done in minutes. One of each is held
+/// out.
 const PER_TASK: usize = 4;
 /// Iterations, as in the paper.
 const ITERATIONS: usize = 5;
-/// Torque noise over the torque limit. The paper's 5 % are three times this elbow's friction: in five motions nobody would see it.
+/// Torque noise over the torque limit. The paper's 5 % are three times this elbow's friction: in five motions
+/// nobody would see it.
 const NOISE: f64 = 0.02;
 
 /// What came out.

@@ -2,25 +2,28 @@
 //!
 //! # What it asks
 //!
-//! Whether the whole chain works, from motions and logs to a model with its missing effect found. First a curriculum runs on an 18-joint upper body
-//! (`models/upper_body18.urdf`) with an effect that nobody declared: 48 embedded marker recordings are retargeted, five of the motions are chosen and done on a
-//! simulated robot, and after each an effect is looked for that the model lacks. Then `phiw explain` works on logs of an arm (`models/puma560.urdf`) whose wrist
-//! has a differential that nobody declared. Where logs of a real robot lie beside the workspace (`../shared/data/logs/tx40`), they are explained as well.
+//! Whether the whole chain works, from motions and logs to a model with its missing effect found. First a
+//! curriculum runs on an 18-joint upper body (`models/upper_body18.urdf`) with an effect that nobody
+//! declared: 48 embedded marker recordings are retargeted, five of the motions are chosen and done on a
+//! simulated robot, and after each an effect is looked for that the model lacks. Then `phiw explain` works on
+//! logs of an arm (`models/puma560.urdf`) whose wrist has a differential that nobody declared. Where logs of
+//! a real robot lie beside the workspace (`../shared/data/logs/tx40`), they are explained as well.
 //!
 //! # How it is run
 //!
-//! `cargo xtask run`, or `cargo xtask run --open` to see the reports in the browser. The outcome is the same on every machine with the same physics engine,
-//! which is MuJoCo where its library is there, and Rapier otherwise. A run that was stopped goes on where it was.
+//! `cargo xtask run`, or `cargo xtask run --open` to see the reports in the browser. The outcome is the same
+//! on every machine with the same physics engine, which is MuJoCo where its library is there, and Rapier
+//! otherwise. A run that was stopped goes on where it was.
 //!
 //! # What it prints
 //!
-//! For the curriculum: the effect that was found, and the errors of torque and parameters before and after. For each explained robot what `phiw explain` prints.
-//! The paths of the reports come last.
+//! For the curriculum: the effect that was found, and the errors of torque and parameters before and after.
+//! For each explained robot what `phiw explain` prints. The paths of the reports come last.
 //!
 //! # Where results go
 //!
-//! Into `out/run` in the workspace, or where `--out` says: `report.html`, `motions/` and `runs/` of the curriculum, and a folder of results for each explained
-//! robot (`example/`, `tx40/`).
+//! Into `out/run` in the workspace, or where `--out` says: `report.html`, `motions/` and `runs/` of the
+//! curriculum, and a folder of results for each explained robot (`example/`, `tx40/`).
 
 mod curriculum;
 mod curriculum_page;

@@ -15,7 +15,8 @@ const HARMONICS: usize = 5;
 const FREQUENCY: f64 = 0.1;
 /// Share of the joint's range and of its speed limit that the motion uses.
 const USED: f64 = 0.8;
-/// Frictions at full speed and rotor inertia, over the joint's torque limit (and its speed limit where they need one).
+/// Frictions at full speed and rotor inertia, over the joint's torque limit (and its speed limit where they
+/// need one).
 const VISCOUS: f64 = 0.08;
 const COULOMB: f64 = 0.06;
 const ROTOR: f64 = 0.01;
@@ -64,7 +65,8 @@ impl Plant {
         self
     }
 
-    /// Writes a log of `rows` rows at `rate` Hz in constant memory; `progress` is told the rows done now and then.
+    /// Writes a log of `rows` rows at `rate` Hz in constant memory; `progress` is told the rows done now and
+    /// then.
     pub fn write_log(
         &self,
         path: &Path,

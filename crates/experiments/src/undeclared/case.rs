@@ -24,8 +24,8 @@ pub const VISIBLE: f64 = 0.5;
 pub const VISIBLE_OUTSIDE: f64 = 1.0;
 /// Rate at which sizes are measured \[Hz\].
 pub const SIZE_RATE: f64 = 100.0;
-/// Friction is drawn in proportion to the rigid body's torque, or to this share of the joint's limit if that is more: a wrist has
-/// next to no load and yet its gears.
+/// Friction is drawn in proportion to the rigid body's torque, or to this share of the joint's limit if that
+/// is more: a wrist has next to no load and yet its gears.
 const LEAST_LEVEL: f64 = 0.04;
 /// Attempts at a case on one robot before the next robot is tried.
 const ATTEMPTS_PER_ROBOT: u64 = 8;
@@ -64,12 +64,14 @@ pub struct Drawn {
     pub size: f64,
     /// RMS of what the declared model cannot absorb, in units of the noise, where most of it is left.
     pub visible: f64,
-    /// Joints where it is large and certain enough that it has to be named; all of its joints, but in the wide suites.
+    /// Joints where it is large and certain enough that it has to be named; all of its joints, but in the
+    /// wide suites.
     pub material: Vec<usize>,
 }
 
 impl<'a> Case<'a> {
-    /// Draws the case of a spec. `None` if no robot can have it, which no spec of the suites is known to bring about.
+    /// Draws the case of a spec. `None` if no robot can have it, which no spec of the suites is known to
+    /// bring about.
     pub fn draw(spec: &Spec, robots: &'a [Robot]) -> Option<Self> {
         let attempts = ATTEMPTS_PER_ROBOT * 2 * robots.len() as u64;
         (0..attempts).find_map(|attempt| {
@@ -232,7 +234,8 @@ fn choose_joints(spec: &Spec, robot: &Robot, dice: &mut Dice) -> Option<Vec<usiz
     Some(joints)
 }
 
-/// Two training motions and the one that is held out, of periodic excitation, but for at most one from point to point.
+/// Two training motions and the one that is held out, of periodic excitation, but for at most one from point
+/// to point.
 pub fn draw_motions(robot: &Robot, reach: Option<Reach>, restless: bool, dice: &mut Dice) -> Vec<Motion> {
     // At most one of the three is made of moves from point to point.
     let resting = if restless || dice.chance(0.55) { None } else { Some(dice.index(STARTS.len())) };
@@ -243,7 +246,8 @@ pub fn draw_motions(robot: &Robot, reach: Option<Reach>, restless: bool, dice: &
     STARTS.into_iter().enumerate().map(draw).collect()
 }
 
-/// The motion, made so small that the joints can deliver it; one that has to come near a limit is left as it is.
+/// The motion, made so small that the joints can deliver it; one that has to come near a limit is left as it
+/// is.
 pub fn tamed(robot: &Robot, mut motion: Motion, reach: Option<Reach>) -> Motion {
     for _ in 0..12 {
         if peak_effort(robot, &motion) < 0.8 || reach.is_some() {
@@ -264,7 +268,8 @@ fn peak_effort(robot: &Robot, motion: &Motion) -> f64 {
     torque.iter().enumerate().map(share).fold(0.0, f64::max)
 }
 
-/// Friction and rotors in proportion to what the rigid body needs; what the secret is, only the secret's joints have.
+/// Friction and rotors in proportion to what the rigid body needs; what the secret is, only the secret's
+/// joints have.
 pub fn draw_ordinary(
     spec: &Spec,
     robot: &Robot,
@@ -350,7 +355,8 @@ pub fn survey<'r>(
     Survey { tree: &robot.tree, range, speed: rms(0), torque: rms(1), width: ordinary.width, reach, spans }
 }
 
-/// Whether each log shows the effect for a while: a stop that one of them never touches is not to be found there.
+/// Whether each log shows the effect for a while: a stop that one of them never touches is not to be found
+/// there.
 pub fn felt_in_every_log(
     secret: &Secret,
     tree: &phiw_dynamics::Tree,

@@ -2,7 +2,8 @@
 
 use super::visibility::Absorber;
 
-/// Root mean square of what is left of each column when the absorber and all other columns have taken what they can, in units of the noise.
+/// Root mean square of what is left of each column when the absorber and all other columns have taken what
+/// they can, in units of the noise.
 pub fn visible_beside_others(absorber: &Absorber, columns: Vec<Vec<f64>>, samples: usize) -> Vec<f64> {
     let left: Vec<Vec<f64>> = columns.into_iter().map(|column| absorber.residual(column)).collect();
     let count = left.len();
@@ -19,7 +20,8 @@ pub fn visible_beside_others(absorber: &Absorber, columns: Vec<Vec<f64>>, sample
     (0..count).map(visible).collect()
 }
 
-/// 1 − R² of each variable on all others, from their correlation matrix: one over the diagonal of its inverse. Nought for those that depend on others.
+/// 1 − R² of each variable on all others, from their correlation matrix: one over the diagonal of its
+/// inverse. Nought for those that depend on others.
 fn unexplained_shares(matrix: Vec<f64>, count: usize) -> Vec<f64> {
     /// Added to the diagonal: columns that are alike to a part in a million are the same.
     const RIDGE: f64 = 1e-6;
@@ -55,7 +57,8 @@ fn dot(left: &[f64], right: &[f64]) -> f64 {
 mod tests {
     use super::unexplained_shares;
 
-    /// Two variables of correlation r leave 1 − r² of each other; a third that has nothing to do with them stays whole.
+    /// Two variables of correlation r leave 1 − r² of each other; a third that has nothing to do with them
+    /// stays whole.
     #[test]
     fn shares_are_those_of_regression() {
         for r in [0.0, 0.5, 0.9] {

@@ -4,7 +4,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// What a stream of random numbers is for. Each use has its own, so that a case without its secret keeps its motion and noise.
+/// What a stream of random numbers is for. Each use has its own, so that a case without its secret keeps its
+/// motion and noise.
 #[derive(Clone, Copy)]
 pub enum Stream {
     /// Friction, rotors, sampling.

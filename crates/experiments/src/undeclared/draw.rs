@@ -41,14 +41,16 @@ impl Survey<'_> {
         dice.uniform(self.range[joint][0], self.range[joint][1])
     }
 
-    /// Whether the effect on this joint gives, to the last digit, the torques of another one: then there is no right name.
+    /// Whether the effect on this joint gives, to the last digit, the torques of another one: then there is
+    /// no right name.
     fn is_ambiguous(&self, kind: Kind, joint: usize) -> bool {
         let body = self.tree.joint(joint);
         let is_root = body.parent.is_none();
         match kind {
             // A force that keeps its direction, on the first link: a sinusoid of its angle, as a balancer's.
             Kind::ExternalForce => is_root,
-            // A body on the first link: what turns about the axis, as a rotor does, and a sinusoid if the axis is level.
+            // A body on the first link: what turns about the axis, as a rotor does, and a sinusoid if the
+            // axis is level.
             Kind::Payload => is_root,
             // All angles from the first joint on are turned alike: the base is tilted.
             Kind::EncoderOffset => is_root,
@@ -238,7 +240,8 @@ fn hysteresis(joint: usize, survey: &Survey, dice: &mut Dice) -> Friction {
 }
 
 fn ripple(joint: usize, survey: &Survey, dice: &mut Dice) -> Option<Mechanism> {
-    // At least a turn and a half over the travel, or it is a spring; at most 8 Hz at usual speed, or filters take it away.
+    // At least a turn and a half over the travel, or it is a spring; at most 8 Hz at usual speed, or filters
+    // take it away.
     let (fewest, most) = (1.5 * TAU / survey.travel(joint), 8.0 * TAU / survey.speed[joint]);
     let most = if survey.is_prismatic(joint) { most } else { most.min(60.0) };
     if fewest * 1.2 > most {

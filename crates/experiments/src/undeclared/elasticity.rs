@@ -8,13 +8,14 @@ use std::f64::consts::TAU;
 
 /// Step of the central differences that turn the link's torque into the spring's rates \[s\].
 const STEP: f64 = 1e-3;
-/// Lowest resonance of a joint on its spring with the motor held \[Hz\]: twice the highest frequency of the motions. Nobody can move a robot as these logs say
-/// it moved once the motion's band holds the resonance.
+/// Lowest resonance of a joint on its spring with the motor held \[Hz\]: twice the highest frequency of the
+/// motions. Nobody can move a robot as these logs say it moved once the motion's band holds the resonance.
 const LOWEST_RESONANCE: f64 = 3.0;
 /// Samples from one look at the inertia to the next.
 const STRIDE: usize = 20;
 
-/// The greatest compliance with which the joint's resonance stays above the motions' band, whatever the pose \[rad/(N·m), m/N\].
+/// The greatest compliance with which the joint's resonance stays above the motions' band, whatever the pose
+/// \[rad/(N·m), m/N\].
 pub fn softest(tree: &Tree, motions: &[Motion], times: &[Vec<f64>], joint: usize) -> f64 {
     let joints = tree.joint_count();
     let mut workspace = Workspace::new(tree);

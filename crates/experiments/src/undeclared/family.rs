@@ -30,7 +30,8 @@ pub enum Shape {
 }
 
 impl Family {
-    /// The family of a kind, in the sizes of `ordinary`, on the joints of `members`. `speed`: each joint's root mean square.
+    /// The family of a kind, in the sizes of `ordinary`, on the joints of `members`. `speed`: each joint's
+    /// root mean square.
     pub fn draw(
         kind: Kind,
         ordinary: &Ordinary,

@@ -1,4 +1,5 @@
-//! Frictions of one joint, with and without memory. Shapes are written from the literature, not from the catalogue.
+//! Frictions of one joint, with and without memory. Shapes are written from the literature, not from the
+//! catalogue.
 
 use super::plant::Scene;
 use std::f64::consts::FRAC_2_PI;
@@ -67,7 +68,8 @@ impl Friction {
             Friction::StribeckLuGre { speed, exponent, distance } => {
                 let steady = |v: f64| coulomb + scale * (-(v / speed).abs().powf(*exponent)).exp();
                 let mut torque = from_fine(scene, joint, |v, _| lugre(v, *distance, steady));
-                // The bristles are the joint's whole dry friction: what the plant adds as its declared share goes out.
+                // The bristles are the joint's whole dry friction: what the plant adds as its declared share
+                // goes out.
                 for (sample, torque) in torque.iter_mut().enumerate() {
                     *torque -= coulomb * sign(scene.motor.v(sample, joint));
                 }
@@ -188,7 +190,8 @@ mod tests {
         ]
     }
 
-    /// Over whole cycles, once the first is over, a friction with memory only takes energy, and stays within its limit.
+    /// Over whole cycles, once the first is over, a friction with memory only takes energy, and stays within
+    /// its limit.
     fn check(force: &[f64], limit: f64, positions: &[f64]) {
         let work: f64 = positions
             .windows(2)

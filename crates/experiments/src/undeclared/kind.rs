@@ -77,7 +77,8 @@ impl Kind {
             .map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
-    /// Whether a free identification of the rigid body swallows the effect, so that it can only be told against a held model.
+    /// Whether a free identification of the rigid body swallows the effect, so that it can only be told
+    /// against a held model.
     pub fn needs_held_model(self) -> bool {
         matches!(self, Kind::Payload | Kind::GravityTilt | Kind::EncoderOffset)
     }
@@ -97,8 +98,8 @@ impl Kind {
         )
     }
 
-    /// Whether `self` on some joint contains `other` on the same joint as a special case, or the other way round, or the two
-    /// are so much alike that finding one of them is right.
+    /// Whether `self` on some joint contains `other` on the same joint as a special case, or the other way
+    /// round, or the two are so much alike that finding one of them is right.
     pub fn is_nested_with(self, other: Kind) -> bool {
         use Kind::*;
         let group = |kinds: &[Kind]| kinds.contains(&self) && kinds.contains(&other);

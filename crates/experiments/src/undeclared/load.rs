@@ -1,4 +1,5 @@
-//! What changes the rigid body itself: a payload, a tilted base, a load picked up on the way; and forces on links.
+//! What changes the rigid body itself: a payload, a tilted base, a load picked up on the way; and forces on
+//! links.
 
 use super::plant::Scene;
 use super::secret::{Form, Secret};

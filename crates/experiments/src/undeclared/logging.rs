@@ -1,4 +1,5 @@
-//! What a logger or a drive does to a log beyond noise and quanta: colour, tails, filters, dead bands, steps, a velocity that is late.
+//! What a logger or a drive does to a log beyond noise and quanta: colour, tails, filters, dead bands, steps,
+//! a velocity that is late.
 
 use super::dice::Dice;
 use super::plant::Record;
@@ -12,7 +13,8 @@ use std::fmt::Write;
 
 /// Share of outliers and their size, for [`Tails::Contaminated`].
 const OUTLIERS: [f64; 2] = [0.02, 8.0];
-/// What velocity columns are multiplied by when somebody took the wrong unit: revolutions a minute, the other direction. Degrees are refused as such.
+/// What velocity columns are multiplied by when somebody took the wrong unit: revolutions a minute, the other
+/// direction. Degrees are refused as such.
 const WRONG_UNITS: [f64; 2] = [9.549_296_6, -1.0];
 
 /// The shape of the noise's innovations, all of unit variance.
@@ -65,7 +67,8 @@ pub struct Logging {
 }
 
 impl Logging {
-    /// Draws what a situation asks for, and changes the sensors to it. `torque`, `speed`: root mean squares of each joint.
+    /// Draws what a situation asks for, and changes the sensors to it. `torque`, `speed`: root mean squares
+    /// of each joint.
     pub fn draw(
         situation: Situation,
         tree: &Tree,
@@ -216,7 +219,8 @@ impl Logging {
         torque
     }
 
-    /// Noise of unit variance: a first-order autoregression of this correlation time \[s\], white where that is nought.
+    /// Noise of unit variance: a first-order autoregression of this correlation time \[s\], white where that
+    /// is nought.
     pub fn noise(&self, times: &[f64], correlation_time: f64, dice: &mut Dice) -> Vec<f64> {
         let mut level = dice.normal();
         let mut previous = times.first().copied().unwrap_or(0.0);

@@ -1,4 +1,5 @@
-//! Torques without memory that mechanisms add: springs, balancers, ripple, couplings, stops; and some that no catalogue has.
+//! Torques without memory that mechanisms add: springs, balancers, ripple, couplings, stops; and some that no
+//! catalogue has.
 
 use super::friction::interpolate;
 use super::plant::Scene;

@@ -1,31 +1,42 @@
-//! `cargo xtask undeclared`: robot logs with effects that nobody declared. It generates them, has `phiw explain` trace them, and scores what that says.
+//! `cargo xtask undeclared`: robot logs with effects that nobody declared. It generates them, has `phiw
+//! explain` trace them, and scores what that says.
 //!
 //! # What it asks
 //!
-//! Which undeclared effects the tracer finds, with the right joints, and what it invents. A case is one of five robots with one, two, three or no secret effects
-//! (the suites `one`, `two`, `three`, `control`), or with one that the catalogue does not have (`outside`). Noise, jitter, quantisation and the declared
-//! effects are drawn as well. The wide suites have robots as they come: frictions on all joints, of which mostly nothing is declared, and up to thirteen effects
-//! more (`wide_effects`), right models (`wide_right`), effects that no catalogue has beside others (`wide_outside`), each in fifteen situations, from white
-//! noise to joints that are mostly noise, filters in drives, late velocities, dead bands, and held-out motion that is faster than all that was trained on. A case follows from its seed alone. Seeds for developing the tracer and seeds for reporting are disjoint.
+//! Which undeclared effects the tracer finds, with the right joints, and what it invents. A case is one of
+//! five robots with one, two, three or no secret effects (the suites `one`, `two`, `three`, `control`), or
+//! with one that the catalogue does not have (`outside`). Noise, jitter, quantisation and the declared
+//! effects are drawn as well. The wide suites have robots as they come: frictions on all joints, of which
+//! mostly nothing is declared, and up to thirteen effects more (`wide_effects`), right models (`wide_right`),
+//! effects that no catalogue has beside others (`wide_outside`), each in fifteen situations, from white noise
+//! to joints that are mostly noise, filters in drives, late velocities, dead bands, and held-out motion that
+//! is faster than all that was trained on. A case follows from its seed alone. Seeds for developing the
+//! tracer and seeds for reporting are disjoint.
 //!
-//! The tracer is a separate program that sees files only. What is true stays here, or in a `truth.json` beside the folder that it sees. All forms of
-//! effects are written from the literature and not from the tracer's catalogue.
+//! The tracer is a separate program that sees files only. What is true stays here, or in a `truth.json`
+//! beside the folder that it sees. All forms of effects are written from the literature and not from the
+//! tracer's catalogue.
 //!
 //! # How it is run
 //!
-//! `cargo xtask undeclared --all` is the full experiment on the old suites, 1000 cases of each family of seeds, and `--suite wide` that on the wide ones, 1170 cases
-//! of the reporting seeds; `--resume` goes on with one that was stopped. `--suite wide_right --false-name-rates 0.005,0.01,0.05,0.1` calibrates the guard: it passes
-//! `--false-name-rate` to the tracer. `--suite`, `--situation`, `--kind`, `--robot` and `--count` choose among the cases, `--case SEED` traces one and shows its truth, and `--generate DIR` only writes the files.
+//! `cargo xtask undeclared --all` is the full experiment on the old suites, 1000 cases of each family of
+//! seeds, and `--suite wide` that on the wide ones, 1170 cases of the reporting seeds; `--resume` goes on
+//! with one that was stopped. `--suite wide_right --false-name-rates 0.005,0.01,0.05,0.1` calibrates the
+//! guard: it passes `--false-name-rate` to the tracer. `--suite`, `--situation`, `--kind`, `--robot` and
+//! `--count` choose among the cases, `--case SEED` traces one and shows its truth, and `--generate DIR` only
+//! writes the files.
 //!
 //! # What it prints
 //!
-//! Tables: for each kind how often it was named right, taken for a rival, given to the wrong joints or missed; false names where
-//! nothing was hidden; the verdicts on what the catalogue does not have; the share of the error removed; time; and every failure with its seed.
+//! Tables: for each kind how often it was named right, taken for a rival, given to the wrong joints or
+//! missed; false names where nothing was hidden; the verdicts on what the catalogue does not have; the share
+//! of the error removed; time; and every failure with its seed.
 //!
 //! # Where results go
 //!
-//! Into `target/undeclared` below the working directory, or where `--out` says, a folder for each family of seeds (`dev`, `report`): `score.md`, `cases.csv`
-//! with one row for each case, and `outcomes/`, what `--resume` goes on from. `--keep DIR` keeps the files of each case.
+//! Into `target/undeclared` below the working directory, or where `--out` says, a folder for each family of
+//! seeds (`dev`, `report`): `score.md`, `cases.csv` with one row for each case, and `outcomes/`, what
+//! `--resume` goes on from. `--keep DIR` keeps the files of each case.
 
 mod case;
 mod certainty;
@@ -70,16 +81,19 @@ use suite::{Seeds, Spec, Suite};
 /// Arguments of `cargo xtask undeclared`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// All old suites (or those of --suite), as many cases as the experiment asks for, on both families of seeds.
+    /// All old suites (or those of --suite), as many cases as the experiment asks for, on both families of
+    /// seeds.
     #[arg(long)]
     all: bool,
-    /// Suites, separated by commas: one, two, three, control, outside (together: old), wide_right, wide_effects, wide_outside (together: wide).
+    /// Suites, separated by commas: one, two, three, control, outside (together: old), wide_right,
+    /// wide_effects, wide_outside (together: wide).
     #[arg(long, value_name = "SUITE", default_value = "old", value_parser = suites)]
     suite: std::sync::Arc<Suites>,
     /// Only cases in this situation (wide suites).
     #[arg(long)]
     situation: Option<Situation>,
-    /// Ask the tracer for these rates of false names one after the other, and print asked against observed (suite wide_right).
+    /// Ask the tracer for these rates of false names one after the other, and print asked against observed
+    /// (suite wide_right).
     #[arg(long, value_name = "RATE", value_delimiter = ',')]
     false_name_rates: Vec<f64>,
     /// Only cases with this effect among their secrets.

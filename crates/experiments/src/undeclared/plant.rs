@@ -99,7 +99,8 @@ pub struct Scene<'a> {
     pub times: &'a [f64],
     /// States of the links.
     pub link: States,
-    /// States of the motors, which the encoders see: apart from the links only behind an elastic transmission.
+    /// States of the motors, which the encoders see: apart from the links only behind an elastic
+    /// transmission.
     pub motor: States,
     /// Torque of the rigid body, samples × joints.
     rigid: Vec<f64>,

@@ -72,8 +72,8 @@ mod tests {
         }
     }
 
-    /// The figures measured for the PUMA's link 3 miss the triangle inequality by a tenth, and no torque tells: what lies along
-    /// joint 3's axis may as well belong to link 2.
+    /// The figures measured for the PUMA's link 3 miss the triangle inequality by a tenth, and no torque
+    /// tells: what lies along joint 3's axis may as well belong to link 2.
     #[test]
     fn the_pumas_third_link_is_as_good_as_a_body() {
         let robots = robots().expect("the models read");

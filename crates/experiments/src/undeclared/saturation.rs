@@ -1,7 +1,9 @@
-//! An actuator that clips: the joint is simulated under control, with what is delivered and not with what is commanded.
+//! An actuator that clips: the joint is simulated under control, with what is delivered and not with what is
+//! commanded.
 //!
-//! The other joints follow their references exactly (hybrid dynamics), so one equation of motion is integrated. The controller is
-//! computed torque with a PD, evaluated at each step of the integration: a sampled controller's hold would be a delay of its own.
+//! The other joints follow their references exactly (hybrid dynamics), so one equation of motion is
+//! integrated. The controller is computed torque with a PD, evaluated at each step of the integration: a
+//! sampled controller's hold would be a delay of its own.
 
 use super::case::{even_times, is_simulated};
 use super::dice::Dice;
@@ -17,7 +19,8 @@ pub const CLIPPED: [f64; 2] = [0.05, 0.15];
 /// Limits and gains tried for one case.
 const TRIALS: usize = 10;
 
-/// Finds a limit and gains with which the clipping is as often and as large as asked, and puts the simulated motions in place.
+/// Finds a limit and gains with which the clipping is as often and as large as asked, and puts the simulated
+/// motions in place.
 ///
 /// Returns the size reached; `None` if no trial was fit.
 pub fn install(
@@ -87,7 +90,8 @@ fn simulate(
     let joints = tree.joint_count();
     let mut workspace = Workspace::new(tree);
     let [mut q, mut v, mut a, mut torque] = [0; 4].map(|_| vec![0.0; joints]);
-    // Torque of the rigid body without the joint's acceleration, and what a unit of that adds, at (position, speed, time).
+    // Torque of the rigid body without the joint's acceleration, and what a unit of that adds, at (position,
+    // speed, time).
     let mut equation = |position: f64, speed: f64, time: f64| -> Option<[f64; 2]> {
         for other in 0..joints {
             [q[other], v[other], a[other]] = motion.state(other, time);

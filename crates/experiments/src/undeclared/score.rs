@@ -9,9 +9,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// A rival with at least this share of the named effect's confidence is of near-equal merit.
 const NEAR_EQUAL: f64 = 0.5;
-/// The error before must exceed the floor by this factor (of squares) for a share of the difference to mean anything.
+/// The error before must exceed the floor by this factor (of squares) for a share of the difference to mean
+/// anything.
 const LEAST_EXCESS: f64 = 1.05;
-/// What is left is more than noise where its root mean square exceeds the noise's by this factor, which is the tolerance of the errors of a fit.
+/// What is left is more than noise where its root mean square exceeds the noise's by this factor, which is
+/// the tolerance of the errors of a fit.
 const MORE_THAN_NOISE: f64 = 1.2;
 
 /// What became of one secret.
@@ -43,7 +45,8 @@ pub struct Score {
     pub named: Vec<String>,
     /// The tracer's verdict.
     pub verdict: String,
-    /// Share of the held-out squared error above the noise floor that was taken away; each joint's in units of its floor.
+    /// Share of the held-out squared error above the noise floor that was taken away; each joint's in units
+    /// of its floor.
     pub closed: Option<f64>,
     /// The same with the joints' squared errors added as they are \[N·m, N\].
     pub closed_pooled: Option<f64>,
@@ -67,8 +70,8 @@ struct Named {
 }
 
 impl Score {
-    /// Whether the case's own demand is met: all named right and nothing else, or nothing named where there is nothing, or structure
-    /// admitted where nothing of the catalogue explains it.
+    /// Whether the case's own demand is met: all named right and nothing else, or nothing named where there
+    /// is nothing, or structure admitted where nothing of the catalogue explains it.
     pub fn is_good(&self, truth: &Truth) -> bool {
         match truth.suite {
             Suite::WideRight => {
@@ -101,7 +104,8 @@ impl Score {
     }
 }
 
-/// Scores a report. `floors`: RMS that the noise leaves on the validation log, joint by joint; the report's own where `None`.
+/// Scores a report. `floors`: RMS that the noise leaves on the validation log, joint by joint; the report's
+/// own where `None`.
 pub fn score(truth: &Truth, report: &Report, floors: Option<&BTreeMap<String, f64>>) -> Score {
     let named = merged(&report.effects);
     let mut used = vec![false; named.len()];
@@ -218,7 +222,8 @@ fn is_secret(secret: &TrueSecret, kind: &str, joints: &BTreeSet<String>) -> bool
         || secret.equivalents.iter().any(|(other, names)| other.name() == kind && same(names))
 }
 
-/// The named effects; one kind named on several joints one after another is one effect, but for couplings, whose joints are pairs.
+/// The named effects; one kind named on several joints one after another is one effect, but for couplings,
+/// whose joints are pairs.
 fn merged(effects: &[Effect]) -> Vec<Named> {
     let mut all: Vec<Named> = Vec::new();
     for effect in effects {
@@ -366,8 +371,8 @@ mod tests {
         check(viscous, &with_rival("quadratic_friction", "joint_spring", 0.4), &[WrongKind], 1);
     }
 
-    /// A family is right with and without the joints where it is immaterial; a secret that is only a refinement, and a name that the situation makes true,
-    /// are neither right nor false.
+    /// A family is right with and without the joints where it is immaterial; a secret that is only a
+    /// refinement, and a name that the situation makes true, are neither right nor false.
     #[test]
     fn what_is_immaterial_may_be_named_or_not() {
         use Outcome::*;
@@ -397,7 +402,8 @@ mod tests {
         assert_eq!(score(&truth, &refined, None).outcomes, [Refined]);
     }
 
-    /// `identify` gives no verdict on a model that leaves more than noise: the floor of such a case was lost without a word.
+    /// `identify` gives no verdict on a model that leaves more than noise: the floor of such a case was lost
+    /// without a word.
     #[test]
     fn a_report_without_a_verdict_is_read() {
         let text = r#"{"verdict": null, "noise_floor": {}, "before": {}, "effects": [], "after": {}}"#;

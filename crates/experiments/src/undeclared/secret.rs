@@ -110,7 +110,8 @@ impl Secret {
         }
     }
 
-    /// Root mean square of the effect over that of the joint's torque without it, for the joint that feels it most.
+    /// Root mean square of the effect over that of the joint's torque without it, for the joint that feels it
+    /// most.
     pub fn size(&self, tree: &Tree, ordinary: &Ordinary, motions: &[Motion], times: &[Vec<f64>]) -> f64 {
         let mut squares = vec![[0.0; 2]; tree.joint_count()];
         for (motion, times) in motions.iter().zip(times) {
@@ -139,7 +140,8 @@ impl Secret {
         }
         let sign = self.scale.signum();
         let mut magnitude = self.scale.abs().clamp(lowest, highest);
-        // Almost all sizes grow in proportion to the scale, the others still with it: a damped fixed point finds them.
+        // Almost all sizes grow in proportion to the scale, the others still with it: a damped fixed point
+        // finds them.
         for trial in 0..24 {
             self.scale = sign * magnitude;
             let size = self.size(tree, ordinary, motions, times);

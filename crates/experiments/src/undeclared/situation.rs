@@ -1,4 +1,5 @@
-//! The situations of the widened suites: what a logger, a drive or a motion does that a log made for an experiment does not.
+//! The situations of the widened suites: what a logger, a drive or a motion does that a log made for an
+//! experiment does not.
 
 use serde::Serialize;
 
@@ -15,11 +16,13 @@ pub enum Situation {
     Colour,
     /// Of 0.3 to 1 s.
     LongColour,
-    /// Noise with outliers: Student's t with three degrees of freedom, or one sample in fifty eight times as large.
+    /// Noise with outliers: Student's t with three degrees of freedom, or one sample in fifty eight times as
+    /// large.
     HeavyTails,
     /// Joints whose torque is mostly noise.
     NoiseJoints,
-    /// The drive low-passes the torque that it logs, noise and all, at 4 to 20 Hz, and makes up for the filter's delay.
+    /// The drive low-passes the torque that it logs, noise and all, at 4 to 20 Hz, and makes up for the
+    /// filter's delay.
     DriveFilter,
     /// The same with a causal filter: the logged torque is late, so a delay is no false name.
     LateFilter,

@@ -165,7 +165,8 @@ impl Spec {
             !kind.needs_held_model()
                 && !matches!(
                     kind,
-                    // Simulated motion and deflected encoders would change what the others are; frictions, rotors and offsets come as families.
+                    // Simulated motion and deflected encoders would change what the others are; frictions,
+                    // rotors and offsets come as families.
                     Kind::ActuatorSaturation
                         | Kind::JointElasticity
                         | Kind::ViscousFriction
@@ -184,7 +185,8 @@ impl Spec {
     fn draw_several(&mut self, count: usize, dice: &mut Dice) {
         self.held = dice.chance(0.2);
         let may_join = |kind: &Kind| match kind {
-            // Simulated motion and deflected encoders would change what a second effect is: they are judged alone.
+            // Simulated motion and deflected encoders would change what a second effect is: they are judged
+            // alone.
             Kind::ActuatorSaturation | Kind::JointElasticity => false,
             kind => self.held || !kind.needs_held_model(),
         };

@@ -206,7 +206,8 @@ fn a_saturated_actuator_delivers_no_more_than_its_limit() {
         for sample in 5..times.len() - 5 {
             let [commanded, delivered] =
                 [&record.torque, &record.ideal].map(|torque| torque[sample * n + joint]);
-            // Delivered is what the simulated motion needs: the integration's error is in it, most where friction turns.
+            // Delivered is what the simulated motion needs: the integration's error is in it, most where
+            // friction turns.
             assert!(delivered.abs() < 1.1 * secret.scale, "{delivered} of {}", secret.scale);
             if commanded.abs() > secret.scale {
                 clipped += 1;
@@ -255,7 +256,8 @@ fn clocks_jitter_as_asked() {
     check(Clock::JitteredStamps(0.2), false, true);
 }
 
-/// What the log holds beyond the perfect record: half a quantum of angle, and noise of the right size and memory.
+/// What the log holds beyond the perfect record: half a quantum of angle, and noise of the right size and
+/// memory.
 #[test]
 fn logs_are_quantised_and_noisy_as_asked() {
     let robots = models();

@@ -29,7 +29,8 @@ pub struct Traced {
 }
 
 impl Tracer {
-    /// Writes the case into `folder`, identifies the clean robot where a model is held, and lets the tracer explain the logs.
+    /// Writes the case into `folder`, identifies the clean robot where a model is held, and lets the tracer
+    /// explain the logs.
     ///
     /// # Errors
     /// A file cannot be written or read, or the tracer fails: its standard error is in the message.
@@ -50,8 +51,8 @@ impl Tracer {
         Ok(Traced { report: read_report(folder)?, elapsed })
     }
 
-    /// Writes the case into `folder` and gives what is left of it once the declared model is identified, joint by joint: of a case without secrets, what
-    /// the noise leaves behind the tracer's own filters.
+    /// Writes the case into `folder` and gives what is left of it once the declared model is identified,
+    /// joint by joint: of a case without secrets, what the noise leaves behind the tracer's own filters.
     ///
     /// # Errors
     /// A file cannot be written or read, or the program fails.

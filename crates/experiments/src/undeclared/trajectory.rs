@@ -112,7 +112,8 @@ impl Motion {
         Self::moves(tree, dice, start, duration, reach, SHORT_RESTS)
     }
 
-    /// Moves from pose to pose with long rests: all joints together, or one after the other in their own time.
+    /// Moves from pose to pose with long rests: all joints together, or one after the other in their own
+    /// time.
     pub fn with_rests(
         tree: &Tree,
         dice: &mut Dice,

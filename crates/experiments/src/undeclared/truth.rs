@@ -1,4 +1,5 @@
-//! What is true of a case, for the scorer and for whoever debugs the tracer; never in the folder that the tracer sees.
+//! What is true of a case, for the scorer and for whoever debugs the tracer; never in the folder that the
+//! tracer sees.
 
 use super::case::Case;
 use super::kind::{Kind, Name};
@@ -103,13 +104,14 @@ impl TrueSecret {
     }
 }
 
-/// Other names for literally the same torques, whatever the motion, given that the declared model's parameters are free.
+/// Other names for literally the same torques, whatever the motion, given that the declared model's
+/// parameters are free.
 fn equivalents(case: &Case, secret: &Secret) -> Vec<(Kind, Vec<String>)> {
     let tree = &case.robot.tree;
     let others = |joints: &[usize]| -> Vec<String> { case.robot.names(joints) };
     match (&secret.form, secret.joints.as_slice()) {
-        // A balancer whose spring has no rest length pulls the first link with a torque that is a pure sinusoid of its angle: so does a force on that link that
-        // keeps its direction.
+        // A balancer whose spring has no rest length pulls the first link with a torque that is a pure
+        // sinusoid of its angle: so does a force on that link that keeps its direction.
         (Form::Mechanism(Mechanism::Balancer { rest: 0.0, .. }), joints)
             if joints.iter().all(|&joint| tree.joint(joint).parent.is_none()) =>
         {
@@ -119,14 +121,16 @@ fn equivalents(case: &Case, secret: &Secret) -> Vec<(Kind, Vec<String>)> {
         (Form::Gain, &[joint]) if tree.joint_count() == 2 && !case.spec.held => {
             vec![(Kind::TorqueGain, others(&[1 - joint]))]
         }
-        // On a slide along gravity a mass is felt as inertia and as weight: more inertia is the same as less weight.
+        // On a slide along gravity a mass is felt as inertia and as weight: more inertia is the same as less
+        // weight.
         (Form::Mechanism(Mechanism::Rotor), &[joint]) if slides_along_gravity(tree, joint) => {
             vec![(Kind::TorqueOffset, others(&[joint]))]
         }
         (Form::Mechanism(Mechanism::Offset), &[joint]) if slides_along_gravity(tree, joint) => {
             vec![(Kind::RotorInertia, others(&[joint]))]
         }
-        // A slide along gravity carries a force's point up and down: about the joints before it the arm is the same, and along it the force is a weight.
+        // A slide along gravity carries a force's point up and down: about the joints before it the arm is
+        // the same, and along it the force is a weight.
         (Form::Force(_), &[joint]) if joint > 0 && slides_along_gravity(tree, joint) => {
             vec![(Kind::ExternalForce, others(&[joint - 1]))]
         }
@@ -143,7 +147,8 @@ fn slides_along_gravity(tree: &Tree, joint: usize) -> bool {
     let mut slide = body.origin.rotation * body.axis;
     while let Some(parent) = body.parent {
         body = &tree.bodies()[parent];
-        // In the parent's frame the slide must lie along the parent's own axis, so that turning leaves it where it is.
+        // In the parent's frame the slide must lie along the parent's own axis, so that turning leaves it
+        // where it is.
         if slide.dot(body.axis).abs() < 1.0 - 1e-9 {
             return false;
         }

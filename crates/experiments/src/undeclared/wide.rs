@@ -1,4 +1,5 @@
-//! Draws a case of the widened suites: frictions on all joints in forms of their own, up to a dozen effects at once, and a situation.
+//! Draws a case of the widened suites: frictions on all joints in forms of their own, up to a dozen effects
+//! at once, and a situation.
 
 use super::case::{
     Case, DURATION, Drawn, SIZE_RATE, SIZES, STARTS, VISIBLE, VISIBLE_OUTSIDE, draw_motions, draw_ordinary,
@@ -23,7 +24,8 @@ use super::visibility::Absorber;
 const ATTEMPTS: usize = 8;
 /// Most effects for each joint, besides the families.
 const EFFECTS_PER_JOINT: usize = 2;
-/// What an effect's size must be in units of its own uncertainty, for one that has to be named: far above any guard's threshold.
+/// What an effect's size must be in units of its own uncertainty, for one that has to be named: far above any
+/// guard's threshold.
 const CERTAIN: f64 = 15.0;
 /// Share of right models with nothing but a rigid body.
 const BARE: f64 = 0.2;
@@ -258,7 +260,8 @@ fn weighed(secrets: &[Secret], case: &Case, full: &Ordinary) -> Vec<Drawn> {
     let rows = effective_rows(sensors);
     let material = |place: usize| {
         let (index, joint, size) = owners[place];
-        // Friction that differs with the direction may well be named instead of what both directions have in common.
+        // Friction that differs with the direction may well be named instead of what both directions have in
+        // common.
         let common = [Kind::ViscousFriction, Kind::CoulombFriction]
             .iter()
             .any(|kind| secrets[index].name == Name::Catalogue(*kind));

@@ -1,4 +1,5 @@
-//! The score of the widened suites by situation and by number of effects, what confidence is worth, and the rate of false names that was asked for.
+//! The score of the widened suites by situation and by number of effects, what confidence is worth, and the
+//! rate of false names that was asked for.
 
 use super::kind::Name;
 use super::run::Scored;

@@ -85,7 +85,8 @@ fn noise_has_the_tails_that_it_says() {
     }
 }
 
-/// A sinusoid at the corner loses half of its amplitude in two poles; only the causal filter shifts it, by a quarter of a period.
+/// A sinusoid at the corner loses half of its amplitude in two poles; only the causal filter shifts it, by a
+/// quarter of a period.
 #[test]
 fn a_drives_filter_has_its_corner_and_its_delay() {
     let times: Vec<f64> = (0..20_000).map(|k| 5e-4 * f64::from(k)).collect();
@@ -245,7 +246,8 @@ fn motions_are_slow_periodic_or_at_rest_as_asked() {
     assert!(repeated && one_by_one, "both forms are drawn");
 }
 
-/// Families are on the joints that they say, in sizes of their own; other effects stay within their sizes, and all are in the truth.
+/// Families are on the joints that they say, in sizes of their own; other effects stay within their sizes,
+/// and all are in the truth.
 #[test]
 fn many_effects_are_drawn_at_once() {
     let robots = models();

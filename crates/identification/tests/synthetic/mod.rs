@@ -80,7 +80,8 @@ pub fn truth(tree: &Tree, viscous: f64) -> Vec<f64> {
     truth
 }
 
-/// The robot on sums of sines, at 100 Hz. The motion is that of `motion`, the torques' white noise of deviation `noise` that of `seed`.
+/// The robot on sums of sines, at 100 Hz. The motion is that of `motion`, the torques' white noise of
+/// deviation `noise` that of `seed`.
 ///
 /// Velocities and accelerations are recorded too, so that the torque belongs to them to the last digit.
 pub fn recording(tree: &Tree, motion: u64, seconds: f64, viscous: f64, noise: f64, seed: u64) -> Recording {

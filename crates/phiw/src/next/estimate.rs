@@ -198,7 +198,8 @@ impl Known {
     }
 }
 
-/// The declared columns when there is no log yet. Nothing can choose among an effect's constants then: the simplest stand for all.
+/// The declared columns when there is no log yet. Nothing can choose among an effect's constants then: the
+/// simplest stand for all.
 fn unmeasured_design(arguments: &NextArguments, tree: &Tree, motions: &Motions) -> Result<Design, Error> {
     let catalogue = Catalogue::default();
     let mut effects = Vec::new();

@@ -55,7 +55,8 @@ pub fn read(folder: &Path, tree: &Tree, progress: Progress<'_>) -> Result<Motion
     Ok(Motions { dataset: MotionDataset::new(joints.len(), motions)?, files, ranges })
 }
 
-/// What no motion moves, no motion can tell: every condition number would be infinite, and the choice arbitrary.
+/// What no motion moves, no motion can tell: every condition number would be infinite, and the choice
+/// arbitrary.
 fn check_excitation(folder: &Path, tree: &Tree, surveys: &[Survey]) -> Result<(), Error> {
     for joint in 0..tree.joint_count() {
         let travel = surveys.iter().map(|survey| survey.joints[joint].travel()).fold(0.0, f64::max);

@@ -1,4 +1,5 @@
-//! The chosen motion as the robot gets it: positions, velocities, accelerations, and the torque that the estimate predicts.
+//! The chosen motion as the robot gets it: positions, velocities, accelerations, and the torque that the
+//! estimate predicts.
 
 use phiw_curriculum::Motion;
 use phiw_dynamics::Tree;

@@ -38,7 +38,8 @@ impl Telling<'_> {
         if self.plan.forced { 0 } else { self.plan.allowed.len() }
     }
 
-    /// cond(Φ) of all that has been measured; none before anything has been. Infinite while something is not determined.
+    /// cond(Φ) of all that has been measured; none before anything has been. Infinite while something is not
+    /// determined.
     fn before(&self) -> Option<f64> {
         self.present.condition_numbers.last().copied().flatten()
     }

@@ -25,7 +25,8 @@ pub fn tree(urdf: &str, floating_base: bool) -> Tree {
     read_urdf(urdf, &UrdfOptions { floating_base, held: Vec::new() }).unwrap().tree
 }
 
-/// A motion of 6 s at 100 Hz that begins and ends at rest: sines under a smooth window, `speed` times as fast as a slow one.
+/// A motion of 6 s at 100 Hz that begins and ends at rest: sines under a smooth window, `speed` times as fast
+/// as a slow one.
 pub fn motion(seed: u64, reach: f64, speed: f64) -> Recording {
     let mut random = RandomNumbers::new(seed);
     let sines: Vec<[f64; 3]> = (0..JOINTS)

@@ -7,12 +7,13 @@ use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, re
 use faer::{Mat, Par};
 use phiw_dynamics::{check_index, check_size};
 
-/// Collects rows of \[Φ f\] and folds them into R, a block at a time. Memory does not depend on the number of rows, and
-/// nothing is allocated after [`FactorBuilder::new`].
+/// Collects rows of \[Φ f\] and folds them into R, a block at a time. Memory does not depend on the number of
+/// rows, and nothing is allocated after [`FactorBuilder::new`].
 pub struct FactorBuilder {
     columns: usize,
     rows: u64,
-    /// R in the first `columns` rows, then the rows that wait; as long as there is no R, the rows that wait come first.
+    /// R in the first `columns` rows, then the rows that wait; as long as there is no R, the rows that wait
+    /// come first.
     work: Mat<f64>,
     /// Rows of `work` that R takes: `columns`, or none before the first QR.
     triangle: usize,
@@ -24,8 +25,8 @@ pub struct FactorBuilder {
 impl FactorBuilder {
     /// For rows of `columns` numbers, the right-hand side included (as the last).
     pub fn new(columns: usize) -> Self {
-        // Twice a triangle's rows for each QR: the triangle that is factored again costs a third, and the block stays in the
-        // second-level cache.
+        // Twice a triangle's rows for each QR: the triangle that is factored again costs a third, and the
+        // block stays in the second-level cache.
         let capacity = (2 * columns).max(64);
         let size = columns + capacity;
         let block = recommended_block_size::<f64>(size, columns.max(1)).max(1);
@@ -98,7 +99,8 @@ impl FactorBuilder {
         Ok(())
     }
 
-    /// Adds all the rows that a factor stands for, each times `weight`; its column k becomes column `columns[k]` here.
+    /// Adds all the rows that a factor stands for, each times `weight`; its column k becomes column
+    /// `columns[k]` here.
     ///
     /// # Errors
     /// `columns` does not name a column of this builder for each column of `factor`.
@@ -156,8 +158,9 @@ impl FactorBuilder {
             MemStack::new(&mut self.stack),
             Default::default(),
         );
-        // faer's kernels leave the upper halves of the vector registers in use, and on some processors all scalar code after them runs at a
-        // third of its speed. A function for wide registers clears them when it returns; a mere fill would not use them.
+        // faer's kernels leave the upper halves of the vector registers in use, and on some processors all
+        // scalar code after them runs at a third of its speed. A function for wide registers clears them when
+        // it returns; a mere fill would not use them.
         let Self { columns, work, .. } = self;
         pulp::Arch::new().dispatch(
             #[inline(always)]

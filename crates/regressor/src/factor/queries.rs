@@ -6,7 +6,8 @@ use faer::Mat;
 use phiw_dynamics::check_size;
 use phiw_dynamics::dense::dot;
 
-/// A column whose part orthogonal to the columns before it is smaller than this share of its norm is undetermined.
+/// A column whose part orthogonal to the columns before it is smaller than this share of its norm is
+/// undetermined.
 const RANK_TOLERANCE: f64 = 1e-7;
 
 /// A least-squares solution (paper, equation 4).

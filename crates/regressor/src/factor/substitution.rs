@@ -2,7 +2,8 @@
 
 use phiw_dynamics::dense::dot;
 
-/// `x` ← R⁻¹·x, R upper triangular with as many columns as `x` has elements; `column(k)` begins with the elements of column k down to the diagonal.
+/// `x` ← R⁻¹·x, R upper triangular with as many columns as `x` has elements; `column(k)` begins with the
+/// elements of column k down to the diagonal.
 pub fn solve_upper<'a>(column: impl Fn(usize) -> &'a [f64], x: &mut [f64]) {
     for k in (0..x.len()).rev() {
         let entries = column(k);

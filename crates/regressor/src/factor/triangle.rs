@@ -7,7 +7,8 @@ use phiw_dynamics::{check_index, check_size};
 
 /// The upper triangular R with RᵀR = \[Φ f\]ᵀ\[Φ f\]; the last column is the right-hand side f.
 ///
-/// The first non-zero entry of each row is positive, so that equal rows give equal factors in whatever order they came.
+/// The first non-zero entry of each row is positive, so that equal rows give equal factors in whatever order
+/// they came.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Factor {
     columns: usize,
@@ -44,8 +45,8 @@ impl Factor {
         Factor { columns, rows, r }
     }
 
-    /// The factor whose upper triangle is `entries`, row by row from the diagonal on, exactly as [`Self::triangle`] gave it; it stands for
-    /// `rows` rows.
+    /// The factor whose upper triangle is `entries`, row by row from the diagonal on, exactly as
+    /// [`Self::triangle`] gave it; it stands for `rows` rows.
     ///
     /// # Errors
     /// There are not `columns`·(`columns` + 1)/2 entries.
@@ -128,8 +129,8 @@ impl Factor {
         Ok(builder.factor())
     }
 
-    /// The factor of `columns` of \[Φ f\], in that order: drops, keeps and reorders columns. The last one named is the new
-    /// right-hand side.
+    /// The factor of `columns` of \[Φ f\], in that order: drops, keeps and reorders columns. The last one
+    /// named is the new right-hand side.
     ///
     /// # Errors
     /// A column does not exist.

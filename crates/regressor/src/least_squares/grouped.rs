@@ -1,7 +1,8 @@
 //! One factor for each torque.
 //!
-//! The torque of joint j feels only the bodies that j moves: its factor holds only their columns, which is smaller and
-//! quicker than one factor of all columns, and lets the joints' weights change without going back to the rows.
+//! The torque of joint j feels only the bodies that j moves: its factor holds only their columns, which is
+//! smaller and quicker than one factor of all columns, and lets the joints' weights change without going back
+//! to the rows.
 
 use crate::RegressorError;
 use crate::factor::{Factor, FactorBuilder};

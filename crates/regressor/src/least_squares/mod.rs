@@ -1,4 +1,5 @@
-//! Least squares over rows that come in groups: one group for each torque, each with its own columns and its own noise.
+//! Least squares over rows that come in groups: one group for each torque, each with its own columns and its
+//! own noise.
 
 mod grouped;
 mod robust;

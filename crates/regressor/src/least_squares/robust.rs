@@ -8,7 +8,8 @@ use phiw_dynamics::check_index;
 /// How rows are judged.
 #[derive(Clone, Copy, Debug)]
 pub struct RobustOptions {
-    /// Residuals beyond this multiple of the noise count linearly (Huber's k; 1.345 loses 5 % on Gaussian noise).
+    /// Residuals beyond this multiple of the noise count linearly (Huber's k; 1.345 loses 5 % on Gaussian
+    /// noise).
     pub threshold: f64,
     /// Passes over the rows after the first.
     pub passes: usize,
@@ -29,8 +30,8 @@ pub struct RobustFit {
     pub downweighted: Vec<f64>,
 }
 
-/// Fits rows that `stream` can bring again and again: it calls its argument with (group, row) for every row of \[Φ f\],
-/// the right-hand side last. Memory does not depend on the number of rows.
+/// Fits rows that `stream` can bring again and again: it calls its argument with (group, row) for every row
+/// of \[Φ f\], the right-hand side last. Memory does not depend on the number of rows.
 ///
 /// `group_parameters[k]` names the parameter of each column of group k's rows.
 ///
@@ -50,7 +51,8 @@ pub fn robust_least_squares<E: From<RegressorError>>(
     })?;
     let mut solution = solve(parameter_count, group_parameters, &mut builders)?;
     let mut downweighted = vec![0.0; group_parameters.len()];
-    // The scale of the noise must not feel the outliers: a histogram of |residual| gives its median in constant memory.
+    // The scale of the noise must not feel the outliers: a histogram of |residual| gives its median in
+    // constant memory.
     let mut scales = solution.group_std.clone();
     for _ in 0..options.passes {
         builders.iter_mut().for_each(FactorBuilder::clear);

@@ -28,7 +28,8 @@ pub fn ordinary_least_squares(factor: &GroupedFactor) -> Result<Solution, Regres
     factor.combine(&vec![1.0; factor.groups().len()])?.solve()
 }
 
-/// Least squares with each group weighted by the inverse of its own residual, iterated until the weights settle.
+/// Least squares with each group weighted by the inverse of its own residual, iterated until the weights
+/// settle.
 ///
 /// Groups that the model fits exactly get the weight of a residual of 1e-9 of their right-hand side.
 ///
@@ -67,7 +68,8 @@ pub fn weighted_least_squares(factor: &GroupedFactor) -> Result<WeightedSolution
     }
 }
 
-/// Rows of each group less its share of the parameters (shared in proportion to the groups that determine them).
+/// Rows of each group less its share of the parameters (shared in proportion to the groups that determine
+/// them).
 fn degrees_of_freedom(factor: &GroupedFactor) -> Vec<f64> {
     let mut users = vec![0.0_f64; factor.parameter_count()];
     for group in factor.groups() {

@@ -22,7 +22,8 @@ pub struct EffectSection {
     pub relative_before: f64,
     /// Pooled held-out error with it in.
     pub relative_after: f64,
-    /// Share of the residual's variance above the noise floor that it took away, on data it was not fitted to.
+    /// Share of the residual's variance above the noise floor that it took away, on data it was not fitted
+    /// to.
     pub explains: f64,
     /// Its probability against its rivals.
     pub confidence: f64,

@@ -72,7 +72,8 @@ impl ErrorTable {
             .flat_map(|row| [Some(row.relative()), row.share(row.before), row.share(row.noise_floor)])
             .flatten()
             .filter(|share| share.is_finite())
-            // A joint that hardly loads may be off by several times its torque; the others shall stay readable.
+            // A joint that hardly loads may be off by several times its torque; the others shall stay
+            // readable.
             .fold(0.01, |scale: f64, share| scale.max(share.min(1.0)));
         let pooled = &self.pooled;
         let pooled_relative = pooled.held_out.or(pooled.train).unwrap_or(f64::NAN);

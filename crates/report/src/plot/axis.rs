@@ -91,7 +91,8 @@ fn few_decades((low, high): (f64, f64)) -> Vec<(f64, String)> {
         .collect()
 }
 
-/// The nearest of 1, 2 and 5 times the decades below and above a range, so that a narrow one has ticks and is not lost between whole decades.
+/// The nearest of 1, 2 and 5 times the decades below and above a range, so that a narrow one has ticks and is
+/// not lost between whole decades.
 fn between_round_values((low, high): (f64, f64)) -> (f64, f64) {
     let round = || {
         let exponents = low.floor() as i32..=high.ceil() as i32;

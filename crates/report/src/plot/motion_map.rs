@@ -1,4 +1,5 @@
-//! A dataset of motions as blocks, iteration by iteration: which were allowed, how good each was, which was chosen.
+//! A dataset of motions as blocks, iteration by iteration: which were allowed, how good each was, which was
+//! chosen.
 
 use super::axis::{Axis, log10};
 use super::canvas::{Svg, WIDTH, picture};
@@ -37,8 +38,8 @@ pub struct MotionMap<'a> {
 /// Lightest and darkest part of the colour.
 const SHADES: (f64, f64) = (0.06, 0.95);
 
-/// A block for each motion in each row, the darker the smaller its value among the row's; allowed blocks are framed, chosen ones dotted and
-/// joined by a line.
+/// A block for each motion in each row, the darker the smaller its value among the row's; allowed blocks are
+/// framed, chosen ones dotted and joined by a line.
 pub fn motion_map(input: &MotionMap<'_>) -> Svg {
     let count = input.rows.iter().map(|row| row.values.len()).max().unwrap_or(0);
     let names: Vec<String> = input.rows.iter().rev().map(|row| row.name.to_owned()).collect();

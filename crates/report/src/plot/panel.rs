@@ -56,7 +56,8 @@ pub(super) fn panel<'a>(sheet: &Sheet<'a>, x: &Axis, y: &Axis, legend: &[Legend<
         let style = if label == "0" { zero } else { grid };
         sheet.draw(&PathElement::new(vec![(left, to_y(*value)), (right, to_y(*value))], style))?;
     }
-    // The abscissa's label takes the place of tick labels at the right end, or has a line of its own under names.
+    // The abscissa's label takes the place of tick labels at the right end, or has a line of its own under
+    // names.
     let (label_line, label_from) = if x.label.is_empty() || x.names {
         (bottom + px(5 + LINE), i32::MAX)
     } else {

@@ -42,7 +42,8 @@ pub fn torque_panel(input: &TorquePanel<'_>) -> Svg {
 pub struct ResidualPanel<'a> {
     /// Measured minus predicted torque over time (s).
     pub residual: Line<'a>,
-    /// The torque above it (s), whose times are shown, so that the two stand in line though the residual may have gaps at its ends.
+    /// The torque above it (s), whose times are shown, so that the two stand in line though the residual may
+    /// have gaps at its ends.
     pub torque: Line<'a>,
     /// RMS of the noise, drawn as a band of ± this; none is drawn where it is not known.
     pub noise_floor: Option<f64>,

@@ -213,7 +213,8 @@ mod tests {
         Box::new(OwnTorque::new(kind, tree, joint, constants, &parameters, column))
     }
 
-    /// Candidates with a rubbing or a grinding part beside `present`, each as the kinds and constants of its effects.
+    /// Candidates with a rubbing or a grinding part beside `present`, each as the kinds and constants of its
+    /// effects.
     fn candidates(present: &[EffectSpec]) -> Vec<Vec<(String, Vec<f64>)>> {
         let urdf = r#"<robot name="arm"><link name="base"/><link name="arm"/>
             <joint name="pivot" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/></joint></robot>"#;

@@ -26,14 +26,15 @@ const NEGLIGIBLE: f64 = 0.01;
 /// Log-likelihood, and share of the best one's, by which a simpler candidate may be worse and still be taken.
 const NEAR_SCORE: f64 = 6.0;
 const NEAR_SHARE: f64 = 0.02;
-/// Share of the best one's score from which a candidate may still win once it is refined: one that is linear only to first order, or a simpler one beside which
-/// the declared signs have not their best widths yet.
+/// Share of the best one's score from which a candidate may still win once it is refined: one that is linear
+/// only to first order, or a simpler one beside which the declared signs have not their best widths yet.
 const UNREFINED_SHARE: f64 = 0.7;
 /// Candidates that are asked whether they are believed.
 const TRIES: usize = 4;
 /// Candidates that are tried in full.
 const ENTRANTS: usize = 5;
-/// What an effect that the model has taken up in part must be above the least of the others: share of a residual; times the size; times the significance.
+/// What an effect that the model has taken up in part must be above the least of the others: share of a
+/// residual; times the size; times the significance.
 const ABSORBED_SHARE: f64 = 0.25;
 const ABSORBED_SIZE: f64 = 3.0;
 const ABSORBED_SIGNIFICANCE: f64 = 1.5;
@@ -93,7 +94,8 @@ impl Search<'_> {
         })
     }
 
-    /// The simplest candidate that the folds cannot tell from the best, then those that it is to be compared with. `None`: there is no candidate.
+    /// The simplest candidate that the folds cannot tell from the best, then those that it is to be compared
+    /// with. `None`: there is no candidate.
     fn entrants(
         &self,
         fitted: &Fitted,
@@ -145,7 +147,8 @@ impl Search<'_> {
     ) -> Result<bool, IdentificationError> {
         let stage = &fitted.stage;
         let rows = stage.rows(chosen.candidate);
-        // What is linear to first order only is judged before it is in force: its columns are not yet what they will be.
+        // What is linear to first order only is judged before it is in force: its columns are not yet what
+        // they will be.
         let linearised = self.is_linearised(&stage.candidates[chosen.candidate].specs[0])?;
         let needed = if linearised { FIRST_ORDER } else { 1.0 } * self.options.least_significance;
         Ok(chosen.held_out_gain > 0.0
@@ -153,10 +156,12 @@ impl Search<'_> {
             && self.matters(stage, &rows, &chosen.parameters, significance, &fitted.refit, &chosen.refit)?)
     }
 
-    /// Whether what lies between two fits, one without and one with the parameters `own`, which act on `rows`, is worth a name.
+    /// Whether what lies between two fits, one without and one with the parameters `own`, which act on
+    /// `rows`, is worth a name.
     ///
-    /// It must take away a share of the residual of a torque that it acts on, and be a share of that torque. Where the other parameters have taken up most of it,
-    /// it is to be seen on any torque, and must be a share of its torque by itself; the evidence must then be stronger.
+    /// It must take away a share of the residual of a torque that it acts on, and be a share of that torque.
+    /// Where the other parameters have taken up most of it, it is to be seen on any torque, and must be a
+    /// share of its torque by itself; the evidence must then be stronger.
     pub(super) fn matters(
         &self,
         stage: &Stage,
@@ -180,7 +185,8 @@ impl Search<'_> {
             let taken = (before - after).max(0.0);
             let share = taken / before.max(f64::MIN_POSITIVE);
             largest_share = largest_share.max(share);
-            // The form of an effect is never quite the catalogue's: a small part of what the others took is no effect of its own.
+            // The form of an effect is never quite the catalogue's: a small part of what the others took is
+            // no effect of its own.
             let by_others = self.initial.as_ref().map_or(0.0, |initial| initial[row] - before);
             seen |= rows.contains(&row)
                 && share >= options.least_share
@@ -195,7 +201,8 @@ impl Search<'_> {
         Ok(seen || absorbed)
     }
 
-    /// Whether a torque's residual is no larger than it was when the held model was fitted: then nothing has changed there since.
+    /// Whether a torque's residual is no larger than it was when the held model was fitted: then nothing has
+    /// changed there since.
     fn is_as_it_was(&self, row: usize, squares: f64, rows: u64) -> bool {
         let held = self.input.held.as_ref();
         held.is_some_and(|held| (squares / rows.max(1) as f64).sqrt() <= AS_IT_WAS * held.residual_std[row])
@@ -211,8 +218,9 @@ impl Search<'_> {
 
     /// The branch in which the choice is in the model, constants refined, and its parameters.
     ///
-    /// Where there are several entrants, each gets a branch of its own: an effect that is linear only to first order, or whose constants come from a
-    /// coarse grid, shows what it can explain after it is refined.
+    /// Where there are several entrants, each gets a branch of its own: an effect that is linear only to
+    /// first order, or whose constants come from a coarse grid, shows what it can explain after it is
+    /// refined.
     pub(super) fn with_choice(
         &self,
         fitted: &Fitted,
@@ -238,7 +246,8 @@ impl Search<'_> {
         let highest = standings.iter().map(|standing| standing.score).fold(f64::NEG_INFINITY, f64::max);
         standings.retain(|standing| standing.score >= highest - near_score(highest));
         standings.sort_by_key(|standing| complexity(&fitted.stage, standing.judged));
-        // The odds are those of the choice itself: one with more parameters than the one chosen has to be better by what the choice asks for.
+        // The odds are those of the choice itself: one with more parameters than the one chosen has to be
+        // better by what the choice asks for.
         let counted = |standing: &Standing<'_, Self>| complexity(&fitted.stage, standing.judged).0;
         let fewest = standings.first().map_or(0, counted);
         for standing in standings.iter_mut().filter(|standing| counted(standing) > fewest) {

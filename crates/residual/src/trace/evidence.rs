@@ -1,4 +1,5 @@
-//! What the factors say of a candidate: refit of everything with it, error on motion held out, and how sure that is.
+//! What the factors say of a candidate: refit of everything with it, error on motion held out, and how sure
+//! that is.
 
 use super::screening::Whole;
 use faer::Mat;
@@ -23,7 +24,8 @@ pub(super) struct Evidence<'a> {
     pub prior: Option<&'a Factor>,
     /// For each torque, the model's rows (the prior behind them).
     rows: Vec<Factor>,
-    /// For each torque, the model's rows of all the others and the prior; filled in when it is first asked for.
+    /// For each torque, the model's rows of all the others and the prior; filled in when it is first asked
+    /// for.
     others: Vec<OnceLock<Factor>>,
     /// The model's rows of all torques, for the quick look; filled in when it is first asked for.
     whole: OnceLock<Whole>,
@@ -109,7 +111,8 @@ impl<'a> Evidence<'a> {
 
     /// Refits the model with `added` parameters of the design; `rows` are the torques that they act on.
     ///
-    /// `None` where the added columns have nothing left after the model has absorbed its part: not identifiable from these logs.
+    /// `None` where the added columns have nothing left after the model has absorbed its part: not
+    /// identifiable from these logs.
     pub fn refit(&self, added: &[usize], rows: &[usize]) -> Result<Option<Refit>, RegressorError> {
         let (places, count) = self.places();
         let columns = count + added.len();
@@ -135,7 +138,8 @@ impl<'a> Evidence<'a> {
             }
         }
         let factor = builder.factor();
-        // Columns that the motion does not excite, or that the model has absorbed but for a thousandth, say nothing: the rest of the candidate may.
+        // Columns that the motion does not excite, or that the model has absorbed but for a thousandth, say
+        // nothing: the rest of the candidate may.
         let silent = |column: usize| factor.entry(column, column) < ABSORBED * factor.column_norm(column);
         let undetermined = factor.undetermined_columns();
         if undetermined.iter().any(|&column| column < count) {
@@ -184,7 +188,8 @@ impl<'a> Evidence<'a> {
         })
     }
 
-    /// Residual sum of squares of each torque; those that the added columns do not act on need the model's columns only.
+    /// Residual sum of squares of each torque; those that the added columns do not act on need the model's
+    /// columns only.
     fn squares(
         &self,
         factors: &GroupedFactor,
@@ -215,8 +220,9 @@ impl<'a> Evidence<'a> {
 
     /// How many standard deviations the added columns' fitted combination is from nothing.
     ///
-    /// The standard deviation comes from the scores of whole folds (a cluster-robust sandwich, Liang & Zeger 1986), so that samples that are correlated
-    /// within a fold are not counted one by one. It is that of the combination's scale: the Wald form of several parameters would need more folds than there are.
+    /// The standard deviation comes from the scores of whole folds (a cluster-robust sandwich, Liang & Zeger
+    /// 1986), so that samples that are correlated within a fold are not counted one by one. It is that of the
+    /// combination's scale: the Wald form of several parameters would need more folds than there are.
     pub fn significance(&self, added: &[usize]) -> Result<f64, RegressorError> {
         let (places, count) = self.places();
         let columns = count + added.len();
@@ -295,8 +301,8 @@ pub(super) const ABSORBED: f64 = 2e-3;
 
 /// Pushes a torque's rows over the model's determined columns, the added ones and the right-hand side.
 ///
-/// A group's columns are in the order of the design's parameters, the model's first: its factor needs no new decomposition for the model's part,
-/// and what is below it is reduced to the added columns.
+/// A group's columns are in the order of the design's parameters, the model's first: its factor needs no new
+/// decomposition for the model's part, and what is below it is reduced to the added columns.
 fn push_group(
     builder: &mut FactorBuilder,
     group: &Group,

@@ -9,9 +9,9 @@ const POSES: usize = 400;
 
 /// Standard deviation of each torque's residual under a right model \[N·m, N\], after the filters.
 ///
-/// Torque noise goes through the parallel filter. Position noise goes through the differentiating low-pass and the parallel filter, then through
-/// the inertia: τ feels q̈'s noise by the mass matrix, which depends on the pose and is averaged over the logs. `rotor_inertia` is
-/// what the effects add to its diagonal.
+/// Torque noise goes through the parallel filter. Position noise goes through the differentiating low-pass
+/// and the parallel filter, then through the inertia: τ feels q̈'s noise by the mass matrix, which depends on
+/// the pose and is averaged over the logs. `rotor_inertia` is what the effects add to its diagonal.
 ///
 /// # Errors
 /// A log cannot be read, or the conditioning does not fit it.

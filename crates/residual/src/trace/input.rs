@@ -20,14 +20,18 @@ pub struct TraceOptions {
     pub least_size: f64,
     /// A residual over the noise floor by less than this is noise.
     pub floor_margin: f64,
-    /// Autocorrelation over 0.25 to 0.5 s from which a residual is structure: that of the declared model, and that of one to which effects were added. To say that
-    /// an effect explains all asks for more than to say that nothing is missing.
+    /// Autocorrelation over 0.25 to 0.5 s from which a residual is structure: that of the declared model, and
+    /// that of one to which effects were added. To say that an effect explains all asks for more than to say
+    /// that nothing is missing.
     pub structured_correlation: [f64; 2],
-    /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which it is structure: the noise of a robot's sensors is of one
-    /// colour, and raises all residuals over their floors alike.
+    /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which it
+    /// is structure: the noise of a robot's sensors is of one colour, and raises all residuals over their
+    /// floors alike.
     pub structured_ratio: f64,
-    /// RMS residual over the RMS of its torque from which it may be structure: filters and encoders leave as much of a right model. The second one is for torques on which
-    /// effects act that were found, and those of the joints next to them, and for what follows the motion only: to say of a torque that it is explained asks for more.
+    /// RMS residual over the RMS of its torque from which it may be structure: filters and encoders leave as
+    /// much of a right model. The second one is for torques on which effects act that were found, and those
+    /// of the joints next to them, and for what follows the motion only: to say of a torque that it is
+    /// explained asks for more.
     pub structured_share: [f64; 2],
     /// Torques whose residual is to be explained: what acts on none of them is no candidate. `None`: all.
     pub torques: Option<Vec<usize>>,

@@ -1,7 +1,8 @@
 //! Tracing a residual to the physical effect that the model lacks.
 //!
-//! The loop: fit, ask whether there is structure, try every candidate of the catalogue by refitting everything with it, take the
-//! simplest that explains on motion held out, refine its constants, and begin again, until nothing that is left has a name.
+//! The loop: fit, ask whether there is structure, try every candidate of the catalogue by refitting
+//! everything with it, take the simplest that explains on motion held out, refine its constants, and begin
+//! again, until nothing that is left has a name.
 
 mod candidate;
 mod choice;

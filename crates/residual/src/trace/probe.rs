@@ -1,4 +1,5 @@
-//! What a residual follows, without a name: shapes over each signal, fitted on some folds, judged on the others.
+//! What a residual follows, without a name: shapes over each signal, fitted on some folds, judged on the
+//! others.
 
 use super::candidate::{Candidate, Candidates};
 use super::evidence::paired_t;
@@ -16,19 +17,23 @@ use rayon::prelude::*;
 pub struct Dependence {
     /// The joint whose residual it is.
     pub joint: String,
-    /// The signal, as in `report.json`: `q`, `qd`, `qdd`, `tau`, `t`, or another joint's `q.<joint>`, `qd.<joint>`.
+    /// The signal, as in `report.json`: `q`, `qd`, `qdd`, `tau`, `t`, or another joint's `q.<joint>`,
+    /// `qd.<joint>`.
     pub signal: String,
-    /// Share of the residual variance that shapes over the signal predict on folds that they were not fitted on.
+    /// Share of the residual variance that shapes over the signal predict on folds that they were not fitted
+    /// on.
     pub share: f64,
 }
 
-/// A residual follows a signal that foretells this share of its variance on other folds, this many standard deviations (over the folds) from nothing. Shapes over
-/// noise foretell less than nothing: they were fitted on other noise.
+/// A residual follows a signal that foretells this share of its variance on other folds, this many standard
+/// deviations (over the folds) from nothing. Shapes over noise foretell less than nothing: they were fitted
+/// on other noise.
 const LEAST_SHARE: f64 = 0.05;
 const LEAST_SIGNIFICANCE: f64 = 2.2;
 /// Parts that take turns in being left out.
 const PARTS: usize = 5;
-/// A shape's height is drawn to nothing as if this share of all rows had said so: where few rows are, it does not swing out.
+/// A shape's height is drawn to nothing as if this share of all rows had said so: where few rows are, it does
+/// not swing out.
 const DRAWN: f64 = 0.01;
 /// The same for the model's parameters: enough for those that the rows do not determine.
 const DRAWN_MODEL: f64 = 1e-6;
@@ -58,8 +63,8 @@ pub(super) fn probe(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<Dependence>, Ide
     Ok(found)
 }
 
-/// Those of the torques `rows` whose residual follows the motion of the joint or of its neighbours. Noise that does not know the motion foretells nothing, whatever
-/// its colour.
+/// Those of the torques `rows` whose residual follows the motion of the joint or of its neighbours. Noise
+/// that does not know the motion foretells nothing, whatever its colour.
 pub(super) fn following(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<usize>, IdentificationError> {
     let shapes = |row| {
         let mut shapes = own_shapes(fit.fixed, row, fit.ranges);
@@ -146,7 +151,8 @@ impl<'a> Residual<'a> {
         Residual { folds: stage.folds.iter().collect(), parameters, row, free }
     }
 
-    /// The sum of squares left of each fold after a fit of the free parameters and `added` to the other parts of the folds.
+    /// The sum of squares left of each fold after a fit of the free parameters and `added` to the other parts
+    /// of the folds.
     fn left_over(&self, added: &[usize]) -> Result<Vec<f64>, RegressorError> {
         let folds: Result<Vec<Factor>, RegressorError> =
             self.folds.iter().map(|fold| self.reduced(fold, added)).collect();

@@ -14,8 +14,8 @@ const WORTH_A_CHANGE: f64 = 0.03;
 const REFINEMENTS: usize = 3;
 
 impl Search<'_> {
-    /// Refines the constants of the effect found last and the widths of the signs on its joints, and linearises anew what is linearised: one
-    /// pass a step, for all of them.
+    /// Refines the constants of the effect found last and the widths of the signs on its joints, and
+    /// linearises anew what is linearised: one pass a step, for all of them.
     pub(super) fn refine(&mut self, mut parameters: Vec<f64>) -> Result<Vec<f64>, IdentificationError> {
         for step in 0..REFINEMENTS {
             let (places, candidates) = self.near(step)?;
@@ -48,8 +48,9 @@ impl Search<'_> {
         Ok(parameters)
     }
 
-    /// Constants to try in the place of those of the effects found and of the declared ones whose constants the data chose: each missing effect has
-    /// bent the choice. All of the kind's scan first, then closer and closer to the best.
+    /// Constants to try in the place of those of the effects found and of the declared ones whose constants
+    /// the data chose: each missing effect has bent the choice. All of the kind's scan first, then closer and
+    /// closer to the best.
     fn near(&self, step: usize) -> Result<(Vec<usize>, Candidates), IdentificationError> {
         let declared = self.input.declared.len();
         // A torque that is down to its noise has nothing to say about a constant.
@@ -87,7 +88,8 @@ impl Search<'_> {
         Ok((places, candidates))
     }
 
-    /// The best of the constants near one effect's, if any beats its own; the refit's parameters are in the effect's own place.
+    /// The best of the constants near one effect's, if any beats its own; the refit's parameters are in the
+    /// effect's own place.
     fn best_near(
         &self,
         fitted: &Fitted,
@@ -150,8 +152,9 @@ impl Search<'_> {
     }
 }
 
-/// For a declared effect the variant with the smallest constants among those that are nearly as good as the best; `None` where the present one is nearly as good,
-/// so that a declared model means the same whatever has been found beside it.
+/// For a declared effect the variant with the smallest constants among those that are nearly as good as the
+/// best; `None` where the present one is nearly as good, so that a declared model means the same whatever has
+/// been found beside it.
 fn simplest(
     candidates: &[Candidate],
     judged: Vec<Judged>,

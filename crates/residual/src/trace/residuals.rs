@@ -6,10 +6,12 @@ use phiw_telemetry::FilterScratch;
 /// What the residual of each torque looks like on some folds.
 #[derive(Clone, Debug, Default)]
 pub struct ResidualShape {
-    /// Autocorrelation of each torque's residual, less what the filter alone gives to noise: the largest of those 0.25 to 0.5 s apart. Near zero for
-    /// noise, whatever its colour within the filter's band. At several distances, since that of a residual that swings once a second is zero at one of them.
+    /// Autocorrelation of each torque's residual, less what the filter alone gives to noise: the largest of
+    /// those 0.25 to 0.5 s apart. Near zero for noise, whatever its colour within the filter's band. At
+    /// several distances, since that of a residual that swings once a second is zero at one of them.
     pub autocorrelation: Vec<f64>,
-    /// For each joint, spatial frequencies \[periods·2π over the unit of position\] at which its residual has peaks, strongest first.
+    /// For each joint, spatial frequencies \[periods·2π over the unit of position\] at which its residual has
+    /// peaks, strongest first.
     pub ripple_frequencies: Vec<Vec<f64>>,
     /// Filtered rows that were looked at.
     pub rows: u64,

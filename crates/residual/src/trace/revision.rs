@@ -7,7 +7,8 @@ use super::stage::{Judged, Thoroughness};
 use super::tracing::RivalEffect;
 use phiw_identification::IdentificationError;
 
-/// Share of an effect's score from which a candidate could win in its place on other motion, and how many of those are tried.
+/// Share of an effect's score from which a candidate could win in its place on other motion, and how many of
+/// those are tried.
 const CONTENDER: f64 = 0.5;
 const CONTENDERS: usize = 8;
 /// Share of the draws in which an effect must be chosen.
@@ -59,8 +60,8 @@ impl Search<'_> {
         self.refine(parameters)
     }
 
-    /// A candidate that, in the place of an effect found earlier, does as much as the best candidate beside it (whose score is at least `score`):
-    /// one effect instead of two.
+    /// A candidate that, in the place of an effect found earlier, does as much as the best candidate beside
+    /// it (whose score is at least `score`): one effect instead of two.
     pub(super) fn replacement(
         &self,
         fitted: &Fitted,
@@ -94,8 +95,9 @@ impl Search<'_> {
         Ok(best)
     }
 
-    /// Chooses again on bootstrap draws of the training folds, each effect found beside all the others: what wins in some draw is a rival. Gives the place of the
-    /// effect that is chosen too seldom to keep its name, if there is one.
+    /// Chooses again on bootstrap draws of the training folds, each effect found beside all the others: what
+    /// wins in some draw is a rival. Gives the place of the effect that is chosen too seldom to keep its
+    /// name, if there is one.
     pub(super) fn unstable(&mut self, fitted: &Fitted) -> Result<Option<usize>, IdentificationError> {
         let stage = &fitted.stage;
         let declared = self.input.declared.len();

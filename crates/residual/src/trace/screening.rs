@@ -1,8 +1,9 @@
-//! A quick look at many candidates: the refit of [`Evidence::refit`] from the normal equations of the candidate's few columns beside the model's
-//! factor (semi-normal equations, Björck 1987).
+//! A quick look at many candidates: the refit of [`Evidence::refit`] from the normal equations of the
+//! candidate's few columns beside the model's factor (semi-normal equations, Björck 1987).
 //!
-//! A candidate costs columns² instead of columns³. What is left of its columns beside the model's is known to about ε·cond of their norm, far below the share at
-//! which a column counts as absorbed; who is chosen is then refitted in full.
+//! A candidate costs columns² instead of columns³. What is left of its columns beside the model's is known to
+//! about ε·cond of their norm, far below the share at which a column counts as absorbed; who is chosen is
+//! then refitted in full.
 
 use super::evidence::{ABSORBED, Evidence, Refit};
 use phiw_regressor::RegressorError;
@@ -88,7 +89,8 @@ impl Evidence<'_> {
     }
 }
 
-/// (column of the group's factor, place among the added) of the added parameters that act on the group's torque.
+/// (column of the group's factor, place among the added) of the added parameters that act on the group's
+/// torque.
 fn columns_of(group: &Group, added: &[usize]) -> Vec<(usize, usize)> {
     // A group's columns are in the order of the design's parameters.
     let column = |parameter: &usize| group.parameters.binary_search(parameter).ok();
@@ -105,7 +107,8 @@ fn product(factor: &Factor, left: usize, right: usize) -> f64 {
     dot(&factor.column(left)[..size], &factor.column(right)[..size])
 }
 
-/// Solves the added columns' equations one by one (Cholesky); a column with nothing left is left out and gets zero. `None` if all are.
+/// Solves the added columns' equations one by one (Cholesky); a column with nothing left is left out and gets
+/// zero. `None` if all are.
 fn solve_heard(left: &[f64], gram: &[f64], right: &[f64]) -> Option<Vec<f64>> {
     let k = right.len();
     let mut triangle = vec![0.0; k * k];
@@ -172,7 +175,8 @@ mod tests {
     use phiw_regressor::factor::FactorBuilder;
     use phiw_regressor::least_squares::{Group, GroupedFactor};
 
-    /// Two torques over three parameters of a model and two candidates, the second of which nearly depends on the model.
+    /// Two torques over three parameters of a model and two candidates, the second of which nearly depends on
+    /// the model.
     fn factors(random: &mut RandomNumbers) -> GroupedFactor {
         let mut number = || random.uniform(-1.0, 1.0);
         let columns = [vec![0, 1, 3, 4], vec![1, 2, 4]];

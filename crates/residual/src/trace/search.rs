@@ -218,7 +218,8 @@ impl Search<'_> {
         self.input.held.is_some() && place < self.input.declared.len()
     }
 
-    /// Whether the effect at `place` is in force through its point of linearisation, so that taking its columns away does not take it away.
+    /// Whether the effect at `place` is in force through its point of linearisation, so that taking its
+    /// columns away does not take it away.
     pub(super) fn is_linearised(&self, spec: &EffectSpec) -> Result<bool, IdentificationError> {
         let built = self.fixed.build(std::slice::from_ref(spec))?;
         let mut linearised =

@@ -11,7 +11,8 @@ pub(super) type Shape = (String, Box<dyn Effect>);
 /// Nodes over the joint's own signals, and over those of other joints.
 const OWN_NODES: usize = 10;
 const OTHER_NODES: usize = 6;
-/// Speeds and torques bend most near nothing: nodes stand evenly over asinh of the signal over this share of its RMS, up to this many times its RMS.
+/// Speeds and torques bend most near nothing: nodes stand evenly over asinh of the signal over this share of
+/// its RMS, up to this many times its RMS.
 const FINE: f64 = 0.05;
 const FAR: f64 = 3.0;
 

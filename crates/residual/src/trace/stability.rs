@@ -1,4 +1,5 @@
-//! Would other motion have led to another name? The selection again on bootstrap draws of the training folds (Efron 1979).
+//! Would other motion have led to another name? The selection again on bootstrap draws of the training folds
+//! (Efron 1979).
 
 use super::choice::near_score;
 use super::evidence::ABSORBED;
@@ -19,10 +20,11 @@ pub(super) struct Finalist {
     pub complexity: (usize, usize),
 }
 
-/// For each draw the place of the finalist that would have been chosen beside the `determined` parameters of the model; `None` where none gains anything.
+/// For each draw the place of the finalist that would have been chosen beside the `determined` parameters of
+/// the model; `None` where none gains anything.
 ///
-/// A draw takes as many training folds as there are, with replacement. Its refits work on the folds' normal equations, which are small sums once the folds'
-/// factors are there; half the digits are enough to rank.
+/// A draw takes as many training folds as there are, with replacement. Its refits work on the folds' normal
+/// equations, which are small sums once the folds' factors are there; half the digits are enough to rank.
 pub(super) fn winners(
     fitted: &Fitted,
     determined: &[bool],
@@ -54,7 +56,8 @@ impl Dice {
     }
 }
 
-/// Scalar products of the columns of one torque over one fold: the model's, the finalists', and the torque as the last.
+/// Scalar products of the columns of one torque over one fold: the model's, the finalists', and the torque as
+/// the last.
 #[derive(Clone)]
 struct Products {
     size: usize,
@@ -294,7 +297,8 @@ impl Whole {
         x
     }
 
-    /// The solution with some unknowns beside the model's; those that the model absorbs are left out. `None` if all are.
+    /// The solution with some unknowns beside the model's; those that the model absorbs are left out. `None`
+    /// if all are.
     fn with(&self, system: &[f64], added: &[usize], unknowns: usize) -> Option<Vec<f64>> {
         let width = unknowns + 1;
         let model = self.scale.len();

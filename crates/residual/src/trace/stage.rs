@@ -158,8 +158,9 @@ impl Stage {
         rows
     }
 
-    /// Candidates whose columns would be the same if the model did not have the effect at `place`. A column of all torque that the model knows of has that effect in
-    /// it, and does the effect's work under its own name where nothing else binds it.
+    /// Candidates whose columns would be the same if the model did not have the effect at `place`. A column
+    /// of all torque that the model knows of has that effect in it, and does the effect's work under its own
+    /// name where nothing else binds it.
     pub fn independent_of(&self, place: usize) -> Vec<usize> {
         let rows = self.rows_of(place);
         let made_of_it = |candidate: &usize| {
@@ -196,7 +197,8 @@ impl Stage {
         Ok((0..model).map(|parameter| !undetermined.contains(&parameter)).collect())
     }
 
-    /// The same where a prior determines the base and the effects that it knew; those added since need the rows.
+    /// The same where a prior determines the base and the effects that it knew; those added since need the
+    /// rows.
     fn determined_beside(&self, prior: &Prior) -> Result<Vec<bool>, RegressorError> {
         let model = self.model_size();
         // A parameter that was not determined then would take up what has come since: it stays out.
@@ -237,7 +239,8 @@ impl Stage {
         )
     }
 
-    /// Screens every candidate of `which`, or refits with it in full; those that leave nothing to identify, or break their bounds, are left out.
+    /// Screens every candidate of `which`, or refits with it in full; those that leave nothing to identify,
+    /// or break their bounds, are left out.
     ///
     /// `inflation` says how many correlated samples make one.
     pub fn judge(
@@ -291,7 +294,8 @@ impl Stage {
         0.5 * (samples as f64 / inflation).max(2.0).ln() * count as f64
     }
 
-    /// Gain in log-likelihood of each torque's rows over `before`, with each torque's noise unknown: rows/2·ln(RSS⁰/RSS), training and held out.
+    /// Gain in log-likelihood of each torque's rows over `before`, with each torque's noise unknown:
+    /// rows/2·ln(RSS⁰/RSS), training and held out.
     pub fn gain(&self, before: &Refit, after: &Refit) -> (f64, f64) {
         let gain = |factors: &GroupedFactor, before: &[f64], after: &[f64]| -> f64 {
             let of_group = |row: usize| {

@@ -49,7 +49,8 @@ pub struct FoundEffect {
     pub explains: f64,
     /// Its probability against its rivals.
     pub confidence: f64,
-    /// Share of bootstrap draws of the training folds in which it, or one of its rivals, is chosen beside the other effects.
+    /// Share of bootstrap draws of the training folds in which it, or one of its rivals, is chosen beside the
+    /// other effects.
     pub stability: f64,
     /// Standard deviations from nothing.
     pub significance: f64,
@@ -68,7 +69,8 @@ pub struct Remaining {
     pub depends_on: Vec<Dependence>,
     /// The best candidates that were not good enough.
     pub ranking: Vec<Ranked>,
-    /// What these logs cannot tell: candidates of which the motion leaves nothing beside the model's own columns.
+    /// What these logs cannot tell: candidates of which the motion leaves nothing beside the model's own
+    /// columns.
     pub silent: Vec<EffectSpec>,
 }
 
@@ -86,6 +88,7 @@ pub struct Tracing {
     pub effects: Vec<FoundEffect>,
     /// What is left.
     pub remaining: Remaining,
-    /// Kinds and joints of which some constants could not be judged, since their columns are not finite on these logs.
+    /// Kinds and joints of which some constants could not be judged, since their columns are not finite on
+    /// these logs.
     pub not_judged: Vec<(String, Vec<String>)>,
 }

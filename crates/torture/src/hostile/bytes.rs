@@ -3,7 +3,8 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// A few bits, bytes or stretches of `good` changed, cut out, doubled, or all after one place gone. Says what was done.
+/// A few bits, bytes or stretches of `good` changed, cut out, doubled, or all after one place gone. Says what
+/// was done.
 pub fn damage(good: &[u8], random: &mut ChaCha8Rng) -> (Vec<u8>, String) {
     let mut bytes = good.to_vec();
     if bytes.is_empty() {

@@ -1,6 +1,7 @@
 //! What is tried, and what has to come of it.
 //!
-//! A case is made on a good run of the ground, and the ground runs its good cases as trials that judge a case: case, ground and trial name each other.
+//! A case is made on a good run of the ground, and the ground runs its good cases as trials that judge a
+//! case: case, ground and trial name each other.
 
 use super::Ground;
 use rand_chacha::ChaCha8Rng;
@@ -12,9 +13,11 @@ pub enum Expectation {
     Same,
     /// Exit status 2 and one line; no result.
     Refused,
-    /// Refused, or the result of the good input, or a result with a warning that the good input does not have. Never another result in silence.
+    /// Refused, or the result of the good input, or a result with a warning that the good input does not
+    /// have. Never another result in silence.
     SameOrSaid,
-    /// Any orderly end, since whether the input is wrong depends on the seed: exit status 0, or 2 with one line. No crash, no torn result.
+    /// Any orderly end, since whether the input is wrong depends on the seed: exit status 0, or 2 with one
+    /// line. No crash, no torn result.
     Orderly,
     /// The same, or exit status 1 with one line: the machine gave less than the work needs.
     Starved,

@@ -67,8 +67,9 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// How far a result may be from that of the good input and still be the same: a share of the good held-out error, and as much again in
-    /// percentage points of a hundredth. Losing a few per cent of the rows moves the error by less.
+    /// How far a result may be from that of the good input and still be the same: a share of the good
+    /// held-out error, and as much again in percentage points of a hundredth. Losing a few per cent of the
+    /// rows moves the error by less.
     pub const TOLERANCE: f64 = 0.15;
 
     /// Makes the good inputs and runs the program `phiw` on them.

@@ -40,8 +40,8 @@ pub struct Failure {
     pub judgement: Judgement,
 }
 
-/// Runs `share` of each class's cases, several at once; a case depends on `seed`, its class and its number alone. `progress` is called after
-/// each class.
+/// Runs `share` of each class's cases, several at once; a case depends on `seed`, its class and its number
+/// alone. `progress` is called after each class.
 ///
 /// # Errors
 /// A program can't be started, or a folder not be made.

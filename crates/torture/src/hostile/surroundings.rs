@@ -1,4 +1,5 @@
-//! Good inputs in bad surroundings: command lines, closed streams, full disks, little memory, places that cannot be written.
+//! Good inputs in bad surroundings: command lines, closed streams, full disks, little memory, places that
+//! cannot be written.
 
 use super::case::{Case, Class, Expectation};
 use super::ground::Ground;

@@ -59,8 +59,8 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// Writes the files into a folder of its own, runs `phiw` with `words` there, and collects what it left. `shell` is the script that
-    /// starts it, [`Case::PLAIN`] but for limits and redirections.
+    /// Writes the files into a folder of its own, runs `phiw` with `words` there, and collects what it left.
+    /// `shell` is the script that starts it, [`Case::PLAIN`] but for limits and redirections.
     ///
     /// # Errors
     /// The folder can't be made, or the program can't be started.

@@ -25,7 +25,8 @@ pub(super) enum State {
     Mixed,
 }
 
-/// What `results` are, beside those of the two runs. `claims` says whether a file that is there claims a result.
+/// What `results` are, beside those of the two runs. `claims` says whether a file that is there claims a
+/// result.
 fn state_of(results: &Results, references: &[Results; 2], claims: impl Fn(&Path, &[u8]) -> bool) -> State {
     match references.iter().position(|reference| reference == results) {
         Some(which) => State::Whole(which),
@@ -149,7 +150,8 @@ impl Subject {
         let claims = |path: &Path, content: &[u8]| match self.name {
             // A motion without its facts is a whole motion, of which nobody says how it came about.
             "retarget" => path.ends_with("recording.json"),
-            // Run files grow from iteration to iteration, and are whole at any moment; motions are made before them.
+            // Run files grow from iteration to iteration, and are whole at any moment; motions are made
+            // before them.
             "paper" => {
                 path.extension().is_some_and(|extension| extension == "json")
                     && serde_json::from_slice::<serde_json::Value>(content).is_err()
@@ -175,7 +177,8 @@ impl Subject {
         Ok(results.iter().map(of_file).collect::<Vec<_>>().join(", "))
     }
 
-    /// Temporary names that are there: those of a commit that is under way, or of one that was killed. Locks are none.
+    /// Temporary names that are there: those of a commit that is under way, or of one that was killed. Locks
+    /// are none.
     pub(super) fn temporary_names(&self) -> BTreeSet<PathBuf> {
         let root = self.folder.path();
         let entries =
