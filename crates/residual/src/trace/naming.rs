@@ -32,20 +32,23 @@ pub(super) struct Trial {
     places: Vec<usize>,
 }
 
-/// The model without all that is a form of something simpler.
-struct Simple {
+/// The model without the forms of something simpler from a level on, constants refined.
+struct Simpler {
     trial: Trial,
     /// What it leaves of each torque on motion held out.
     squares: Vec<f64>,
-    /// The forms' places among the effects of the whole model.
-    forms: Vec<usize>,
+    /// The places, among the effects of the whole model, of the forms that are left out, ascending.
+    left_out: Vec<usize>,
 }
 
-impl Simple {
-    /// The place in it of an effect at `place` in the whole model.
-    fn place(&self, place: usize) -> usize {
-        place - self.forms.iter().filter(|form| **form < place).count()
-    }
+/// What is left of each torque on motion held out.
+struct Squares {
+    /// By the declared effects alone.
+    initial: Vec<f64>,
+    /// Without an effect.
+    without: Vec<f64>,
+    /// With it.
+    with: Vec<f64>,
 }
 
 /// What leaving out an effect does.
@@ -59,8 +62,6 @@ struct Judged {
     folds: f64,
     /// RMS of what it takes over the RMS of a torque that it acts on, the largest.
     size: f64,
-    /// Whether another effect is a form of it.
-    required: bool,
     named: bool,
 }
 
@@ -70,51 +71,78 @@ impl Search<'_> {
     ///
     /// What makes the error on motion held out larger is left out.
     pub(super) fn name(&mut self) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
-        loop {
+        let trial = loop {
             let trial = self.trial()?;
-            let simple = self.simple(&trial)?;
-            let judged = self.judge(&trial, simple.as_ref())?;
-            let harmful = judged.iter().filter(|judged| judged.gain <= 0.0 && !judged.required);
-            match harmful.min_by(|a, b| a.gain.total_cmp(&b.gain)) {
-                Some(harmful) => {
-                    let place = harmful.place;
-                    self.leave_out(place)?;
+            match self.most_harmful(&trial) {
+                Some(place) => {
+                    self.remove(place)?;
+                    self.refine()?;
                 }
-                None => {
-                    let mut judged = judged;
-                    self.judge_small(&trial, &mut judged)?;
-                    return self.in_order(&trial, judged);
-                }
+                None => break trial,
             }
-        }
+        };
+        let mut judged = self.judge(&trial)?;
+        self.judge_small(&trial, &mut judged)?;
+        self.in_order(&trial, judged)
     }
 
-    /// The model without all that is a form of something simpler, constants refined; `None` if nothing is. A
-    /// sign that turns over another speed is no effect of its own.
-    fn simple(&self, trial: &Trial) -> Result<Option<Simple>, IdentificationError> {
+    /// The effect that makes the error on motion held out larger, by most; what others are forms of stays.
+    fn most_harmful(&self, trial: &Trial) -> Option<usize> {
+        let all = trial.held_out_squares(&trial.fit);
+        let found = trial.members.iter().zip(&trial.places);
+        let found = found.filter(|(member, place)| **place >= self.declared && !trial.is_required(member));
+        let gains = found.map(|(_, &place)| {
+            let without = trial.held_out_squares(&trial.fit_with(|other| other != place));
+            (trial.gain(&without, &all), place)
+        });
+        let worst = gains.min_by(|a, b| a.0.total_cmp(&b.0));
+        worst.filter(|(gain, _)| *gain <= 0.0).map(|(_, place)| place)
+    }
+
+    /// For each effect of the model how many simpler ones on the same joints it stands on, by its place: what
+    /// the textbook has stands on none, the first form of it on one level, the next on two.
+    fn levels(&self, trial: &Trial) -> BTreeMap<usize, usize> {
+        let rank = |place: usize| {
+            let kind = &self.specs[place].kind;
+            self.fixed.catalogue.kinds().position(|other| other.name() == kind)
+        };
         let is_form = |member: &Member| {
             let hypothesis = &trial.problem.hypotheses[member.hypothesis];
             !hypothesis.declared && !hypothesis.requires.is_empty()
         };
         let forms = trial.members.iter().zip(&trial.places).filter(|(member, _)| is_form(member));
-        let mut forms: Vec<usize> = forms.map(|(_, place)| *place).collect();
-        if forms.is_empty() {
-            return Ok(None);
-        }
-        forms.sort_unstable();
-        let mut branch = self.clone();
-        for &place in forms.iter().rev() {
-            branch.remove(place)?;
-        }
-        branch.refine()?;
-        let trial = branch.trial()?;
-        Ok(Some(Simple { squares: trial.held_out_squares(&trial.fit), trial, forms }))
+        let forms: Vec<usize> = forms.map(|(_, place)| *place).collect();
+        let simpler = |place: usize| {
+            let own = &self.specs[place].joints;
+            forms
+                .iter()
+                .filter(|&&other| self.specs[other].joints == *own && rank(other) < rank(place))
+                .count()
+        };
+        forms.iter().map(|&place| (place, 1 + simpler(place))).collect()
+    }
+
+    /// The models with the forms below each level only. An effect is judged against what is as simple or
+    /// simpler: beside all forms of it, none is missed.
+    fn simpler(&self, levels: &BTreeMap<usize, usize>) -> Result<Vec<Simpler>, IdentificationError> {
+        let highest = levels.values().copied().max().unwrap_or(0);
+        let below = |level: usize| {
+            let mut branch = self.clone();
+            let left_out: Vec<usize> =
+                levels.iter().filter(|(_, own)| **own > level).map(|(place, _)| *place).collect();
+            for &place in left_out.iter().rev() {
+                branch.remove(place)?;
+            }
+            branch.refine()?;
+            let trial = branch.trial()?;
+            Ok(Simpler { squares: trial.held_out_squares(&trial.fit), trial, left_out })
+        };
+        (0..highest).map(below).collect()
     }
 
     /// Asks again of small effects on joints where another effect has constants, now that these are refined
     /// without it: a sign that turns over another speed looks like some viscous friction.
     fn judge_small(&self, trial: &Trial, judged: &mut [Judged]) -> Result<(), IdentificationError> {
-        let all = trial.held_out_squares(&trial.fit);
         let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
         for judged in judged.iter_mut().filter(|judged| judged.named && judged.size < SMALL) {
             let own = &self.specs[judged.place];
@@ -127,18 +155,15 @@ impl Search<'_> {
             branch.remove(judged.place)?;
             branch.refine()?;
             let refined = branch.trial()?;
-            let without = refined.held_out_squares(&refined.fit);
-            let place = trial.places.iter().position(|place| *place == judged.place);
-            let member = place.map(|place| trial.members[place]);
-            judged.named =
-                member.is_some_and(|member| self.is_material(trial, member, [&initial, &without, &all]));
+            let squares = Squares {
+                initial: initial.clone(),
+                without: refined.held_out_squares(&refined.fit),
+                with: trial.held_out_squares(&trial.fit),
+            };
+            let member = trial.member(judged.place);
+            judged.named = member.is_some_and(|member| self.is_material(trial, member, &squares));
         }
         Ok(())
-    }
-
-    fn leave_out(&mut self, place: usize) -> Result<(), IdentificationError> {
-        self.remove(place)?;
-        self.refine()
     }
 
     fn remove(&mut self, place: usize) -> Result<(), IdentificationError> {
@@ -168,96 +193,63 @@ impl Search<'_> {
         })
     }
 
-    fn judge(&self, trial: &Trial, simple: Option<&Simple>) -> Result<Vec<Judged>, IdentificationError> {
+    fn judge(&self, whole: &Trial) -> Result<Vec<Judged>, IdentificationError> {
         let limit = self.options.false_name_probability / self.chosen.hypotheses.max(1) as f64;
-        let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
-        let all = trial.held_out_squares(&trial.fit);
+        let levels = self.levels(whole);
+        let simpler = self.simpler(&levels)?;
+        let all = whole.held_out_squares(&whole.fit);
         let mut judged = Vec::new();
-        for (index, &member) in trial.members.iter().enumerate() {
-            let place = trial.places[index];
+        for (&member, &place) in whole.members.iter().zip(&whole.places) {
             if place < self.declared {
                 continue;
             }
-            let without_fit = trial.fit_with(|other| other != place);
-            let without = trial.held_out_squares(&without_fit);
-            let certainty = certainty(&trial.problem, &trial.fit, member);
-            let gain: f64 = (0..all.len())
-                .map(|torque| trial.held_out[torque].rows() * (without[torque] / all[torque]).ln())
-                .sum();
-            let required = trial.members.iter().any(|other| {
-                let requires = &trial.problem.hypotheses[other.hypothesis].requires;
-                requires.contains(&member.hypothesis)
-            });
-            let material = match simple {
-                Some(simple) if simple.forms.contains(&place) => {
-                    let [beside, without] = self.beside_simpler(trial, &simple.forms, place)?;
-                    self.is_form_material(trial, member, [&simple.squares, &without, &beside, &all])
-                }
-                // What others are forms of is judged without these.
-                Some(simple) if required => {
-                    let place = simple.place(place);
-                    let without = simple.trial.fit_with(|other| other != place);
-                    let without = simple.trial.held_out_squares(&without);
-                    self.is_material(trial, member, [&initial, &without, &simple.squares])
-                }
-                _ => self.is_material(trial, member, [&initial, &without, &all]),
+            let level = levels.get(&place).copied();
+            // What others are forms of is judged without these; a form beside the simpler ones only.
+            let beside = match level {
+                Some(level) => simpler.get(level),
+                None if whole.is_required(&member) => simpler.first(),
+                None => None,
             };
-            let torques = trial.problem.hypotheses[member.hypothesis].torques.iter();
-            let size = |&torque: &usize| {
-                let whole = trial.held_out[torque].right_hand_side().max(f64::MIN_POSITIVE);
-                ((without[torque] - all[torque]).max(0.0) / whole).sqrt()
+            let (trial, own) = match beside {
+                Some(beside) => (&beside.trial, beside.place(place)),
+                None => (whole, place),
             };
+            let Some(own_member) = trial.member(own) else { continue };
+            let with = trial.held_out_squares(&trial.fit);
+            let without = match level.map(|level| &simpler[level - 1]) {
+                Some(simpler) => simpler.squares.clone(),
+                None => trial.held_out_squares(&trial.fit_with(|other| other != own)),
+            };
+            let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
+            let squares = Squares { initial, without, with };
+            let material = match level {
+                Some(_) => self.is_form_material(trial, own_member, &squares),
+                None => self.is_material(trial, own_member, &squares),
+            };
+            let certainty = certainty(&trial.problem, &trial.fit, own_member);
+            let without = whole.fit_with(|other| other != place);
             judged.push(Judged {
                 place,
-                size: torques.map(size).fold(0.0, f64::max),
-                required,
+                size: trial.size(own_member, &squares),
                 significance: certainty.significance,
-                gain,
-                folds: trial.better_folds(&without_fit),
+                gain: whole.gain(&whole.held_out_squares(&without), &all),
+                folds: whole.better_folds(&without),
                 named: certainty.tail <= limit && material,
             });
         }
         Ok(judged)
     }
 
-    /// What is left without a form beside the simpler ones on its joints: with it and without.
-    fn beside_simpler(
-        &self,
-        trial: &Trial,
-        forms: &[usize],
-        place: usize,
-    ) -> Result<[Vec<f64>; 2], IdentificationError> {
-        let rank = |place: usize| {
-            let kind = &self.specs[place].kind;
-            self.fixed.catalogue.kinds().position(|other| other.name() == kind)
-        };
-        let later = |other: usize| {
-            forms.contains(&other)
-                && self.specs[other].joints == self.specs[place].joints
-                && rank(other) > rank(place)
-        };
-        let with = trial.held_out_squares(&trial.fit_with(|other| !later(other)));
-        let without = trial.held_out_squares(&trial.fit_with(|other| other != place && !later(other)));
-        Ok([with, without])
-    }
-
-    /// Whether a form of something simpler is worth a name of its own: it must take away most of what that
-    /// leaves, and all the forms together must be a share of the torque.
-    fn is_form_material(
-        &self,
-        trial: &Trial,
-        member: Member,
-        [simple, without, with, all]: [&[f64]; 4],
-    ) -> bool {
-        let options = self.options;
+    /// Whether a form of something simpler is worth a name of its own: it must take away most of what the
+    /// simpler ones leave, and be a share of the torque.
+    fn is_form_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
         trial.problem.hypotheses[member.hypothesis].torques.iter().any(|&torque| {
             let whole = trial.held_out[torque].right_hand_side().max(f64::MIN_POSITIVE);
-            let taken = (simple[torque] - all[torque]).max(0.0);
-            let own = (without[torque] - with[torque]).max(0.0);
-            !self.is_as_it_was(torque, (simple[torque] / trial.held_out[torque].rows().max(1.0)).sqrt())
-                && taken >= options.least_share_of_kin * simple[torque]
-                && own >= options.least_share_of_kin * without[torque]
-                && (taken / whole).sqrt() >= options.least_size
+            let (without, with) = (squares.without[torque], squares.with[torque]);
+            let taken = (without - with).max(0.0);
+            !self.is_as_it_was(torque, (without / trial.held_out[torque].rows().max(1.0)).sqrt())
+                && taken >= self.options.least_share_of_kin * without
+                && (taken / whole).sqrt() >= self.options.least_size
         })
     }
 
@@ -272,8 +264,9 @@ impl Search<'_> {
     /// It must take away a share of the residual of a torque that it acts on, and be a share of that torque.
     /// Where the other parameters have taken up most of it, it is to be seen on any torque, and must be a
     /// share of its torque by itself.
-    fn is_material(&self, trial: &Trial, member: Member, [initial, without, with]: [&[f64]; 3]) -> bool {
+    fn is_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
         let options = self.options;
+        let Squares { initial, without, with } = squares;
         let hypothesis = &trial.problem.hypotheses[member.hypothesis];
         let (mut largest_share, mut size): (f64, f64) = (0.0, 0.0);
         let mut seen = false;
@@ -373,7 +366,40 @@ impl Search<'_> {
     }
 }
 
+impl Simpler {
+    /// The place in it of an effect at `place` in the whole model.
+    fn place(&self, place: usize) -> usize {
+        place - self.left_out.iter().filter(|left_out| **left_out < place).count()
+    }
+}
+
 impl Trial {
+    /// The member at a place among the model's effects.
+    fn member(&self, place: usize) -> Option<Member> {
+        self.places.iter().position(|other| *other == place).map(|at| self.members[at])
+    }
+
+    /// Whether another effect is a form of it.
+    fn is_required(&self, member: &Member) -> bool {
+        let requires = |other: &Member| &self.problem.hypotheses[other.hypothesis].requires;
+        self.members.iter().any(|other| requires(other).contains(&member.hypothesis))
+    }
+
+    /// What the logarithms of the errors held out gain: Σ rows·log(without/with).
+    fn gain(&self, without: &[f64], with: &[f64]) -> f64 {
+        let of_torque = |torque: usize| self.held_out[torque].rows() * (without[torque] / with[torque]).ln();
+        (0..self.held_out.len()).map(of_torque).sum()
+    }
+
+    /// RMS of what a member takes over the RMS of a torque that it acts on, the largest.
+    fn size(&self, member: Member, squares: &Squares) -> f64 {
+        let of_torque = |&torque: &usize| {
+            let whole = self.held_out[torque].right_hand_side().max(f64::MIN_POSITIVE);
+            ((squares.without[torque] - squares.with[torque]).max(0.0) / whole).sqrt()
+        };
+        self.problem.hypotheses[member.hypothesis].torques.iter().map(of_torque).fold(0.0, f64::max)
+    }
+
     /// The fit with the declared members and those found that `stays` keeps, by their place among the model's
     /// effects.
     fn fit_with(&self, stays: impl Fn(usize) -> bool) -> Fit {
