@@ -4,7 +4,7 @@ use super::criterion::criterion;
 use super::fit::Fit;
 use super::problem::Member;
 use super::screening::screen;
-use super::search::{Model, Search};
+use super::search::{Model, NEAR, Search};
 use super::wald::squares_of;
 use rayon::prelude::*;
 
@@ -24,7 +24,7 @@ impl Search<'_> {
     }
 
     /// The best first of models with these members. All are fitted with the weights of the present model; the
-    /// best few, which may be taken, are then fitted with their own. What belongs to each is handed through.
+    /// best few, where they may be taken, are then fitted with their own. What belongs to each is handed through.
     pub(super) fn ranked<T: Send>(&self, candidates: Vec<(Vec<Member>, T)>) -> Vec<(Model, T)> {
         let quickly = |(mut members, belongs): (Vec<Member>, T)| {
             self.add_required(&mut members, &self.model.fit);
@@ -32,7 +32,8 @@ impl Search<'_> {
         };
         let mut models: Vec<(Model, T)> = candidates.into_par_iter().map(quickly).collect();
         models.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
-        let best = models.len().min(FITTED_IN_FULL);
+        let near = |(model, _): &&(Model, T)| model.value < self.model.value + NEAR.0;
+        let best = models.iter().take(FITTED_IN_FULL).take_while(near).count();
         models[..best].par_iter_mut().for_each(|(model, _)| {
             let members = std::mem::take(&mut model.members);
             *model = self.within_bounds(members, &self.model.fit, true);

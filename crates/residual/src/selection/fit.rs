@@ -201,6 +201,12 @@ impl Fit {
     /// Cholesky's factor of the system, whose first `kept` rows have it already; columns of which nothing is
     /// left are passed over.
     fn factor(&mut self, mut system: Vec<f64>, kept: usize, model: usize) {
+        pulp::Arch::new().dispatch(|| self.factor_rows(&mut system, kept, model));
+        self.triangle = system;
+    }
+
+    #[inline(always)]
+    fn factor_rows(&mut self, system: &mut [f64], kept: usize, model: usize) {
         let size = self.active.len();
         for row in kept..size {
             let (before, rest) = system.split_at_mut(row * size);
@@ -225,20 +231,24 @@ impl Fit {
                 own[row] = 1.0;
             }
         }
-        self.triangle = system;
     }
 
     /// L⁻¹·x.
     pub fn forward(&self, x: &[f64]) -> Vec<f64> {
+        let mut y = vec![0.0; self.active.len()];
+        pulp::Arch::new().dispatch(|| self.forward_rows(x, &mut y));
+        y
+    }
+
+    #[inline(always)]
+    fn forward_rows(&self, x: &[f64], y: &mut [f64]) {
         let size = self.active.len();
-        let mut y = vec![0.0; size];
         for row in 0..size {
             if self.heard[row] {
                 let own = &self.triangle[row * size..row * size + row + 1];
                 y[row] = (x[row] - dot(&own[..row], &y[..row])) / own[row];
             }
         }
-        y
     }
 
     /// L⁻ᵀ·y.
@@ -270,13 +280,14 @@ impl Fit {
     }
 }
 
+#[inline(always)]
 pub(super) fn dot(left: &[f64], right: &[f64]) -> f64 {
-    // Four sums, so that the additions do not wait for each other.
-    let mut sums = [0.0; 4];
-    let (left_fours, right_fours) = (left.chunks_exact(4), right.chunks_exact(4));
-    let rest: f64 = left_fours.remainder().iter().zip(right_fours.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in left_fours.zip(right_fours) {
-        for lane in 0..4 {
+    // Many sums, so that the additions do not wait for each other and fill the widest registers.
+    let mut sums = [0.0; 16];
+    let (left_parts, right_parts) = (left.chunks_exact(16), right.chunks_exact(16));
+    let rest: f64 = left_parts.remainder().iter().zip(right_parts.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in left_parts.zip(right_parts) {
+        for lane in 0..16 {
             sums[lane] += a[lane] * b[lane];
         }
     }

@@ -72,7 +72,7 @@ const ROUNDS: usize = 6;
 const LEAST_STEP: f64 = 1e-3;
 /// By how much, and by which share, a hypothesis may gain less than the member whose place it would take, to
 /// first order, and still be fitted in full.
-const NEAR: (f64, f64) = (20.0, 0.03);
+pub(super) const NEAR: (f64, f64) = (20.0, 0.03);
 /// Share of a member's gain that one in its place must have that is known to first order only.
 const FIRST_ORDER: f64 = 0.5;
 
