@@ -1,6 +1,7 @@
 //! A weighted fit of some parameters, from products.
 
 use super::problem::{Problem, Torque};
+use std::ops::Range;
 
 /// A column of the model with less than this share of its squared norm left beside those before it is
 /// undetermined.
@@ -69,6 +70,14 @@ impl Fit {
         fit.weights.clone_from(&start.weights);
         fit.solve(problem, Some(start));
         fit.rss = (0..problem.torques.len()).map(|torque| fit.residual(problem, torque)).collect();
+        fit
+    }
+
+    /// The same parameters fitted with the same weights to the rows of all folds but some.
+    pub fn without(&self, problem: &Problem, folds: &Range<usize>) -> Self {
+        let mut fit = self.clone();
+        fit.heard.fill(true);
+        fit.solve_rows(problem, None, folds);
         fit
     }
 
@@ -146,6 +155,11 @@ impl Fit {
 
     /// Takes the rows of the triangle that are those of `start` from there; the weights must be the same.
     fn solve(&mut self, problem: &Problem, start: Option<&Fit>) {
+        self.solve_rows(problem, start, &(0..0));
+    }
+
+    /// The same with the rows of all folds but `left_out`.
+    fn solve_rows(&mut self, problem: &Problem, start: Option<&Fit>, left_out: &Range<usize>) {
         let size = self.active.len();
         let same = |start: &Fit| {
             self.active.iter().zip(&start.active).take_while(|(own, other)| own == other).count()
@@ -163,8 +177,17 @@ impl Fit {
         let mut right = vec![0.0; size];
         for (torque, rows) in problem.torques.iter().enumerate() {
             let weight = self.weights[torque];
+            let mut fewer = Vec::new();
             for &(column, place) in &self.own[torque] {
-                let products = rows.whole.column(column);
+                let mut products = rows.whole.column(column);
+                if !left_out.is_empty() {
+                    fewer.clear();
+                    fewer.extend_from_slice(products);
+                    for fold in &rows.folds[left_out.clone()] {
+                        fewer.iter_mut().zip(fold.column(column)).for_each(|(sum, own)| *sum -= own);
+                    }
+                    products = &fewer;
+                }
                 if place >= kept {
                     // What is above the diagonal is not looked at.
                     let row = &mut system[place * size..place * size + place + 1];

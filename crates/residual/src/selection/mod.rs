@@ -10,6 +10,7 @@
 
 mod admissible;
 mod criterion;
+mod cross_validation;
 mod design_effect;
 mod distribution;
 mod fit;

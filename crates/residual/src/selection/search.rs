@@ -1,6 +1,7 @@
 //! Forward to the end, then prune, then swap, until nothing is better.
 
 use super::criterion::{choice, criterion, price};
+use super::cross_validation::cross_validated;
 use super::design_effect::effective_rows;
 use super::fit::Fit;
 use super::problem::{Member, Problem};
@@ -68,8 +69,8 @@ pub(super) struct Search<'a> {
 const SWEEPS: usize = 4;
 /// Times that forward, prune and swap follow each other.
 const ROUNDS: usize = 6;
-/// The criterion must fall by this much for a step: less is rounding.
-const LEAST_STEP: f64 = 1e-3;
+/// The criterion must fall by this much for a step: less says nothing.
+const LEAST_STEP: f64 = 0.5;
 /// By how much, and by which share, a hypothesis may gain less than the member whose place it would take, to
 /// first order, and still be fitted in full.
 pub(super) const NEAR: (f64, f64) = (20.0, 0.03);
@@ -157,6 +158,13 @@ impl<'a> Search<'a> {
     }
 
     fn accept(&mut self, model: Model) {
+        if std::env::var("PHIW_DBG").is_ok() {
+            let name = |m: &Member| { let h = &self.problem.hypotheses[m.hypothesis]; format!("k{}{:?}v{}", h.kind/2, h.torques, m.variant) };
+            let add: Vec<_> = model.members.iter().filter(|m| !self.model.members.contains(m)).map(name).collect();
+            let rem: Vec<_> = self.model.members.iter().filter(|m| !model.members.contains(m)).map(name).collect();
+            let rel: Vec<_> = model.fit.rss.iter().zip(&self.problem.torques).map(|(r,t)| (1000.0*(r/t.whole.right_hand_side()).sqrt()).round()/10.0).collect();
+            eprintln!("{:.1} -> {:.1} n={} +{add:?} -{rem:?} rows {:?} rel {rel:?}", self.model.value, model.value, model.members.len(), self.rows.iter().map(|r| r.round()).collect::<Vec<_>>());
+        }
         self.model = model;
         self.renew();
     }
@@ -172,15 +180,20 @@ impl<'a> Search<'a> {
         let moves = self.moves(&screened);
         let larger = |added: Vec<Member>| (self.model.members.iter().copied().chain(added).collect(), ());
         let models = self.ranked(moves.into_iter().map(larger).collect());
-        match models.into_iter().next() {
-            Some((best, ()))
-                if best.value < self.model.value - LEAST_STEP && best.members != self.model.members =>
-            {
-                self.accept(best);
-                true
-            }
-            _ => false,
+        let better = models.into_iter().map(|(model, ())| model).filter(|model| {
+            model.value < self.model.value - LEAST_STEP && model.members != self.model.members
+        });
+        let best = self.first_that_foretells(better.collect());
+        best.map(|best| self.accept(best)).is_some()
+    }
+
+    /// The first of these that foretells what it is not fitted to better than the present model.
+    fn first_that_foretells(&self, models: Vec<Model>) -> Option<Model> {
+        if models.is_empty() {
+            return None;
         }
+        let present = cross_validated(self.problem, &self.model.fit, &self.rows);
+        models.into_iter().find(|model| cross_validated(self.problem, &model.fit, &self.rows) < present)
     }
 
     /// Leaves out what the criterion is better without: one member, or all of a kind.
@@ -231,9 +244,9 @@ impl<'a> Search<'a> {
         let mut place = 0;
         while place < self.model.members.len() {
             let best = self.in_place_of(place).into_iter().next();
-            if let Some((model, _)) = best
-                && model.value < self.model.value - LEAST_STEP
-            {
+            let better = best.filter(|(model, _)| model.value < self.model.value - LEAST_STEP);
+            let better = better.map(|(model, _)| vec![model]).unwrap_or_default();
+            if let Some(model) = self.first_that_foretells(better) {
                 self.accept(model);
                 swapped = true;
             }
