@@ -67,6 +67,9 @@ pub(super) struct Search<'a> {
 
 /// Sweeps of swaps; each accepts whatever is better.
 const SWEEPS: usize = 4;
+/// Times that the effective rows are renewed while effects are added: the more is explained, the less
+/// coloured is what is left.
+const FORWARD_PHASES: usize = 4;
 /// Times that forward, prune and swap follow each other.
 const ROUNDS: usize = 6;
 /// The criterion must fall by this much for a step: less says nothing.
@@ -123,12 +126,22 @@ impl<'a> Search<'a> {
     fn run(&mut self) {
         for _ in 0..ROUNDS {
             let before = self.model.members.clone();
-            // What the textbook has first, or a form of it takes its place.
-            while self.forward(true) {}
-            while self.forward(false) {}
+            // What the textbook has first, or a form of it takes its place. The effective rows are renewed
+            // between the phases: within one the criterion falls with each step, so that each ends.
+            for textbook in [true, false] {
+                for _ in 0..FORWARD_PHASES {
+                    self.renew();
+                    if !self.forward(textbook) {
+                        break;
+                    }
+                    while self.forward(textbook) {}
+                }
+            }
+            self.renew();
             while self.prune() {}
             self.sweep();
             while self.prune() {}
+            self.renew();
             self.doubt();
             if self.model.members == before {
                 break;
@@ -157,17 +170,6 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-    fn accept(&mut self, model: Model) {
-        if std::env::var("PHIW_DBG").is_ok() {
-            let name = |m: &Member| { let h = &self.problem.hypotheses[m.hypothesis]; format!("k{}{:?}v{}", h.kind/2, h.torques, m.variant) };
-            let add: Vec<_> = model.members.iter().filter(|m| !self.model.members.contains(m)).map(name).collect();
-            let rem: Vec<_> = self.model.members.iter().filter(|m| !model.members.contains(m)).map(name).collect();
-            let rel: Vec<_> = model.fit.rss.iter().zip(&self.problem.torques).map(|(r,t)| (1000.0*(r/t.whole.right_hand_side()).sqrt()).round()/10.0).collect();
-            eprintln!("{:.1} -> {:.1} n={} +{add:?} -{rem:?} rows {:?} rel {rel:?}", self.model.value, model.value, model.members.len(), self.rows.iter().map(|r| r.round()).collect::<Vec<_>>());
-        }
-        self.model = model;
-        self.renew();
-    }
 
     /// Takes the best of all models that have more in them, if it is better.
     fn forward(&mut self, textbook: bool) -> bool {
@@ -184,7 +186,7 @@ impl<'a> Search<'a> {
             model.value < self.model.value - LEAST_STEP && model.members != self.model.members
         });
         let best = self.first_that_foretells(better.collect());
-        best.map(|best| self.accept(best)).is_some()
+        best.map(|best| self.model = best).is_some()
     }
 
     /// The first of these that foretells what it is not fitted to better than the present model.
@@ -231,7 +233,7 @@ impl<'a> Search<'a> {
         let models = self.ranked(moves.into_iter().map(smaller).collect());
         match models.into_iter().next() {
             Some((best, ())) if best.value <= self.model.value && best.members != self.model.members => {
-                self.accept(best);
+                self.model = best;
                 true
             }
             _ => false,
@@ -247,7 +249,7 @@ impl<'a> Search<'a> {
             let better = best.filter(|(model, _)| model.value < self.model.value - LEAST_STEP);
             let better = better.map(|(model, _)| vec![model]).unwrap_or_default();
             if let Some(model) = self.first_that_foretells(better) {
-                self.accept(model);
+                self.model = model;
                 swapped = true;
             }
             place += 1;
@@ -318,7 +320,7 @@ impl<'a> Search<'a> {
             let mut members = self.model.members.clone();
             self.closed[members.remove(place).hypothesis] = true;
             let model = self.evaluate(members, &self.model.fit);
-            self.accept(model);
+            self.model = model;
         }
     }
 
