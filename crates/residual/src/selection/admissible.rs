@@ -23,21 +23,31 @@ impl Search<'_> {
         self.within_bounds(members, start, true)
     }
 
-    /// The best first of models with these members. All are fitted with the weights of the present model; the
-    /// best few, where they may be taken, are then fitted with their own. What belongs to each is handed through.
-    pub(super) fn ranked<T: Send>(&self, candidates: Vec<(Vec<Member>, T)>) -> Vec<(Model, T)> {
+    /// The best first of models with these members. All are fitted with the weights of `start`, quickest where
+    /// they begin with its members; the best few, where they may be taken, are then fitted with their own,
+    /// their members in the order of the present model and new ones at `place`. What belongs to each is
+    /// handed through.
+    pub(super) fn ranked<T: Send>(
+        &self,
+        candidates: Vec<(Vec<Member>, T)>,
+        start: &Fit,
+        place: usize,
+    ) -> Vec<(Model, T)> {
         let quickly = |(mut members, belongs): (Vec<Member>, T)| {
-            self.add_required(&mut members, &self.model.fit);
-            (self.within_bounds(members, &self.model.fit, false), belongs)
+            self.add_required(&mut members, start);
+            (self.within_bounds(members, start, false), belongs)
         };
         let mut models: Vec<(Model, T)> = candidates.into_par_iter().map(quickly).collect();
         models.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
         let near = |(model, _): &&(Model, T)| model.value < self.model.value + NEAR.0;
         let best = models.iter().take(FITTED_IN_FULL).take_while(near).count();
         models[..best].par_iter_mut().for_each(|(model, _)| {
-            let members = std::mem::take(&mut model.members);
-            *model = self.within_bounds(members, &self.model.fit, true);
+            let mut members = std::mem::take(&mut model.members);
+            let present = |member: &Member| self.model.members.iter().position(|other| other == member);
+            members.sort_by_key(|member| present(member).unwrap_or(place));
+            *model = self.within_bounds(members, start, true);
         });
+        models.truncate(best);
         models.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
         models
     }

@@ -170,7 +170,6 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-
     /// Takes the best of all models that have more in them, if it is better.
     fn forward(&mut self, textbook: bool) -> bool {
         if self.model.members.len() >= self.policy.most_members {
@@ -181,7 +180,7 @@ impl<'a> Search<'a> {
         let screened = screen(self.problem, &self.model.fit, &self.rows, &open);
         let moves = self.moves(&screened);
         let larger = |added: Vec<Member>| (self.model.members.iter().copied().chain(added).collect(), ());
-        let models = self.ranked(moves.into_iter().map(larger).collect());
+        let models = self.ranked(moves.into_iter().map(larger).collect(), &self.model.fit, usize::MAX);
         let better = models.into_iter().map(|(model, ())| model).filter(|model| {
             model.value < self.model.value - LEAST_STEP && model.members != self.model.members
         });
@@ -230,7 +229,7 @@ impl<'a> Search<'a> {
             let stays = self.model.members.iter().filter(|member| !removed.contains(member));
             (stays.copied().collect(), ())
         };
-        let models = self.ranked(moves.into_iter().map(smaller).collect());
+        let models = self.ranked(moves.into_iter().map(smaller).collect(), &self.model.fit, usize::MAX);
         match models.into_iter().next() {
             Some((best, ())) if best.value <= self.model.value && best.members != self.model.members => {
                 self.model = best;
@@ -296,11 +295,10 @@ impl<'a> Search<'a> {
         let pairs = pairs.iter().map(|(_, pair)| pair.to_vec()).take(self.policy.finalists / 4);
         let moves: Vec<Vec<Member>> = singles.chain(pairs).collect();
         let swapped = |entering: Vec<Member>| {
-            let mut members = self.model.members.clone();
-            members.splice(place..=place, entering.iter().copied());
+            let members = others.iter().chain(&entering).copied().collect();
             (members, entering)
         };
-        let mut models = self.ranked(moves.into_iter().map(swapped).collect());
+        let mut models = self.ranked(moves.into_iter().map(swapped).collect(), &without, place);
         models.retain(|(model, entering)| entering.iter().all(|member| model.members.contains(member)));
         models
     }

@@ -8,6 +8,7 @@ use super::tracing::{FoundEffect, RivalEffect};
 use crate::selection::{Fit, Member, Problem, Products, certainty};
 use phiw_identification::{EffectSpec, IdentificationError};
 use phiw_regressor::least_squares::GroupedFactor;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// A rival that is less probable is none.
@@ -73,30 +74,45 @@ impl Search<'_> {
     pub(super) fn name(&mut self) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
         let trial = loop {
             let trial = self.trial()?;
-            match self.most_harmful(&trial) {
-                Some(place) => {
-                    self.remove(place)?;
-                    self.refine()?;
-                }
-                None => break trial,
+            let harmful = self.harmful(&trial);
+            if harmful.is_empty() {
+                break trial;
             }
+            for place in harmful.into_iter().rev() {
+                self.remove(place)?;
+            }
+            self.refine()?;
         };
         let mut judged = self.judge(&trial)?;
         self.judge_small(&trial, &mut judged)?;
         self.in_order(&trial, judged)
     }
 
-    /// The effect that makes the error on motion held out larger, by most; what others are forms of stays.
-    fn most_harmful(&self, trial: &Trial) -> Option<usize> {
-        let all = trial.held_out_squares(&trial.fit);
-        let found = trial.members.iter().zip(&trial.places);
-        let found = found.filter(|(member, place)| **place >= self.declared && !trial.is_required(member));
-        let gains = found.map(|(_, &place)| {
-            let without = trial.held_out_squares(&trial.fit_with(|other| other != place));
-            (trial.gain(&without, &all), place)
-        });
-        let worst = gains.min_by(|a, b| a.0.total_cmp(&b.0));
-        worst.filter(|(gain, _)| *gain <= 0.0).map(|(_, place)| place)
+    /// The places of the effects, ascending, that make the error on motion held out larger: the worst, the
+    /// worst of what is left without it, and so on. What others are forms of stays.
+    fn harmful(&self, trial: &Trial) -> Vec<usize> {
+        let mut left_out: Vec<usize> = Vec::new();
+        let mut present = trial.held_out_squares(&trial.fit);
+        loop {
+            let found = trial.members.par_iter().zip(&trial.places).filter(|(member, place)| {
+                **place >= self.declared && !trial.is_required(member) && !left_out.contains(place)
+            });
+            let without = found.map(|(_, &place)| {
+                let fit = trial.fit_with(|other| other != place && !left_out.contains(&other));
+                let squares = trial.held_out_squares(&fit);
+                (trial.gain(&squares, &present), place, squares)
+            });
+            let worst = without.min_by(|a, b| a.0.total_cmp(&b.0));
+            match worst.filter(|(gain, ..)| *gain <= 0.0) {
+                Some((_, place, squares)) => {
+                    left_out.push(place);
+                    present = squares;
+                }
+                None => break,
+            }
+        }
+        left_out.sort_unstable();
+        left_out
     }
 
     /// For each effect of the model how many simpler ones on the same joints it stands on, by its place: what
