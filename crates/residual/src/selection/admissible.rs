@@ -1,6 +1,6 @@
 //! Which models may be: members within their bounds, with what they require.
 
-use super::criterion::criterion;
+use super::criterion::{choice, criterion, price};
 use super::fit::Fit;
 use super::problem::Member;
 use super::screening::screen;
@@ -66,6 +66,10 @@ impl Search<'_> {
                 let value = criterion(self.problem, &members, &fit, &self.rows);
                 return Model { members, fit, value };
             }
+            // Leaving out the broken ones saves no more than their price.
+            if !own_weights && self.least_without(&members, &broken, &fit) >= self.model.value + NEAR.0 {
+                return Model { members, fit, value: f64::INFINITY };
+            }
             let depends = |other: &Member, on: &Member| {
                 let other = &self.problem.hypotheses[other.hypothesis];
                 !other.declared && other.requires.contains(&on.hypothesis)
@@ -92,6 +96,17 @@ impl Search<'_> {
             members =
                 if value(&without_forms) <= value(&without_broken) { without_forms } else { without_broken };
         }
+    }
+
+    /// What the criterion is at least without `broken` members and those that require them.
+    fn least_without(&self, members: &[Member], broken: &[Member], fit: &Fit) -> f64 {
+        let goes = |member: &&Member| {
+            let requires = &self.problem.hypotheses[member.hypothesis].requires;
+            broken.iter().any(|broken| *broken == **member || requires.contains(&broken.hypothesis))
+        };
+        let saved = |member: &Member| price(self.problem, *member, None, &self.rows) + choice(self.problem);
+        let saved: f64 = members.iter().filter(goes).map(saved).sum();
+        criterion(self.problem, members, fit, &self.rows) - saved
     }
 
     /// Whether another member requires it, or is made of it: then it stays as long as that does.
