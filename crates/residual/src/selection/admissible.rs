@@ -1,6 +1,6 @@
 //! Which models may be: members within their bounds, with what they require.
 
-use super::criterion::{choice, criterion, price};
+use super::criterion::criterion;
 use super::fit::Fit;
 use super::problem::Member;
 use super::screening::screen;
@@ -20,7 +20,7 @@ impl Search<'_> {
     /// left out.
     pub(super) fn evaluate(&self, mut members: Vec<Member>, start: &Fit) -> Model {
         self.add_required(&mut members, start);
-        self.within_bounds(members, start, true)
+        self.within_bounds(members, start)
     }
 
     /// The best first of models with these members. All are fitted with the weights of `start`, quickest where
@@ -35,7 +35,7 @@ impl Search<'_> {
     ) -> Vec<(Model, T)> {
         let quickly = |(mut members, belongs): (Vec<Member>, T)| {
             self.add_required(&mut members, start);
-            (self.within_bounds(members, start, false), belongs)
+            (self.quickly(members, start), belongs)
         };
         let mut models: Vec<(Model, T)> = candidates.into_par_iter().map(quickly).collect();
         models.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
@@ -45,30 +45,54 @@ impl Search<'_> {
             let mut members = std::mem::take(&mut model.members);
             let present = |member: &Member| self.model.members.iter().position(|other| other == member);
             members.sort_by_key(|member| present(member).unwrap_or(place));
-            *model = self.within_bounds(members, start, true);
+            *model = self.within_bounds(members, start);
         });
         models.truncate(best);
         models.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
         models
     }
 
-    /// The same with nothing added; `own_weights` are those of the model itself, otherwise those of `start`.
-    fn within_bounds(&self, mut members: Vec<Member>, start: &Fit, own_weights: bool) -> Model {
+    /// A model with the weights of `start`; what breaks its bounds is absent, with all that requires it.
+    fn quickly(&self, mut members: Vec<Member>, start: &Fit) -> Model {
+        let fitted = Fit::beside(self.problem, self.problem.active(&members), &self.rows, start);
+        let mut absent: Vec<usize> = Vec::new();
+        let mut fit = None;
         loop {
-            let active = self.problem.active(&members);
-            let fit = match own_weights {
-                true => Fit::new(self.problem, active, &self.rows, Some(start)),
-                false => Fit::beside(self.problem, active, &self.rows, start),
+            let present = fit.as_ref().unwrap_or(&fitted);
+            let breaks =
+                |member: &Member| !self.is_declared(member) && !self.is_within_bounds(present, member);
+            let broken: Vec<Member> = members.iter().filter(|member| breaks(member)).copied().collect();
+            if broken.is_empty() {
+                let fit = fit.unwrap_or(fitted);
+                let value = criterion(self.problem, &members, &fit, &self.rows);
+                return Model { members, fit, value };
+            }
+            let goes = |member: &Member| {
+                let own = &self.problem.hypotheses[member.hypothesis];
+                let requires = |broken: &Member| !own.declared && own.requires.contains(&broken.hypothesis);
+                broken.iter().any(|broken| broken == member || requires(broken))
             };
+            let (gone, left): (Vec<Member>, Vec<Member>) = members.into_iter().partition(goes);
+            members = left;
+            let parameters =
+                gone.iter().flat_map(|&member| self.problem.variant(member).parameters.iter().copied());
+            absent.extend(parameters.filter_map(|parameter| fitted.place[parameter]));
+            fit = fitted.pinned(self.problem, &absent);
+            if fit.is_none() {
+                return Model { members, fit: fitted, value: f64::INFINITY };
+            }
+        }
+    }
+
+    /// A model fitted with its own weights; nothing is added.
+    fn within_bounds(&self, mut members: Vec<Member>, start: &Fit) -> Model {
+        loop {
+            let fit = Fit::new(self.problem, self.problem.active(&members), &self.rows, Some(start));
             let breaks = |member: &Member| !self.is_declared(member) && !self.is_within_bounds(&fit, member);
             let broken: Vec<Member> = members.iter().filter(|member| breaks(member)).copied().collect();
             if broken.is_empty() {
                 let value = criterion(self.problem, &members, &fit, &self.rows);
                 return Model { members, fit, value };
-            }
-            // Leaving out the broken ones saves no more than their price.
-            if !own_weights && self.least_without(&members, &broken, &fit) >= self.model.value + NEAR.0 {
-                return Model { members, fit, value: f64::INFINITY };
             }
             let depends = |other: &Member, on: &Member| {
                 let other = &self.problem.hypotheses[other.hypothesis];
@@ -96,17 +120,6 @@ impl Search<'_> {
             members =
                 if value(&without_forms) <= value(&without_broken) { without_forms } else { without_broken };
         }
-    }
-
-    /// What the criterion is at least without `broken` members and those that require them.
-    fn least_without(&self, members: &[Member], broken: &[Member], fit: &Fit) -> f64 {
-        let goes = |member: &&Member| {
-            let requires = &self.problem.hypotheses[member.hypothesis].requires;
-            broken.iter().any(|broken| *broken == **member || requires.contains(&broken.hypothesis))
-        };
-        let saved = |member: &Member| price(self.problem, *member, None, &self.rows) + choice(self.problem);
-        let saved: f64 = members.iter().filter(goes).map(saved).sum();
-        criterion(self.problem, members, fit, &self.rows) - saved
     }
 
     /// Whether another member requires it, or is made of it: then it stays as long as that does.

@@ -73,6 +73,44 @@ impl Fit {
         fit
     }
 
+    /// The same weights and rows with some of the active parameters absent: values and residuals only, by the
+    /// constraint's Schur complement. `None` where these parameters are not told apart.
+    pub fn pinned(&self, problem: &Problem, places: &[usize]) -> Option<Self> {
+        let places: Vec<usize> = places.iter().copied().filter(|&place| self.heard[place]).collect();
+        let column = |&place: &usize| {
+            let mut unit = vec![0.0; self.active.len()];
+            unit[place] = 1.0;
+            self.backward(self.forward(&unit))
+        };
+        let inverse: Vec<Vec<f64>> = places.iter().map(column).collect();
+        let change: Vec<f64> = places
+            .iter()
+            .map(|&place| self.values[self.active[place]] - problem.absent[self.active[place]])
+            .collect();
+        let solved = solve_block(&places, &inverse, &change)?;
+        let mut values = self.values.clone();
+        for (at, &parameter) in self.active.iter().enumerate().filter(|(at, _)| self.heard[*at]) {
+            let change: f64 = inverse.iter().zip(&solved).map(|(column, value)| column[at] * value).sum();
+            values[parameter] -= change;
+        }
+        places.iter().for_each(|&place| values[self.active[place]] = problem.absent[self.active[place]]);
+        let mut fit = Fit {
+            active: self.active.clone(),
+            place: self.place.clone(),
+            own: self.own.clone(),
+            absent: self.absent.clone(),
+            heard: self.heard.clone(),
+            triangle: Vec::new(),
+            half: Vec::new(),
+            values,
+            rss: Vec::new(),
+            weights: self.weights.clone(),
+            prior_weight: self.prior_weight,
+        };
+        fit.rss = (0..problem.torques.len()).map(|torque| fit.residual(problem, torque)).collect();
+        Some(fit)
+    }
+
     /// The same parameters fitted with the same weights to the rows of all folds but some.
     pub fn without(&self, problem: &Problem, folds: &Range<usize>) -> Self {
         let mut fit = self.clone();
@@ -315,4 +353,34 @@ pub(super) fn dot(left: &[f64], right: &[f64]) -> f64 {
         }
     }
     sums.iter().sum::<f64>() + rest
+}
+
+/// (Z_oo)⁻¹·x for some places o, from their columns of Z, by Cholesky's factor of the small block.
+pub(super) fn solve_block(own: &[usize], inverse: &[Vec<f64>], x: &[f64]) -> Option<Vec<f64>> {
+    let count = own.len();
+    let mut l = vec![0.0; count * count];
+    for row in 0..count {
+        for column in 0..=row {
+            let known: f64 = (0..column).map(|k| l[row * count + k] * l[column * count + k]).sum();
+            let rest = inverse[row][own[column]] - known;
+            if row == column {
+                if rest.is_nan() || rest <= 0.0 {
+                    return None;
+                }
+                l[row * count + row] = rest.sqrt();
+            } else {
+                l[row * count + column] = rest / l[column * count + column];
+            }
+        }
+    }
+    let mut y = x.to_vec();
+    for row in 0..count {
+        let known: f64 = (0..row).map(|k| l[row * count + k] * y[k]).sum();
+        y[row] = (y[row] - known) / l[row * count + row];
+    }
+    for row in (0..count).rev() {
+        let known: f64 = (row + 1..count).map(|k| l[k * count + row] * y[k]).sum();
+        y[row] = (y[row] - known) / l[row * count + row];
+    }
+    Some(y)
 }

@@ -1,7 +1,7 @@
 //! Is it there at all? Wald's test over folds.
 
 use super::distribution::fisher_tail;
-use super::fit::{Fit, dot};
+use super::fit::{Fit, dot, solve_block};
 use super::problem::{Member, Problem};
 
 /// How sure a member of a model is.
@@ -78,36 +78,6 @@ fn weights_of_scale(own: &[usize], inverse: &[Vec<f64>], values: &[f64]) -> Vec<
     let Some(solved) = solve_block(own, inverse, values) else { return vec![0.0; values.len()] };
     let total = dot(&solved, values);
     solved.iter().map(|value| if total > 0.0 { value / total } else { 0.0 }).collect()
-}
-
-/// (Z_oo)⁻¹·x by Cholesky's factor of the small block.
-fn solve_block(own: &[usize], inverse: &[Vec<f64>], x: &[f64]) -> Option<Vec<f64>> {
-    let count = own.len();
-    let mut l = vec![0.0; count * count];
-    for row in 0..count {
-        for column in 0..=row {
-            let known: f64 = (0..column).map(|k| l[row * count + k] * l[column * count + k]).sum();
-            let rest = inverse[row][own[column]] - known;
-            if row == column {
-                if rest.is_nan() || rest <= 0.0 {
-                    return None;
-                }
-                l[row * count + row] = rest.sqrt();
-            } else {
-                l[row * count + column] = rest / l[column * count + column];
-            }
-        }
-    }
-    let mut y = x.to_vec();
-    for row in 0..count {
-        let known: f64 = (0..row).map(|k| l[row * count + k] * y[k]).sum();
-        y[row] = (y[row] - known) / l[row * count + row];
-    }
-    for row in (0..count).rev() {
-        let known: f64 = (row + 1..count).map(|k| l[k * count + row] * y[k]).sum();
-        y[row] = (y[row] - known) / l[row * count + row];
-    }
-    Some(y)
 }
 
 /// For each fold the weighted scores of all active columns times `influence`.
