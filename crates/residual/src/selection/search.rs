@@ -246,8 +246,12 @@ impl<'a> Search<'a> {
         while place < self.model.members.len() {
             let best = self.in_place_of(place).into_iter().next();
             let better = best.filter(|(model, _)| model.value < self.model.value - LEAST_STEP);
-            let better = better.map(|(model, _)| vec![model]).unwrap_or_default();
-            if let Some(model) = self.first_that_foretells(better) {
+            let better = better.and_then(|(model, entering)| match entering.len() {
+                1 => Some(model),
+                // More in the place of one must foretell more, as whatever is added.
+                _ => self.first_that_foretells(vec![model]),
+            });
+            if let Some(model) = better {
                 self.model = model;
                 swapped = true;
             }
