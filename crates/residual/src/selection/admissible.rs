@@ -47,7 +47,6 @@ impl Search<'_> {
             members.sort_by_key(|member| present(member).unwrap_or(place));
             *model = self.within_bounds(members, start);
         });
-        models.truncate(best);
         models.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
         models
     }
@@ -65,7 +64,7 @@ impl Search<'_> {
             if broken.is_empty() {
                 let fit = fit.unwrap_or(fitted);
                 let value = criterion(self.problem, &members, &fit, &self.rows);
-                return Model { members, fit, value };
+                return Model { members, fit, value, settled: false };
             }
             let goes = |member: &Member| {
                 let own = &self.problem.hypotheses[member.hypothesis];
@@ -79,7 +78,7 @@ impl Search<'_> {
             absent.extend(parameters.filter_map(|parameter| fitted.place[parameter]));
             fit = fitted.pinned(self.problem, &absent);
             if fit.is_none() {
-                return Model { members, fit: fitted, value: f64::INFINITY };
+                return Model { members, fit: fitted, value: f64::INFINITY, settled: false };
             }
         }
     }
@@ -92,7 +91,7 @@ impl Search<'_> {
             let broken: Vec<Member> = members.iter().filter(|member| breaks(member)).copied().collect();
             if broken.is_empty() {
                 let value = criterion(self.problem, &members, &fit, &self.rows);
-                return Model { members, fit, value };
+                return Model { members, fit, value, settled: true };
             }
             let depends = |other: &Member, on: &Member| {
                 let other = &self.problem.hypotheses[other.hypothesis];

@@ -54,6 +54,8 @@ pub(super) struct Model {
     pub members: Vec<Member>,
     pub fit: Fit,
     pub value: f64,
+    /// Whether it is fitted with its own weights, so that it may be taken; otherwise it has values only.
+    pub settled: bool,
 }
 
 pub(super) struct Search<'a> {
@@ -108,7 +110,7 @@ impl<'a> Search<'a> {
             .map(|torque| (torque.whole.rows() / problem.rows_per_independent).max(2.0))
             .collect();
         let fit = Fit::new(problem, problem.active(&start), &rows, None);
-        let model = Model { members: start, fit, value: 0.0 };
+        let model = Model { members: start, fit, value: 0.0, settled: true };
         let mut search =
             Search { problem, policy, closed: vec![false; problem.hypotheses.len()], rows, model };
         search.renew();
@@ -182,7 +184,9 @@ impl<'a> Search<'a> {
         let larger = |added: Vec<Member>| (self.model.members.iter().copied().chain(added).collect(), ());
         let models = self.ranked(moves.into_iter().map(larger).collect(), &self.model.fit, usize::MAX);
         let better = models.into_iter().map(|(model, ())| model).filter(|model| {
-            model.value < self.model.value - LEAST_STEP && model.members != self.model.members
+            model.settled
+                && model.value < self.model.value - LEAST_STEP
+                && model.members != self.model.members
         });
         let best = self.first_that_foretells(better.collect());
         best.map(|best| self.model = best).is_some()
@@ -230,7 +234,7 @@ impl<'a> Search<'a> {
             (stays.copied().collect(), ())
         };
         let models = self.ranked(moves.into_iter().map(smaller).collect(), &self.model.fit, usize::MAX);
-        match models.into_iter().next() {
+        match models.into_iter().find(|(model, ())| model.settled) {
             Some((best, ())) if best.value <= self.model.value && best.members != self.model.members => {
                 self.model = best;
                 true
@@ -244,7 +248,7 @@ impl<'a> Search<'a> {
         let mut swapped = false;
         let mut place = 0;
         while place < self.model.members.len() {
-            let best = self.in_place_of(place).into_iter().next();
+            let best = self.in_place_of(place).into_iter().find(|(model, _)| model.settled);
             let better = best.filter(|(model, _)| model.value < self.model.value - LEAST_STEP);
             let better = better.and_then(|(model, entering)| match entering.len() {
                 1 => Some(model),

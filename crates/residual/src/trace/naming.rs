@@ -232,10 +232,11 @@ impl Search<'_> {
             };
             let Some(own_member) = trial.member(own) else { continue };
             let with = trial.held_out_squares(&trial.fit);
-            let without = match level.map(|level| &simpler[level - 1]) {
-                Some(simpler) => simpler.squares.clone(),
-                None => trial.held_out_squares(&trial.fit_with(|other| other != own)),
-            };
+            let mut without = trial.held_out_squares(&trial.fit_with(|other| other != own));
+            if let Some(simpler) = level.map(|level| &simpler[level - 1]) {
+                // With constants as they are without it, and as they are with it: what is less.
+                without.iter_mut().zip(&simpler.squares).for_each(|(own, other)| *own = own.min(*other));
+            }
             let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
             let squares = Squares { initial, without, with };
             let material = match level {
