@@ -81,7 +81,7 @@ impl Search<'_> {
                     let prices: f64 =
                         members.iter().map(|&member| price(self.problem, member, None, &self.rows)).sum();
                     let most = most_of(self.problem, fit, &self.rows, &[torque]);
-                    let gain = gain_of(squares, self.rows[torque]).min(most) - prices;
+                    let gain = gain_of(fit, squares, self.rows[torque], &[torque]).min(most) - prices;
                     if within && gain > first.gain && gain > second.gain {
                         let mut members = members;
                         members.sort_by_key(|member| self.problem.hypotheses[member.hypothesis].kind);

@@ -94,10 +94,12 @@ impl Beside {
     }
 }
 
-/// What the criterion gains, to first order, where `squares` weighted squares are taken from torques of
-/// `rows` effective rows.
-pub(super) fn gain_of(squares: f64, rows: f64) -> f64 {
-    -rows * (-(squares / rows.max(1.0)).min(1.0 - 1e-9)).ln_1p()
+/// What the criterion gains, to first order, where `squares` weighted squares are taken from what a fit leaves
+/// of torques of `rows` effective rows.
+pub(super) fn gain_of(fit: &Fit, squares: f64, rows: f64, torques: &[usize]) -> f64 {
+    // As many as there are rows only where the weights are the fit's own.
+    let all: f64 = torques.iter().map(|&torque| fit.weights[torque] * fit.rss[torque]).sum();
+    -rows * (-(squares / all.max(f64::MIN_POSITIVE)).min(1.0 - 1e-9)).ln_1p()
 }
 
 /// What the criterion would gain if nothing were left of the torques.
@@ -132,7 +134,8 @@ pub(super) fn screen(problem: &Problem, fit: &Fit, rows: &[f64], open: &[usize])
                 .iter()
                 .zip(bounds)
                 .all(|(value, (low, high))| value.is_none_or(|value| *low <= value && value <= *high));
-            let gain = gain_of(squares, effective).min(most) - price(problem, member, None, rows);
+            let gain =
+                gain_of(fit, squares, effective, &own.torques).min(most) - price(problem, member, None, rows);
             (within && values.iter().any(Option::is_some) && gain > 0.0).then_some(Screened { member, gain })
         };
         let variants = (0..own.variants.len()).filter_map(of_variant);
