@@ -258,14 +258,21 @@ impl Search<'_> {
     }
 
     /// Whether a form of something simpler is worth a name of its own: it must take away most of what the
-    /// simpler ones leave, and be a share of the torque.
+    /// simpler ones leave, be a share of the torque, and a share of what it is a form of.
     fn is_form_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
-        trial.problem.hypotheses[member.hypothesis].torques.iter().any(|&torque| {
+        let hypothesis = &trial.problem.hypotheses[member.hypothesis];
+        hypothesis.torques.iter().any(|&torque| {
             let whole = trial.held_out[torque].right_hand_side().max(f64::MIN_POSITIVE);
             let (without, with) = (squares.without[torque], squares.with[torque]);
             let taken = (without - with).max(0.0);
+            let simpler =
+                trial.members.iter().filter(|other| hypothesis.requires.contains(&other.hypothesis));
+            let simpler: Vec<(usize, f64)> =
+                simpler.flat_map(|&other| trial.values_of(other, torque)).collect();
+            let of_simpler = trial.held_out[torque].size_of(&simpler);
             !self.is_as_it_was(torque, (without / trial.held_out[torque].rows().max(1.0)).sqrt())
                 && taken >= self.options.least_share_of_kin * without
+                && taken >= self.options.least_of_simpler * of_simpler
                 && (taken / whole).sqrt() >= self.options.least_size
         })
     }
