@@ -2,9 +2,13 @@
 //! s.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use phiw_curriculum::selection::{Question, Selection, SmallestCondition, TorqueOptimal};
-use phiw_curriculum::{Candidates, Motion, MotionDataset, Robot, Triangle};
+use phiw_curriculum::motion::{Motion, MotionDataset};
+use phiw_curriculum::selection::{
+    Candidates, Question, Selection, SmallestCondition, TorqueOptimal, Triangle,
+};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+use phiw_effects::Catalogue;
+use phiw_estimation::Robot;
 use phiw_plant::{MultiSine, Reference};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -31,7 +35,7 @@ fn all(criterion: &mut Criterion) {
         })
         .collect();
     let dataset = MotionDataset::new(joints, motions).expect("a dataset");
-    let robot = Robot::with_viscous_friction(tree, [0.0; 10]).expect("a robot");
+    let robot = Robot::with_viscous_friction(tree, [0.0; 10], Catalogue::default()).expect("a robot");
     let weights = vec![1.0; joints];
     let candidates =
         Candidates::new(&robot, robot.declared(), &dataset, &weights).expect("motions of this robot");

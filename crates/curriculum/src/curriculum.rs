@@ -1,19 +1,17 @@
 //! Algorithm 1, lines 10 to 17: select, measure, estimate, relax; and, where the model may grow, look for
 //! what it lacks.
 
-use crate::contest::{rivals_to_separate, unconfirmed};
-use crate::estimation::RowsAt;
+use crate::constraint::Constraint;
+use crate::end::{EndCriterion, FixedCount};
 use crate::experiment::check_noise;
-use crate::growth::Found;
-use crate::planner::{Belief, MeasuredSoFar, Policy, plan};
+use crate::growth::{Found, Growth, Rivalry, rivals_to_separate, unconfirmed};
+use crate::motion::MotionDataset;
+use crate::planner::{Belief, MeasuredSoFar, NoneAllowed, Plan, Policy, plan};
 use crate::random::{Purpose, random};
-use crate::selection::SmallestCondition;
-use crate::triangle::Triangle;
-use crate::{
-    Candidates, ConditionRelaxation, Constraint, CurriculumError, EndCriterion, Estimate, Estimator,
-    Evidence, Experiment, FixedCount, Growth, IterationRecord, Measured, MotionDataset, NoneAllowed, Plan,
-    Relaxation, Rivalry, Robot, RobotModel, Run, Selection,
-};
+use crate::relaxation::{ConditionRelaxation, Relaxation};
+use crate::selection::{Candidates, Selection, SmallestCondition, Triangle};
+use crate::{CurriculumError, Experiment, IterationRecord, Run};
+use phiw_estimation::{Estimate, Estimator, Evidence, Measured, Robot, RobotModel, RowsAt};
 use phiw_identification::EffectSpec;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -165,7 +163,9 @@ impl<'a> Curriculum<'a> {
             torque_uncertainty: match &estimate {
                 Some(estimate) => {
                     let candidates = self.candidates_of(&next.model)?;
-                    estimate.uncertainty_along(candidates.everything(), self.dataset.rows())
+                    let everything = candidates.everything();
+                    let covariance = estimate.covariance.as_ref();
+                    covariance.and_then(|known| everything.uncertainty_of(known, self.dataset.rows()))
                 }
                 None => run.history.last().and_then(|record| record.torque_uncertainty),
             },
@@ -246,7 +246,7 @@ impl<'a> Curriculum<'a> {
     /// −log L of what was learnt, if the estimator knows it.
     fn misfit(&self, learning: &Learning) -> Result<Option<f64>, CurriculumError> {
         let design = self.robot.design_of(&learning.model)?;
-        self.estimator.misfit(&design, &learning.evidence, &learning.estimate.parameters)
+        Ok(self.estimator.misfit(&design, &learning.evidence, &learning.estimate.parameters)?)
     }
 
     /// The same with other `effects` beside the declared ones, fitted to all logs again.

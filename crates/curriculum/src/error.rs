@@ -1,6 +1,7 @@
 //! What can go wrong in a curriculum.
 
 use phiw_dynamics::DimensionError;
+use phiw_estimation::EstimationError;
 use phiw_identification::{EffectError, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_telemetry::LogError;
@@ -63,14 +64,6 @@ pub enum CurriculumError {
         /// Standard deviation that the estimator was told \[N·m, N\].
         told: f64,
     },
-    /// A model's effect has no counterpart in a plant.
-    #[error(
-        "no plant is built with {kind} from a model: leave it out there, and add it to the effects of the simulated robot"
-    )]
-    NotSimulated {
-        /// The kind of the effect.
-        kind: String,
-    },
     /// A saved run is not of this robot or these motions.
     #[error(
         "the saved run does not fit: {0}; use the robot and the motions that it was begun with, or begin anew"
@@ -83,6 +76,9 @@ pub enum CurriculumError {
     #[error(transparent)]
     Effect(#[from] EffectError),
     /// The estimate failed.
+    #[error(transparent)]
+    Estimation(#[from] EstimationError),
+    /// A fit failed.
     #[error(transparent)]
     Identification(#[from] IdentificationError),
     /// The robot cannot be run.

@@ -1,7 +1,9 @@
 //! Where measurements come from.
 
-use crate::{CurriculumError, Estimator, Measured, Motion, Robot, RobotModel};
-use rand_chacha::ChaCha8Rng;
+use crate::CurriculumError;
+use crate::motion::Motion;
+use phiw_estimation::{Estimator, Measured, Robot, RobotModel};
+use rand::Rng;
 
 /// What happened when a motion was tried.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,7 +18,7 @@ pub struct Trial {
 
 /// Tries motions on a robot: line 13 of Algorithm 1.
 pub trait Experiment: Send + Sync {
-    /// Lets the robot follow a motion with what is believed of it. The same `random` gives the same trial.
+    /// Lets the robot follow a motion with what is believed of it. The same random numbers give the same trial.
     ///
     /// # Errors
     /// The robot can not be run. A fall is no error.
@@ -25,7 +27,7 @@ pub trait Experiment: Send + Sync {
         robot: &Robot,
         model: &RobotModel,
         motion: &Motion,
-        random: &mut ChaCha8Rng,
+        rng: &mut dyn Rng,
     ) -> Result<Trial, CurriculumError>;
 
     /// Standard deviation of each torque's noise \[N·m, N\], if it is known. An estimator that is told

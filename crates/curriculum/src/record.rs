@@ -1,7 +1,9 @@
 //! What is written down of an iteration, and of a run: everything that is needed to go on.
 
+use crate::end::EndReason;
+use crate::growth::Rivalry;
 use crate::selection::Choice;
-use crate::{Evidence, Measured, Rivalry, RobotModel};
+use phiw_estimation::{Evidence, Measured, RobotModel};
 use serde::{Deserialize, Serialize};
 
 /// One iteration.
@@ -43,16 +45,6 @@ pub struct IterationRecord {
     pub model: RobotModel,
     /// Standard deviations of its parameter vector; `null` where the estimator does not know.
     pub standard_deviations: Vec<Option<f64>>,
-}
-
-/// Why a curriculum ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum EndReason {
-    /// The number of iterations that was asked for.
-    Count,
-    /// Another motion would change little.
-    Converged,
 }
 
 /// A run of a curriculum: all that is needed to go on with it, to the last bit.

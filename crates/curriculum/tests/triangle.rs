@@ -1,7 +1,7 @@
 //! Small triangles against the full factor and the full singular value decomposition.
 
 use faer::linalg::solvers::DenseSolveCore;
-use phiw_curriculum::Triangle;
+use phiw_curriculum::selection::Triangle;
 use phiw_regressor::factor::Factor;
 use proptest::prelude::*;
 

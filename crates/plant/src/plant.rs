@@ -174,7 +174,7 @@ impl Plant {
     /// Puts the robot at rest into the reference's first posture, lets it settle, and follows the reference.
     ///
     /// The first row of the log is that of the motion's start. The reference should start at rest: what it
-    /// asks for at time 0 sets in at once. The same `random` gives the same run; what sensors draw does not
+    /// asks for at time 0 sets in at once. The same random numbers give the same run; what sensors draw does not
     /// change the motion, unless the controller sees it. On a fall the run ends, which is no error.
     ///
     /// # Errors
@@ -183,10 +183,10 @@ impl Plant {
         &mut self,
         reference: &dyn Reference,
         duration_s: f64,
-        random: &mut impl Rng,
+        rng: &mut (impl Rng + ?Sized),
     ) -> Result<PlantRun, PlantError> {
         check_value(|| "the duration".to_owned(), duration_s, "> 0", |value| value > 0.0)?;
-        let seed: u64 = random.random();
+        let seed: u64 = rng.random();
         let stream = |number| {
             let mut stream = ChaCha8Rng::seed_from_u64(seed);
             stream.set_stream(number);

@@ -1,11 +1,13 @@
 //! A simulated robot that tries motions, over any backend.
 
 use crate::Controller;
-use phiw_curriculum::{CurriculumError, Experiment, KnownEffect, Measured, Motion, Robot, RobotModel, Trial};
+use phiw_curriculum::motion::Motion;
+use phiw_curriculum::{CurriculumError, Experiment, Trial};
 use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
-use phiw_effects::JointProperty;
+use phiw_estimation::{KnownEffect, Measured, Robot, RobotModel};
+use phiw_identification::JointProperty;
 use phiw_plant::{Effect, Friction, History, Plant, PlantRun, PlantSetup, Sensors, Timing};
-use rand_chacha::ChaCha8Rng;
+use rand::Rng;
 
 /// Makes a backend of the robot as it is built.
 pub type BuildBackend =
@@ -60,6 +62,15 @@ impl Default for Stillness {
     }
 }
 
+/// An effect of a model that has no counterpart in a plant.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "no plant is built with {kind} from a model: leave it out there, and add it to the effects of the simulated robot"
+)]
+struct NotSimulated {
+    kind: String,
+}
+
 impl SimulatedRobot {
     /// The robot that `truth` describes, on its fixed base: what its bodies and its effects are is stated
     /// there alone. Its actuators add no noise, its sensors are exact, and its time is cut as
@@ -107,7 +118,7 @@ impl SimulatedRobot {
         robot: &Robot,
         model: &RobotModel,
         motion: &Motion,
-        random: &mut ChaCha8Rng,
+        rng: &mut dyn Rng,
     ) -> Result<PlantRun, CurriculumError> {
         let period_s = self.sensors.period_s;
         if (period_s / self.timing.control_period_s - 1.0).abs() > 1e-9 {
@@ -126,7 +137,7 @@ impl SimulatedRobot {
         let mut plant = Plant::new(&self.tree, &self.world, setup, |tree, world| (self.build)(tree, world))
             .map_err(CurriculumError::of_experiment)?;
         let reference = |t_s: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| motion.at(t_s, q, v, a);
-        plant.run(&reference, motion.duration_s(), random).map_err(CurriculumError::of_experiment)
+        plant.run(&reference, motion.duration_s(), rng).map_err(CurriculumError::of_experiment)
     }
 
     /// For each row of the log, whether the base stood still until the next, as a gyroscope in it would tell;
@@ -158,9 +169,9 @@ impl Experiment for SimulatedRobot {
         robot: &Robot,
         model: &RobotModel,
         motion: &Motion,
-        random: &mut ChaCha8Rng,
+        rng: &mut dyn Rng,
     ) -> Result<Trial, CurriculumError> {
-        let run = self.run(robot, model, motion, random)?;
+        let run = self.run(robot, model, motion, rng)?;
         // A robot that falls at once has no log.
         let measured = match run.recording.len() {
             0 | 1 => Measured {
@@ -185,7 +196,7 @@ fn plant_effects(robot: &Robot, model: &RobotModel) -> Result<Vec<Effect>, Curri
         let property = robot.catalogue().joint_property(&known.spec);
         let joint = known.spec.joints.first().and_then(|joint| robot.tree().joint_index(joint));
         let (Some(property), Some(joint), &[value]) = (property, joint, known.parameters.as_slice()) else {
-            return Err(CurriculumError::NotSimulated { kind: known.spec.kind.clone() });
+            return Err(CurriculumError::of_experiment(NotSimulated { kind: known.spec.kind.clone() }));
         };
         let width = known.spec.constants.get("sign_width").copied().unwrap_or(0.0);
         Ok(match property {

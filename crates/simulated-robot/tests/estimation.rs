@@ -3,7 +3,11 @@
 mod arm;
 
 use arm::Arm;
-use phiw_curriculum::*;
+use phiw_curriculum::{Experiment, unreliable_model};
+use phiw_estimation::{
+    Estimate, Estimator, Evidence, LeastSquares, Measured, MotionLikelihood, NewtonSettings, Prior, RowsAt,
+    WeightedLeastSquares,
+};
 use phiw_identification::Design;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

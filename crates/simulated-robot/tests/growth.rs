@@ -4,7 +4,13 @@
 mod arm;
 
 use arm::Arm;
-use phiw_curriculum::*;
+use phiw_curriculum::end::FixedCount;
+use phiw_curriculum::growth::{Growth, Rivalry};
+use phiw_curriculum::motion::{Motion, MotionDataset};
+use phiw_curriculum::selection::Candidates;
+use phiw_curriculum::{Curriculum, CurriculumError, Experiment, Run, unreliable_model};
+use phiw_estimation::{Evidence, KnownEffect, RobotModel, RowsAt};
+use phiw_growth::TraceResidual;
 use phiw_identification::EffectSpec;
 use phiw_plant::{Effect, Friction, Mechanism};
 
@@ -43,7 +49,7 @@ fn torque_error(arm: &Arm, secret: &Effect, model: &RobotModel) -> f64 {
     let mut experiment = Arm::new(0.0).experiment();
     experiment.effects.push(secret.clone());
     let motion = arm::motions(&arm.tree, 9).pop().unwrap();
-    let mut random = rand::SeedableRng::seed_from_u64(99);
+    let mut random = <rand_chacha::ChaCha8Rng as rand::SeedableRng>::seed_from_u64(99);
     let measured = experiment.perform(&arm.robot, &arm.truth, &motion, &mut random).unwrap().measured;
     let design = arm.robot.design_of(model).unwrap();
     let mut evidence = Evidence::none(&design, RowsAt::Periods).unwrap();

@@ -3,10 +3,15 @@
 mod arm;
 
 use arm::Arm;
-use phiw_curriculum::selection::{Choice, Question};
-use phiw_curriculum::*;
+use phiw_curriculum::constraint::{Constraint, Safety};
+use phiw_curriculum::end::{EndReason, FixedCount};
+use phiw_curriculum::motion::Motion;
+use phiw_curriculum::relaxation::{ConditionRelaxation, Learnt, Maximum, Relaxation};
+use phiw_curriculum::selection::{Choice, Question, Selection};
+use phiw_curriculum::{Curriculum, CurriculumError, Experiment, Run, Trial, unreliable_model};
+use phiw_estimation::{Robot, RobotModel};
 use phiw_simulated_robot::*;
-use rand_chacha::ChaCha8Rng;
+use rand::Rng;
 
 fn rms(left: &[f64], right: &[f64]) -> f64 {
     let sum: f64 = left.iter().zip(right).map(|(a, b)| (a - b).powi(2)).sum();
@@ -83,9 +88,9 @@ impl Experiment for Clumsy {
         robot: &Robot,
         model: &RobotModel,
         motion: &Motion,
-        random: &mut ChaCha8Rng,
+        rng: &mut dyn Rng,
     ) -> Result<Trial, CurriculumError> {
-        let trial = self.robot.perform(robot, model, motion, random)?;
+        let trial = self.robot.perform(robot, model, motion, rng)?;
         Ok(Trial { fell_at_s: (motion.name != self.safe).then_some(1.0), ..trial })
     }
 }
@@ -117,7 +122,7 @@ impl Selection for First {
     fn name(&self) -> &'static str {
         "first"
     }
-    fn choose(&self, question: &Question<'_>, _: &mut ChaCha8Rng) -> Choice {
+    fn choose(&self, question: &Question<'_>, _: &mut dyn Rng) -> Choice {
         Choice { motion: question.allowed[0], merit: None, runner_up: None }
     }
 }

@@ -3,7 +3,11 @@
 mod arm;
 
 use arm::Arm;
-use phiw_curriculum::*;
+use phiw_curriculum::end::FixedCount;
+use phiw_curriculum::growth::Growth;
+use phiw_curriculum::{Curriculum, CurriculumError, Experiment, Run, unreliable_model};
+use phiw_estimation::{Estimator, Evidence, Measured, RobotModel, RowsAt};
+use phiw_growth::{ScoreTest, ScoreTestSettings};
 use phiw_identification::EffectSpec;
 use phiw_plant::{Effect, Friction, Mechanism};
 use rand::SeedableRng;

@@ -3,10 +3,13 @@
 mod arm;
 
 use arm::{motions, tree};
+use phiw_curriculum::motion::MotionDataset;
 use phiw_curriculum::selection::{
-    AOptimal, DOptimal, Question, RandomMotion, Selection, SmallestCondition, TorqueOptimal,
+    AOptimal, Candidates, DOptimal, Question, RandomMotion, Selection, SmallestCondition, TorqueOptimal,
+    Triangle,
 };
-use phiw_curriculum::{Candidates, MotionDataset, Robot, Triangle};
+use phiw_effects::Catalogue;
+use phiw_estimation::Robot;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -16,7 +19,7 @@ fn dataset(count: usize) -> MotionDataset {
 
 fn candidates(count: usize) -> Candidates {
     let tree = tree();
-    let robot = Robot::with_viscous_friction(tree, [0.0; 10]).unwrap();
+    let robot = Robot::with_viscous_friction(tree, [0.0; 10], Catalogue::default()).unwrap();
     Candidates::new(&robot, robot.declared(), &dataset(count), &[1.0; 7]).unwrap()
 }
 

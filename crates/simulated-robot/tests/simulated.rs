@@ -6,9 +6,13 @@ use arm::Arm;
 use phiw_bspline_retarget::embedded::embedded_motions;
 use phiw_bspline_retarget::human::MarkerMap;
 use phiw_bspline_retarget::{RetargetOptions, Retargeter};
-use phiw_curriculum::*;
+use phiw_curriculum::end::FixedCount;
+use phiw_curriculum::motion::Motion;
+use phiw_curriculum::{CurriculumError, Experiment, Run, unreliable_model};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{AnalyticBackend, BackendError, SimulationBackend, Tree, World};
+use phiw_effects::Catalogue;
+use phiw_estimation::{MotionLikelihood, Robot};
 use phiw_identification::EffectSpec;
 use phiw_plant::{Derivatives, Effect, Friction, Gains, Sensors, Timing};
 use phiw_simulated_robot::*;
@@ -33,7 +37,7 @@ fn bodies_and_frictions_are_those_of_the_truth() {
         EffectSpec::new("coulomb_friction", &[joints[2]]).with("sign_width", 0.02),
         EffectSpec::new("rotor_inertia", &[joints[4]]),
     ];
-    let robot = Robot::new(tree.clone(), [0.0; 10], specs, Default::default()).unwrap();
+    let robot = Robot::new(tree.clone(), [0.0; 10], specs, Catalogue::default()).unwrap();
     let mut truth = robot.truth(&[3.0, 0.4]).unwrap();
     truth.standard[0] *= 1.5;
     let simulated = SimulatedRobot::new(&robot, &truth, no_gains(), analytic).unwrap();
@@ -48,7 +52,7 @@ fn an_effect_that_no_plant_has_is_named() {
     let tree = arm::tree();
     let joint = tree.joint_names().next().unwrap().to_owned();
     let spec = EffectSpec::new("torque_gain", &[&joint]);
-    let robot = Robot::new(tree, [0.0; 10], vec![spec], Default::default()).unwrap();
+    let robot = Robot::new(tree, [0.0; 10], vec![spec], Catalogue::default()).unwrap();
     let truth = robot.truth(&[0.1]).unwrap();
     let error = SimulatedRobot::new(&robot, &truth, no_gains(), analytic).err().unwrap();
     assert!(error.to_string().contains("torque_gain"), "{error}");

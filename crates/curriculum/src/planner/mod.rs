@@ -4,13 +4,14 @@ mod permission;
 
 pub use permission::{NoneAllowed, Permission, permission};
 
+use crate::constraint::{Constraint, Safety};
+use crate::growth::Rivalry;
+use crate::motion::MotionDataset;
 use crate::random::{Purpose, random};
-use crate::selection::{Best, Choice, Question, Scored, decide};
-use crate::triangle::Triangle;
-use crate::{
-    Candidates, Constraint, CurriculumError, IterationRecord, Learnt, MotionDataset, Relaxation, Rivalry,
-    Robot, RobotModel, Safety, Selection,
-};
+use crate::relaxation::{Learnt, Relaxation};
+use crate::selection::{Best, Candidates, Choice, Question, Scored, Selection, Triangle, decide};
+use crate::{CurriculumError, IterationRecord};
+use phiw_estimation::{Robot, RobotModel};
 
 /// What is believed of a robot, and the motions that it may do.
 #[derive(Clone, Copy)]

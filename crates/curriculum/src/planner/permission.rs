@@ -1,6 +1,6 @@
 //! Which motions may be chosen: the decision by the constraint, and what happens where it allows none.
 
-use crate::Safety;
+use crate::constraint::Safety;
 use serde::{Deserialize, Serialize};
 
 /// What to do where the constraint allows no motion.

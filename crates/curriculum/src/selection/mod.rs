@@ -1,16 +1,20 @@
 //! Which motion next: the optimisation (11), and what it is compared with.
 
+mod candidates;
 mod optimal;
 mod random;
 mod smallest_condition;
+mod triangle;
 
+pub use candidates::{Candidate, Candidates};
 pub use optimal::{AOptimal, DOptimal, TorqueOptimal};
 pub use random::RandomMotion;
 pub use smallest_condition::SmallestCondition;
+pub use triangle::Triangle;
 
-use crate::triangle::Triangle;
-use crate::{Candidates, IterationRecord, MotionDataset};
-use rand_chacha::ChaCha8Rng;
+use crate::IterationRecord;
+use crate::motion::MotionDataset;
+use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 /// What a selection chooses from.
@@ -45,7 +49,7 @@ pub trait Selection: Send + Sync {
     fn name(&self) -> &'static str;
 
     /// Chooses one of the allowed motions.
-    fn choose(&self, question: &Question<'_>, random: &mut ChaCha8Rng) -> Choice;
+    fn choose(&self, question: &Question<'_>, rng: &mut dyn Rng) -> Choice;
 }
 
 impl Question<'_> {

@@ -1,7 +1,7 @@
 //! Optimal experiments in the classical sense, for comparison with cond.
 
 use super::{Choice, Question, Selection, smallest};
-use rand_chacha::ChaCha8Rng;
+use rand::Rng;
 
 /// The largest determinant of ΦᵀΦ: the smallest volume of the parameters' uncertainty.
 #[derive(Clone, Copy, Debug, Default)]
@@ -13,7 +13,7 @@ impl Selection for DOptimal {
     }
 
     /// The merit is −log det(ΦᵀΦ).
-    fn choose(&self, question: &Question<'_>, _: &mut ChaCha8Rng) -> Choice {
+    fn choose(&self, question: &Question<'_>, _: &mut dyn Rng) -> Choice {
         smallest(question.allowed, |motion| -question.stack(motion).log_determinant())
     }
 }
@@ -28,7 +28,7 @@ impl Selection for AOptimal {
         "a_optimal"
     }
 
-    fn choose(&self, question: &Question<'_>, _: &mut ChaCha8Rng) -> Choice {
+    fn choose(&self, question: &Question<'_>, _: &mut dyn Rng) -> Choice {
         smallest(question.allowed, |motion| question.stack(motion).inverse_trace())
     }
 }
@@ -50,7 +50,7 @@ impl Selection for TorqueOptimal {
     }
 
     /// The merit is trace(Φ_all·(ΦᵀΦ)⁻¹·Φ_allᵀ), with the rows weighted like the candidates.
-    fn choose(&self, question: &Question<'_>, _: &mut ChaCha8Rng) -> Choice {
+    fn choose(&self, question: &Question<'_>, _: &mut dyn Rng) -> Choice {
         let everything = question.candidates.everything();
         smallest(question.allowed, |motion| question.stack(motion).variance_along(everything))
     }

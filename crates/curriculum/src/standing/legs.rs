@@ -1,7 +1,8 @@
 //! Legs that follow: base and upper body move as they are told, and the legs keep the feet where they are.
 
 use super::{Feet, VIRTUAL_JOINTS};
-use crate::{CurriculumError, Motion};
+use crate::CurriculumError;
+use crate::motion::Motion;
 use phiw_dynamics::{Foot, JointType, Tree, Vec3, check_size};
 use phiw_regressor::BaseParameters;
 use rand::{RngExt, SeedableRng};

@@ -7,9 +7,10 @@ use super::setup::{Setup, Validation};
 use super::subject::SubjectName;
 use crate::plant::engine::Engine;
 use crate::plant::secret::SecretKind;
-use phiw_curriculum::{
-    Curriculum, CurriculumSettings, FixedCount, NoneAllowed, RowsAt, Run, unreliable_model,
-};
+use phiw_curriculum::end::FixedCount;
+use phiw_curriculum::planner::NoneAllowed;
+use phiw_curriculum::{Curriculum, CurriculumSettings, Run, unreliable_model};
+use phiw_estimation::RowsAt;
 use phiw_plant::Effect;
 use rayon::prelude::*;
 use std::path::Path;

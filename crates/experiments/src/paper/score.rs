@@ -2,9 +2,9 @@
 
 use super::setup::{Setup, Validation};
 use phiw_curriculum::selection::Question;
-use phiw_curriculum::{
-    Curriculum, CurriculumError, Estimator, Evidence, LeastSquares, Measured, RobotModel, RowsAt, Run,
-    WeightedLeastSquares,
+use phiw_curriculum::{Curriculum, Run};
+use phiw_estimation::{
+    EstimationError, Estimator, Evidence, LeastSquares, Measured, RobotModel, RowsAt, WeightedLeastSquares,
 };
 use phiw_identification::accuracy::{parameter_rmse, torque_rmse};
 use phiw_identification::{TorqueError, torque_error};
@@ -81,7 +81,7 @@ impl Setup {
             };
             // Rows that count can be few, where the base rocks: then least squares has no answer.
             match estimator.estimate(&design, evidence, model, &parameters) {
-                Err(CurriculumError::Regressor(RegressorError::RankDeficient { .. })) => Ok(None),
+                Err(EstimationError::Regressor(RegressorError::RankDeficient { .. })) => Ok(None),
                 estimate => Ok(Some(parameter_rmse(&estimate?.parameters, &truth))),
             }
         };

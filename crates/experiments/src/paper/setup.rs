@@ -11,12 +11,18 @@ use crate::plant::engine::Engine;
 use crate::plant::secret::SecretKind;
 use anyhow::{Context, ensure};
 use phiw::console::Console;
-use phiw_curriculum::{
-    Candidates, ConditionRelaxation, Estimator, Evidence, Experiment, Growth, LeastSquares, Measured, Motion,
-    MotionDataset, MotionLikelihood, Prior, Relaxation, Robot, RobotModel, RowsAt, ScoreTest, TraceResidual,
-    UncertaintyRelaxation, WeightedLeastSquares, ZmpConstraint,
-};
+use phiw_curriculum::Experiment;
+use phiw_curriculum::constraint::ZmpConstraint;
+use phiw_curriculum::growth::Growth;
+use phiw_curriculum::motion::{Motion, MotionDataset};
+use phiw_curriculum::relaxation::{ConditionRelaxation, Relaxation, UncertaintyRelaxation};
+use phiw_curriculum::selection::Candidates;
 use phiw_dynamics::{PARAMETERS_PER_BODY, Workspace, World};
+use phiw_estimation::{
+    Estimator, Evidence, LeastSquares, Measured, MotionLikelihood, Prior, Robot, RobotModel, RowsAt,
+    WeightedLeastSquares,
+};
+use phiw_growth::{ScoreTest, TraceResidual};
 use phiw_identification::{parameter_name, standard_unit};
 use phiw_plant::{Effect, Sensors, Timing};
 use phiw_regressor::factor::Factor;

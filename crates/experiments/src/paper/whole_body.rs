@@ -12,18 +12,18 @@ use crate::environment;
 use crate::plant::engine::Engine;
 use anyhow::Context;
 use pelvis::PelvisMotion;
+use phiw_curriculum::motion::Motion;
 use phiw_curriculum::standing::{Legs, StandingStates, VIRTUAL_JOINTS, with_virtual_base};
-use phiw_curriculum::{Motion, Robot};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{BackendError, Foot, PARAMETERS_PER_BODY, SimulationBackend, Tree, World};
 use phiw_effects::Catalogue;
+use phiw_estimation::Robot;
 use phiw_identification::EffectSpec;
 use phiw_plant::{Effect, Sensors, Timing};
 use phiw_regressor::BaseParameters;
 use phiw_sim_mujoco::{Integrator, MujocoBackend};
 use phiw_simulated_robot::{SimulatedRobot, StandingFeedForward, StandingRobot, WrenchNoise};
-use phiw_zmp::feet_from_toml;
-use phiw_zmp::{Stance, SupportPolygon};
+use phiw_zmp::{Stance, SupportPolygon, feet_from_toml};
 
 /// Joints without motors.
 const BASE: usize = VIRTUAL_JOINTS.len();

@@ -11,7 +11,7 @@ use crate::paper::{
 };
 use anyhow::Context;
 use phiw::console::Console;
-use phiw_curriculum::{Measured, RobotModel};
+use phiw_estimation::{Measured, RobotModel};
 use phiw_identification::TorqueError;
 use phiw_plant::Effect;
 use std::path::{Path, PathBuf};

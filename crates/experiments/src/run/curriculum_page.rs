@@ -2,9 +2,9 @@
 
 use super::curriculum::Outcome;
 use crate::paper::{RunFile, Score, balance, choices};
-use phiw_curriculum::RobotModel;
 use phiw_dynamics::Tree;
 use phiw_effects::sentence;
+use phiw_estimation::RobotModel;
 use phiw_identification::TorqueError;
 use phiw_plant::{Effect, Friction};
 use phiw_report::number::{percent, significant};
@@ -185,7 +185,7 @@ fn curves(label: &str, closed: &[f64], open: &[f64], first: usize) -> Picture {
 /// Kinds and joints of the effects beside those declared.
 fn names(outcome: &Outcome, model: &RobotModel) -> String {
     let effects = model.effects.iter().skip(outcome.setup.robot.declared().len());
-    let name = |effect: &phiw_curriculum::KnownEffect| {
+    let name = |effect: &phiw_estimation::KnownEffect| {
         format!("{} of {}", effect.spec.kind.replace('_', " "), effect.spec.joints.join(" and "))
     };
     effects.map(name).collect::<Vec<_>>().join("; ")

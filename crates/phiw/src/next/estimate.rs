@@ -5,12 +5,13 @@ use crate::Error;
 use crate::arguments::NextArguments;
 use crate::model_file::ModelFile;
 use crate::session::{Session, declared};
-use phiw_curriculum::{
-    BayesianLeastSquares, Candidates, CurriculumError, Estimate, Estimator, Evidence, LogNoise, Prior, Robot,
-    RobotModel, RowsAt, Triangle,
-};
+use phiw_curriculum::CurriculumError;
+use phiw_curriculum::selection::{Candidates, Triangle};
 use phiw_dynamics::{InertialParameters, Tree};
 use phiw_effects::Catalogue;
+use phiw_estimation::{
+    BayesianLeastSquares, Estimate, Estimator, Evidence, LogNoise, Prior, Robot, RobotModel, RowsAt,
+};
 use phiw_identification::{
     Design, EffectCatalogue, EffectSpec, IdentificationError, Identified, Progress, check_size_of_robot, fit,
     identify, merge, with_masses,

@@ -2,9 +2,15 @@
 
 #![allow(dead_code, reason = "each test file uses a part")]
 
-use phiw_curriculum::*;
+use phiw_curriculum::constraint::Unconstrained;
+use phiw_curriculum::end::EndCriterion;
+use phiw_curriculum::motion::{Motion, MotionDataset};
+use phiw_curriculum::selection::Candidates;
+use phiw_curriculum::{Curriculum, Experiment};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{AnalyticBackend, Tree, World};
+use phiw_effects::Catalogue;
+use phiw_estimation::{Estimator, MotionLikelihood, Robot, RobotModel};
 use phiw_plant::{Effect, Friction, Gains, MultiSine, Reference, Sensors, Timing};
 use phiw_simulated_robot::*;
 use rand::SeedableRng;
@@ -45,7 +51,7 @@ pub fn motions(tree: &Tree, count: usize) -> Vec<Motion> {
 impl Arm {
     pub fn new(noise: f64) -> Self {
         let tree = tree();
-        let robot = Robot::with_viscous_friction(tree.clone(), [0.0; 10]).unwrap();
+        let robot = Robot::with_viscous_friction(tree.clone(), [0.0; 10], Catalogue::default()).unwrap();
         let viscous: Vec<f64> = (0..tree.joint_count())
             .map(|joint| 0.02 * tree.joint(joint).limits.effort / tree.joint(joint).limits.velocity)
             .collect();
