@@ -54,15 +54,15 @@ pub enum CurriculumError {
     },
     /// Noise is stated twice.
     #[error(
-        "the estimator counts on a noise of {told} N·m (N) in the torque of {joint}, where the experiment makes {made}: give it the experiment's own torque_noise()"
+        "the estimator counts on a noise of {assumed} N·m (N) in the torque of {joint}, where the experiment makes {made}: give it the experiment's own torque_noise()"
     )]
     Noise {
         /// The joint.
         joint: String,
         /// Standard deviation that the experiment makes \[N·m, N\].
         made: f64,
-        /// Standard deviation that the estimator was told \[N·m, N\].
-        told: f64,
+        /// Standard deviation that the estimator assumes \[N·m, N\].
+        assumed: f64,
     },
     /// A saved run is not of this robot or these motions.
     #[error(

@@ -30,7 +30,7 @@ pub trait Experiment: Send + Sync {
         rng: &mut dyn Rng,
     ) -> Result<Trial, CurriculumError>;
 
-    /// Standard deviation of each torque's noise \[N·m, N\], if it is known. An estimator that is told
+    /// Standard deviation of each torque's noise \[N·m, N\], if it is known. An estimator that is assumed
     /// another one is refused.
     fn known_torque_noise(&self) -> Option<Vec<f64>> {
         None
@@ -44,19 +44,19 @@ const ROUNDED: f64 = 1e-6;
 /// wrongly, and nothing else would tell.
 ///
 /// # Errors
-/// The experiment knows the noise of a torque, and the estimator is told another one. Where there is no noise
+/// The experiment knows the noise of a torque, and the estimator is assumed another one. Where there is no noise
 /// any will do: it stands for rounding.
 pub(crate) fn check_noise(
     robot: &Robot,
     experiment: &dyn Experiment,
     estimator: &dyn Estimator,
 ) -> Result<(), CurriculumError> {
-    let (Some(made), Some(told)) = (experiment.known_torque_noise(), estimator.torque_noise()) else {
+    let (Some(made), Some(assumed)) = (experiment.known_torque_noise(), estimator.torque_noise()) else {
         return Ok(());
     };
-    for ((joint, &made), &told) in robot.tree().joint_names().zip(&made).zip(told) {
-        if made > 0.0 && (told / made - 1.0).abs() > ROUNDED {
-            return Err(CurriculumError::Noise { joint: joint.to_owned(), made, told });
+    for ((joint, &made), &assumed) in robot.tree().joint_names().zip(&made).zip(assumed) {
+        if made > 0.0 && (assumed / made - 1.0).abs() > ROUNDED {
+            return Err(CurriculumError::Noise { joint: joint.to_owned(), made, assumed });
         }
     }
     Ok(())

@@ -19,4 +19,4 @@ mod record;
 pub use curriculum::{Curriculum, CurriculumSettings, unreliable_model};
 pub use error::CurriculumError;
 pub use experiment::{Experiment, Trial};
-pub use record::{IterationRecord, Run};
+pub use record::{CurriculumRun, IterationRecord};

@@ -51,7 +51,7 @@ pub struct IterationRecord {
 ///
 /// It is a plain value. Whoever keeps it in a file after each iteration can be killed at any moment.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Run {
+pub struct CurriculumRun {
     /// Seed of all that is random in it.
     pub seed: u64,
     /// The first belief.
@@ -75,10 +75,10 @@ pub struct Run {
     pub ended: Option<EndReason>,
 }
 
-impl Run {
+impl CurriculumRun {
     /// A run that begins with a belief.
     pub fn new(seed: u64, initial: RobotModel) -> Self {
-        Run {
+        CurriculumRun {
             seed,
             model: initial.clone(),
             initial,

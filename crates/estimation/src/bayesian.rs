@@ -2,7 +2,7 @@
 
 use super::least_squares::Determined;
 use super::prior::with_prior;
-use super::{Estimate, Estimator, Evidence, Prior};
+use super::{Estimate, Estimator, Evidence, ParameterPrior};
 use crate::{EstimationError, RobotModel};
 use faer::Mat;
 use phiw_dynamics::check_size;
@@ -65,7 +65,7 @@ pub struct BayesianLeastSquares {
     /// How uncertain the measured rows are.
     pub noise: LogNoise,
     /// What was believed before.
-    pub prior: Prior,
+    pub prior: ParameterPrior,
 }
 
 impl Estimator for BayesianLeastSquares {

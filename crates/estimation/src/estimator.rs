@@ -47,7 +47,7 @@ pub trait Estimator: Send + Sync {
     ///
     /// # Errors
     /// The evidence is not of this design.
-    fn misfit(
+    fn negative_log_likelihood(
         &self,
         _design: &Design,
         _evidence: &Evidence,

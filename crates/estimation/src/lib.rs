@@ -26,7 +26,7 @@ pub use evidence::{Evidence, EvidenceSettings, Instant, RowsAt, grouped_factor};
 pub use least_squares::{LeastSquares, WeightedLeastSquares};
 pub use likelihood::MotionLikelihood;
 pub use measured::Measured;
-pub use prior::Prior;
+pub use prior::ParameterPrior;
 pub use robot::{KnownEffect, Robot, RobotModel};
 pub use score::Gain;
 pub use settings::{NewtonSettings, ScoreSettings};

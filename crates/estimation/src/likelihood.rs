@@ -1,6 +1,6 @@
 //! Maximum likelihood where the noise moves the robot.
 
-use super::prior::{Prior, with_prior};
+use super::prior::{ParameterPrior, with_prior};
 use super::response::{Response, log_determinant};
 use super::sensitivity::Sensitivity;
 use super::settings::{NewtonSettings, ScoreSettings};
@@ -46,7 +46,7 @@ pub struct MotionLikelihood {
     pub standing_on: Vec<usize>,
     /// What was believed before anything was measured; −log L then has its square too. None in the paper:
     /// right where all parameters are well excited.
-    pub prior: Option<Prior>,
+    pub prior: Option<ParameterPrior>,
     /// How the minimum is found.
     pub newton: NewtonSettings,
     /// What effects beside the model are asked.
@@ -71,7 +71,7 @@ impl MotionLikelihood {
     }
 
     /// The same with a belief from before anything was measured.
-    pub fn believing(self, prior: Prior) -> Self {
+    pub fn believing(self, prior: ParameterPrior) -> Self {
         MotionLikelihood { prior: Some(prior), ..self }
     }
 
@@ -160,7 +160,7 @@ impl Estimator for MotionLikelihood {
         Some(&self.torque_noise)
     }
 
-    fn misfit(
+    fn negative_log_likelihood(
         &self,
         design: &Design,
         evidence: &Evidence,

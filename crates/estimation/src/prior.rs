@@ -19,7 +19,7 @@ use phiw_regressor::least_squares::{Group, GroupedFactor};
 /// the model may still be wrong. Of an effect's parameter it is `share` times its value, or times the mean of
 /// its kind where that is larger. Effects that the model has not are free.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Prior {
+pub struct ParameterPrior {
     /// What was believed.
     pub model: RobotModel,
     /// Standard deviation over magnitude.
@@ -30,7 +30,7 @@ pub struct Prior {
 /// initial model is (section 5.2.1).
 const UNIFORM_SHARE: f64 = 0.577_350_269_189_625_8;
 
-impl Prior {
+impl ParameterPrior {
     /// For the paper's bad initial model, each of whose parameters is drawn uniformly between zero and twice
     /// the truth.
     ///
@@ -38,7 +38,7 @@ impl Prior {
     /// too small is therefore believed too firmly: single frictions are let go by more logs only. A larger
     /// `share` lets go earlier, and guards less against the noise of few logs.
     pub fn unreliable(model: RobotModel) -> Self {
-        Prior { model, share: UNIFORM_SHARE }
+        ParameterPrior { model, share: UNIFORM_SHARE }
     }
 
     /// The belief as rows of unit variance over all parameters of `design`.

@@ -166,12 +166,12 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     /// Columns A_k and T·F_k of random symmetric matrices, the first of both near the identity.
-    fn sensitivity(random: &mut ChaCha8Rng, n: usize, parameters: usize) -> Sensitivity {
+    fn sensitivity(rng: &mut ChaCha8Rng, n: usize, parameters: usize) -> Sensitivity {
         let mut columns = |size: f64| {
             Mat::from_fn(packed(n), parameters, |row, parameter| {
                 let diagonal = (0..n).any(|k| place(k, k) == row);
                 let own = if parameter == 0 && diagonal { 1.0 } else { 0.0 };
-                own + size * random.random_range(-1.0..1.0)
+                own + size * rng.random_range(-1.0..1.0)
             })
         };
         Sensitivity { weight: 1.0, directions: n, inertia: columns(0.05), damping: columns(0.05) }
@@ -179,9 +179,9 @@ mod tests {
 
     #[test]
     fn slopes_are_those_of_the_log_determinant() {
-        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
         for n in [1, 2, 5] {
-            let sensitivity = sensitivity(&mut random, n, 4);
+            let sensitivity = sensitivity(&mut rng, n, 4);
             let w = Mat::from_fn(4, 1, |k, _| [1.0, 0.4, -0.3, 0.2][k]);
             let response = Response::of(&sensitivity, &w).unwrap();
             let gradient = response.gradient(&sensitivity, 0);

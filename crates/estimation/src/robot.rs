@@ -229,8 +229,8 @@ impl RobotModel {
 
     /// The paper's bad initial model w¹: every standard parameter and every parameter of an effect uniform
     /// between 0 and twice its value here (section 5.2.1).
-    pub fn unreliable(&self, random: &mut impl Rng) -> Self {
-        let mut draw = |value: &f64| 2.0 * value * random.random::<f64>();
+    pub fn unreliable(&self, rng: &mut impl Rng) -> Self {
+        let mut draw = |value: &f64| 2.0 * value * rng.random::<f64>();
         let standard = self.standard.iter().map(&mut draw).collect();
         let effect = |effect: &KnownEffect| KnownEffect {
             spec: effect.spec.clone(),

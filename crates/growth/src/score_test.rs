@@ -94,9 +94,12 @@ impl ScoreTest {
         }
         let present = model.parameters(robot)?;
         let estimate = self.estimator.estimate(&design, &evidence, &model, &present)?;
-        let misfit = self.estimator.misfit(&design, &evidence, &estimate.parameters)?;
-        let misfit = misfit.filter(|misfit| misfit.is_finite()).unwrap_or(f64::INFINITY);
-        Ok((model.with_parameters(robot, &specs, &estimate.parameters)?, misfit))
+        let negative_log_likelihood =
+            self.estimator.negative_log_likelihood(&design, &evidence, &estimate.parameters)?;
+        let negative_log_likelihood = negative_log_likelihood
+            .filter(|negative_log_likelihood| negative_log_likelihood.is_finite())
+            .unwrap_or(f64::INFINITY);
+        Ok((model.with_parameters(robot, &specs, &estimate.parameters)?, negative_log_likelihood))
     }
 
     /// The effects of `near` once everything has been fitted again beside `known`, each with its constants
@@ -218,8 +221,8 @@ fn candidates(
 ) -> Vec<EffectSpec> {
     let tree = robot.tree();
     let mut specs = Vec::new();
-    let can_be_told = |kind: &&dyn EffectKind| !kind.needs_held_model() && !kind.needs_session_time();
-    for kind in catalogue.kinds().filter(can_be_told) {
+    let can_be_identified = |kind: &&dyn EffectKind| !kind.needs_held_model() && !kind.needs_session_time();
+    for kind in catalogue.kinds().filter(can_be_identified) {
         for site in kind.sites(tree) {
             let joints: Vec<String> = site.iter().map(|&joint| tree.joint(joint).joint.clone()).collect();
             let spec = |constants: Constants| EffectSpec {

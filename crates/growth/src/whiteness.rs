@@ -105,9 +105,9 @@ mod tests {
 
     /// Noise of size 1, and a part of it that goes on: friction of a slow motion, or a ripple of 6 Hz.
     fn residual(seed: u64, square: f64, ripple: f64) -> Vec<f64> {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let value = |row: usize| {
-            let noise: f64 = StandardNormal.sample(&mut random);
+            let noise: f64 = StandardNormal.sample(&mut rng);
             let t_s = 0.01 * row as f64;
             noise + square * (2.0 * t_s).sin().signum() + ripple * (38.0 * t_s).sin()
         };

@@ -10,14 +10,15 @@ use phiw_curriculum::end::FixedCount;
 use phiw_curriculum::motion::{Motion, MotionDataset};
 use phiw_curriculum::planner::Plan;
 use phiw_curriculum::relaxation::ConditionRelaxation;
-use phiw_curriculum::selection::{Candidates, Choice, SmallestCondition};
+use phiw_curriculum::selection::{Choice, MotionCandidates, SmallestCondition};
 use phiw_curriculum::{
-    Curriculum, CurriculumError, CurriculumSettings, Experiment, IterationRecord, Run, Trial,
+    Curriculum, CurriculumError, CurriculumRun, CurriculumSettings, Experiment, IterationRecord, Trial,
 };
 use phiw_dynamics::Tree;
 use phiw_effects::{Catalogue, SignalRanges};
 use phiw_estimation::{
-    BayesianLeastSquares, Estimator, Evidence, LeastSquares, LogNoise, Prior, Robot, RobotModel, RowsAt,
+    BayesianLeastSquares, Estimator, Evidence, LeastSquares, LogNoise, ParameterPrior, Robot, RobotModel,
+    RowsAt,
 };
 use phiw_identification::{BlockSource, Data, LogSet, fit, identify, merge, with_masses};
 use phiw_telemetry::{ConditioningOptions, Recording, TorqueColumns};
@@ -49,19 +50,21 @@ fn curriculum_plan(scene: &Scene, logs: &[&str], size: f64) -> Result<Plan, Curr
     let robot = Robot::with_viscous_friction(fixed.clone(), base_link, Catalogue::default())?;
     let dataset = MotionDataset::new(JOINTS, motions(scene, &fixed))?;
     let initial = RobotModel { standard: with_masses(&fixed), ..robot.truth(&[0.0; JOINTS])? };
-    let mut run = Run::new(0, initial.clone());
+    let mut run = CurriculumRun::new(0, initial.clone());
     let candidates = if logs.is_empty() {
         // The friction of a robot that has not moved yet has columns all the same.
-        Candidates::new(&robot, robot.declared(), &dataset, &[1.0; JOINTS])?
+        MotionCandidates::new(&robot, robot.declared(), &dataset, &[1.0; JOINTS])?
     } else {
         let (noise, evidence) = measured(scene, &fixed, logs);
         let design = robot.design(robot.declared())?;
-        let estimator =
-            BayesianLeastSquares { noise, prior: Prior { model: initial.clone(), share: URDF_ERROR } };
+        let estimator = BayesianLeastSquares {
+            noise,
+            prior: ParameterPrior { model: initial.clone(), share: URDF_ERROR },
+        };
         let all = evidence.last().unwrap().clone();
         let estimate = estimator.estimate(&design, &all, &initial, &initial.parameters(&robot)?)?;
         run.model = initial.with_parameters(&robot, robot.declared(), &estimate.parameters)?;
-        let candidates = Candidates::new(&robot, robot.declared(), &dataset, &[1.0; JOINTS])?;
+        let candidates = MotionCandidates::new(&robot, robot.declared(), &dataset, &[1.0; JOINTS])?;
         for evidence in &evidence {
             run.history.push(record(candidates.measured(evidence)?.condition_number(), &run.model));
         }

@@ -6,7 +6,7 @@ use phiw_curriculum::{CurriculumError, Experiment, Trial};
 use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
 use phiw_estimation::{KnownEffect, Measured, Robot, RobotModel};
 use phiw_identification::JointProperty;
-use phiw_plant::{Effect, Friction, History, Plant, PlantRun, PlantSetup, Sensors, Timing};
+use phiw_plant::{Friction, History, Plant, PlantEffect, PlantRun, PlantSetup, Sensors, Timing};
 use rand::Rng;
 
 /// Makes a backend of the robot as it is built.
@@ -23,7 +23,7 @@ pub struct SimulatedRobot {
     /// Its world.
     pub world: World,
     /// What it has beside its rigid bodies, declared or not.
-    pub effects: Vec<Effect>,
+    pub effects: Vec<PlantEffect>,
     /// Who makes the torques.
     pub controller: Box<dyn Controller>,
     /// Standard deviation of δf over the torque limit: 0.05 in the paper.
@@ -190,7 +190,7 @@ impl Experiment for SimulatedRobot {
 }
 
 /// The effects of a model as a plant has them: those that simulators express as a property of a joint.
-fn plant_effects(robot: &Robot, model: &RobotModel) -> Result<Vec<Effect>, CurriculumError> {
+fn plant_effects(robot: &Robot, model: &RobotModel) -> Result<Vec<PlantEffect>, CurriculumError> {
     robot.design(&model.specs())?;
     let effect = |known: &KnownEffect| {
         let property = robot.catalogue().joint_property(&known.spec);
@@ -201,12 +201,12 @@ fn plant_effects(robot: &Robot, model: &RobotModel) -> Result<Vec<Effect>, Curri
         let width = known.spec.constants.get("sign_width").copied().unwrap_or(0.0);
         Ok(match property {
             JointProperty::Damping => {
-                Effect::Friction { joint, law: Friction::Viscous { coefficient: value } }
+                PlantEffect::Friction { joint, law: Friction::Viscous { coefficient: value } }
             }
             JointProperty::Friction => {
-                Effect::Friction { joint, law: Friction::Coulomb { torque: value, width } }
+                PlantEffect::Friction { joint, law: Friction::Coulomb { torque: value, width } }
             }
-            JointProperty::Armature => Effect::RotorInertia { joint, inertia: value },
+            JointProperty::Armature => PlantEffect::RotorInertia { joint, inertia: value },
         })
     };
     model.effects.iter().map(effect).collect()

@@ -236,8 +236,8 @@ fn the_controller_s_torque_is_that_of_the_model() {
         }),
     };
     let motion = arm::motions(&tree, 1).remove(0);
-    let mut random = <rand_chacha::ChaCha8Rng as rand::SeedableRng>::seed_from_u64(1);
-    let trial = experiment.perform(&robot, &model, &motion, &mut random).unwrap();
+    let mut rng = <rand_chacha::ChaCha8Rng as rand::SeedableRng>::seed_from_u64(1);
+    let trial = experiment.perform(&robot, &model, &motion, &mut rng).unwrap();
     let mut workspace = Workspace::new(&tree);
     for sample in [0, 100, 200] {
         let [q, v, a] = motion.sample(sample);

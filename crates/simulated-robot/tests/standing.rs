@@ -239,12 +239,12 @@ fn the_model_says_what_is_measured() {
     let parameters = truth.parameters(&robot).unwrap();
     for (name, build) in [("mujoco", mujoco as fn(&Tree, &World) -> _), ("rapier", rapier)] {
         let experiment = humanoid.experiment(Box::new(build));
-        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
         if name == "mujoco" && phiw_sim_mujoco::find_library().is_err() {
             println!("skipped: MuJoCo is not there");
             continue;
         }
-        let trial = experiment.perform(&robot, &truth, &motion, &mut random).unwrap();
+        let trial = experiment.perform(&robot, &truth, &motion, &mut rng).unwrap();
         assert_eq!(trial.fell_at_s, None, "{name}");
         assert!(
             trial.tracking_error[..12].iter().all(|error| *error < 0.02),
@@ -295,8 +295,8 @@ fn positions_and_velocities_are_of_one_instant() {
         }
         let mut experiment = humanoid.experiment(Box::new(build));
         experiment.plant.actuator_noise = 0.02;
-        let mut random = ChaCha8Rng::seed_from_u64(4);
-        let log = experiment.perform(&robot, &truth, &motion, &mut random).unwrap().measured;
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let log = experiment.perform(&robot, &truth, &motion, &mut rng).unwrap().measured;
         let (mut along, mut square) = (0.0, 0.0);
         for index in 0..log.q.len() - log.joints {
             let next = index + log.joints;

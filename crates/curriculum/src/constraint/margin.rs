@@ -2,7 +2,7 @@
 
 use crate::CurriculumError;
 use crate::motion::Motion;
-use phiw_estimation::{Estimate, Prior, Robot, RobotModel};
+use phiw_estimation::{Estimate, ParameterPrior, Robot, RobotModel};
 use phiw_regressor::parameter_scales;
 use phiw_zmp::{
     BalanceRows, MotionBalance, Stance, ZmpModel, ZmpWorkspace, standard_deviation, standing_parameters,
@@ -17,9 +17,9 @@ pub struct MotionMargin {
     pub worst_s: f64,
     /// Standard deviation of the multi-body margin there, by all that is known of the parameters \[m\].
     pub margin_std: f64,
-    /// The part of it that no torque can tell: the base link, and what of the others only the prior says
+    /// The part of it that torques can not identify: the base link, and what of the others only the prior says
     /// \[m\].
-    pub untold_std: f64,
+    pub unidentifiable_std: f64,
 }
 
 impl MotionMargin {
@@ -32,7 +32,7 @@ impl MotionMargin {
         robot: &Robot,
         model: &RobotModel,
         estimate: &Estimate,
-        prior: &Prior,
+        prior: &ParameterPrior,
         stance: &Stance,
         motion: &Motion,
     ) -> Result<Self, CurriculumError> {
@@ -50,16 +50,18 @@ impl MotionMargin {
         let of_base = robot.base().gradient_of_base(of_bodies, reference)?;
         let map = robot.base().map();
         let left = of_bodies.iter().enumerate().map(|(column, value)| {
-            value - of_base.iter().enumerate().map(|(row, told)| told * map[(row, column)]).sum::<f64>()
+            value - of_base.iter().enumerate().map(|(row, value)| value * map[(row, column)]).sum::<f64>()
         });
         let scales = [parameter_scales(robot.base_link()), parameter_scales(reference)].concat();
-        let untold = of_base_link.iter().copied().chain(left).zip(scales);
-        let untold_std =
-            untold.map(|(gradient, scale)| (prior.share * scale * gradient).powi(2)).sum::<f64>().sqrt();
+        let unidentifiable = of_base_link.iter().copied().chain(left).zip(scales);
+        let unidentifiable_std = unidentifiable
+            .map(|(gradient, scale)| (prior.share * scale * gradient).powi(2))
+            .sum::<f64>()
+            .sqrt();
         Ok(MotionMargin {
             worst_s: worst as f64 * motion.period_s(),
-            margin_std: told_std(estimate, &of_base)?.hypot(untold_std),
-            untold_std,
+            margin_std: identified_std(estimate, &of_base)?.hypot(unidentifiable_std),
+            unidentifiable_std,
             balance,
         })
     }
@@ -85,7 +87,7 @@ fn gradient(
 
 /// Standard deviation by the base parameters that are determined; NaN without a covariance. The ZMP does not
 /// depend on effects.
-fn told_std(estimate: &Estimate, of_base: &[f64]) -> Result<f64, CurriculumError> {
+fn identified_std(estimate: &Estimate, of_base: &[f64]) -> Result<f64, CurriculumError> {
     let Some(covariance) = &estimate.covariance else { return Ok(f64::NAN) };
     let known: Vec<usize> =
         (0..of_base.len()).filter(|&parameter| estimate.standard_deviations[parameter].is_finite()).collect();

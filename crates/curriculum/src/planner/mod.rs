@@ -9,7 +9,7 @@ use crate::growth::Rivalry;
 use crate::motion::MotionDataset;
 use crate::random::{Purpose, random};
 use crate::relaxation::{Learnt, Relaxation};
-use crate::selection::{Best, Candidates, Choice, Question, Scored, Selection, Triangle, decide};
+use crate::selection::{Best, Choice, MotionCandidates, Question, Scored, Selection, Triangle, decide};
 use crate::{CurriculumError, IterationRecord};
 use phiw_estimation::{Robot, RobotModel};
 
@@ -21,7 +21,7 @@ pub struct Belief<'a> {
     /// The motions to choose from.
     pub dataset: &'a MotionDataset,
     /// Their factors, in the columns by which motions are compared.
-    pub candidates: &'a Candidates,
+    pub candidates: &'a MotionCandidates,
     /// What is believed now. The constraint judges motions by it.
     pub model: &'a RobotModel,
     /// What was believed before anything was measured. α of the first iteration follows from it.
@@ -123,8 +123,8 @@ pub fn plan(
                 measured: measured.triangle,
                 history: measured.history,
             };
-            let mut random = random(policy.seed, measured.condition_numbers.len(), Purpose::Selection);
-            (policy.selection.choose(&question, &mut random), None)
+            let mut rng = random(policy.seed, measured.condition_numbers.len(), Purpose::Selection);
+            (policy.selection.choose(&question, &mut rng), None)
         }
     };
     let safety = safety[choice.motion];

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 /// One motion as a candidate.
 #[derive(Clone, Debug)]
-pub struct Candidate {
+pub struct MotionCandidate {
     /// R of its Φ.
     pub triangle: Triangle,
     /// cond of its Φ alone.
@@ -22,17 +22,17 @@ pub struct Candidate {
 /// The factors belong to the reference trajectories, as (11) has it: what the robot makes of them is known
 /// only after it has done so.
 #[derive(Clone, Debug)]
-pub struct Candidates {
+pub struct MotionCandidates {
     weights: Vec<f64>,
     /// The parameters of a belief that the columns belong to.
     parameters: Vec<usize>,
     /// Rows a second of the motion in the middle \[Hz\].
     rate_hz: f64,
-    candidates: Vec<Candidate>,
+    candidates: Vec<MotionCandidate>,
     everything: Triangle,
 }
 
-impl Candidates {
+impl MotionCandidates {
     /// Reduces every motion, in parallel: Φ of the rigid body and the `effects`, torque j's rows times
     /// `weights[j]` (all 1 in the paper).
     ///
@@ -91,7 +91,7 @@ impl Candidates {
                 parameters.extend(design.effect_parameters(effect));
             }
             if excited.len() == effects.len() {
-                return Ok(Candidates { parameters, ..candidates });
+                return Ok(MotionCandidates { parameters, ..candidates });
             }
             effects = excited;
         }
@@ -106,9 +106,9 @@ impl Candidates {
             let design = design()?;
             let factor = grouped_factor(&design, motion.block())?.combine(weights)?;
             let triangle = Triangle::of_factor(&factor);
-            Ok(Candidate { condition_number: triangle.condition_number(), triangle })
+            Ok(MotionCandidate { condition_number: triangle.condition_number(), triangle })
         };
-        let candidates: Result<Vec<Candidate>, CurriculumError> =
+        let candidates: Result<Vec<MotionCandidate>, CurriculumError> =
             dataset.motions().par_iter().map(reduce).collect();
         let candidates = candidates?;
         let count = design()?.parameter_count();
@@ -118,7 +118,7 @@ impl Candidates {
         rates.sort_by(f64::total_cmp);
         let rate_hz = rates.get(rates.len() / 2).copied().unwrap_or(1.0);
         let parameters = (0..count).collect();
-        Ok(Candidates { weights: weights.to_vec(), parameters, rate_hz, candidates, everything })
+        Ok(MotionCandidates { weights: weights.to_vec(), parameters, rate_hz, candidates, everything })
     }
 
     /// R of all motions together.
@@ -132,7 +132,7 @@ impl Candidates {
     }
 
     /// The candidates, in the order of the dataset.
-    pub fn all(&self) -> &[Candidate] {
+    pub fn all(&self) -> &[MotionCandidate] {
         &self.candidates
     }
 

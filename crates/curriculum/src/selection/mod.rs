@@ -6,7 +6,7 @@ mod random;
 mod smallest_condition;
 mod triangle;
 
-pub use candidates::{Candidate, Candidates};
+pub use candidates::{MotionCandidate, MotionCandidates};
 pub use optimal::{AOptimal, DOptimal, TorqueOptimal};
 pub use random::RandomMotion;
 pub use smallest_condition::SmallestCondition;
@@ -23,7 +23,7 @@ pub struct Question<'a> {
     /// All motions: their names, tasks and durations.
     pub dataset: &'a MotionDataset,
     /// What each would tell, in the same order.
-    pub candidates: &'a Candidates,
+    pub candidates: &'a MotionCandidates,
     /// Those that the constraint allows, as indices; never empty.
     pub allowed: &'a [usize],
     /// R of all that has been measured; none in the first iteration.

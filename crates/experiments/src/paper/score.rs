@@ -2,7 +2,7 @@
 
 use super::setup::{Setup, Validation};
 use phiw_curriculum::selection::Question;
-use phiw_curriculum::{Curriculum, Run};
+use phiw_curriculum::{Curriculum, CurriculumRun};
 use phiw_estimation::{
     EstimationError, Estimator, Evidence, LeastSquares, Measured, RobotModel, RowsAt, WeightedLeastSquares,
 };
@@ -98,7 +98,7 @@ impl Setup {
     ///
     /// # Errors
     /// The run is not of this robot.
-    pub fn detail(&self, curriculum: &Curriculum<'_>, run: &Run) -> anyhow::Result<Option<Detail>> {
+    pub fn detail(&self, curriculum: &Curriculum<'_>, run: &CurriculumRun) -> anyhow::Result<Option<Detail>> {
         let Some(plan) = curriculum.plan(run)? else { return Ok(None) };
         let measured = curriculum.measured(run)?;
         let question = Question {

@@ -7,7 +7,7 @@ use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
 use phiw_dynamics::{Foot, InertialParameters, Tree, World};
 use phiw_effects::Catalogue;
 use phiw_estimation::{Robot, RobotModel};
-use phiw_plant::{Effect, Friction, GainSettings, Gains, apparent_inertia};
+use phiw_plant::{Friction, GainSettings, Gains, PlantEffect, apparent_inertia};
 use phiw_zmp::{Stance, SupportPolygon, feet_from_toml};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -135,8 +135,8 @@ impl Subject {
     }
 
     /// The frictions, in the plant.
-    pub fn frictions(&self) -> Vec<Effect> {
-        let friction = |(joint, &coefficient): (usize, &f64)| Effect::Friction {
+    pub fn frictions(&self) -> Vec<PlantEffect> {
+        let friction = |(joint, &coefficient): (usize, &f64)| PlantEffect::Friction {
             joint,
             law: Friction::Viscous { coefficient },
         };

@@ -13,7 +13,7 @@ use anyhow::Context;
 use phiw::console::Console;
 use phiw_estimation::{Measured, RobotModel};
 use phiw_identification::TorqueError;
-use phiw_plant::Effect;
+use phiw_plant::PlantEffect;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -36,7 +36,7 @@ pub struct Outcome {
     /// What the runs share.
     pub setup: Setup,
     /// What the plant has.
-    pub secret: Effect,
+    pub secret: PlantEffect,
     /// The runs: with the model as it was declared, and with the loop closed.
     pub runs: [RunFile; 2],
     /// Error of the initial model, and of both at the end, on the held-out motions.

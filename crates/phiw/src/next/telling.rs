@@ -99,7 +99,7 @@ impl Telling<'_> {
             mm(balance.balance.multi_body.margin),
             mm(balance.margin_std),
             significant(balance.worst_s, 3),
-            mm(balance.untold_std),
+            mm(balance.unidentifiable_std),
             mm(balance.balance.point_mass.margin),
         )
     }
@@ -191,7 +191,7 @@ impl Telling<'_> {
                 "largest_alpha": balance.balance.multi_body.largest_reduction,
                 "margin_m": balance.balance.multi_body.margin,
                 "margin_std_m": balance.margin_std,
-                "untold_std_m": balance.untold_std,
+                "untold_std_m": balance.unidentifiable_std,
                 "zmp_m": balance.balance.multi_body.zmp,
                 "at_s": balance.worst_s,
                 "point_mass_margin_m": balance.balance.point_mass.margin,

@@ -21,14 +21,14 @@ pub enum Stream {
 }
 
 /// A seeded generator with the draws that cases need.
-pub struct Dice(ChaCha8Rng);
+pub struct CaseRng(ChaCha8Rng);
 
-impl Dice {
+impl CaseRng {
     /// The numbers of one use, one case and one attempt at it.
     pub fn new(seed: u64, attempt: u64, stream: Stream) -> Self {
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
         generator.set_stream(attempt * 16 + stream as u64);
-        Dice(generator)
+        CaseRng(generator)
     }
 
     /// Uniform between two bounds.

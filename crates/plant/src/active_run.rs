@@ -8,7 +8,7 @@ use crate::plant::Plant;
 use crate::sensors::normal;
 use crate::standing::{standing_configuration, tilt};
 use crate::step_solver::{StepSolver, StepStart};
-use crate::{Effect, History, PlantError, Reference};
+use crate::{History, PlantEffect, PlantError, Reference};
 use phiw_dynamics::{Placement, Tree, Vec3, Workspace};
 use rand_chacha::ChaCha8Rng;
 
@@ -16,11 +16,11 @@ use rand_chacha::ChaCha8Rng;
 const MOBILITY_AGE_S: f64 = 5e-3;
 
 /// A run under way.
-pub(crate) struct Motion {
+pub(crate) struct ActiveRun {
     pub(crate) history: History,
     solver: StepSolver,
-    actuator_random: ChaCha8Rng,
-    encoder_random: ChaCha8Rng,
+    actuator_rng: ChaCha8Rng,
+    encoder_rng: ChaCha8Rng,
     /// Integration steps of a control period.
     substeps: usize,
     /// Of base and joints.
@@ -40,12 +40,12 @@ pub(crate) struct Motion {
     tracked: usize,
 }
 
-impl Motion {
+impl ActiveRun {
     /// Puts the robot at rest into the reference's first posture.
     pub(crate) fn begin(
         plant: &mut Plant,
         reference: &dyn Reference,
-        [actuator_random, encoder_random]: [ChaCha8Rng; 2],
+        [actuator_rng, encoder_rng]: [ChaCha8Rng; 2],
     ) -> Result<Self, PlantError> {
         let Plant { tree, world, backend, drives, timing, .. } = plant;
         let joints = tree.joint_count();
@@ -68,7 +68,7 @@ impl Motion {
         let substeps = (timing.control_period_s / timing.longest_step_s - 1e-9).ceil().max(1.0) as usize;
         let step_s = timing.control_period_s / substeps as f64;
         let settling = (timing.settle_s / timing.control_period_s).round();
-        Ok(Motion {
+        Ok(ActiveRun {
             history: History {
                 joints,
                 start_s: -settling * timing.control_period_s,
@@ -76,8 +76,8 @@ impl Motion {
                 ..History::default()
             },
             solver: StepSolver::new(tree, holding),
-            actuator_random,
-            encoder_random,
+            actuator_rng,
+            encoder_rng,
             substeps,
             v,
             drive_angle,
@@ -95,7 +95,7 @@ impl Motion {
         })
     }
 
-    /// Runs to `end_s`, and tells when the robot fell. Tracking counts up to `duration_s`.
+    /// Runs to `end_s`, and returns when the robot fell. Tracking counts up to `duration_s`.
     pub(crate) fn follow(
         &mut self,
         plant: &mut Plant,
@@ -142,7 +142,7 @@ impl Motion {
         }
         for (joint, measured) in self.measured.iter_mut().enumerate() {
             let angle = self.drive_angle[joint] - plant.drives[joint].encoder_offset;
-            *measured = plant.sensors.encode(joint, angle, &mut self.encoder_random);
+            *measured = plant.sensors.encode(joint, angle, &mut self.encoder_rng);
         }
         let [q, v, a] = &self.reference;
         if moving && t_s <= duration_s {
@@ -158,7 +158,7 @@ impl Motion {
             *command = command.clamp(-limit, limit);
             self.delivered[joint] = plant.drives[joint].delivered(*command);
             if plant.actuator_noise > 0.0 {
-                self.delivered[joint] += plant.actuator_noise * limit * normal(&mut self.actuator_random);
+                self.delivered[joint] += plant.actuator_noise * limit * normal(&mut self.actuator_rng);
             }
         }
         Ok(())
@@ -208,11 +208,11 @@ impl Motion {
     }
 
     /// What external forces ask of the joints: −Jᵀ·force.
-    fn pull(&mut self, tree: &Tree, effects: &[Effect]) -> Result<(), PlantError> {
+    fn pull(&mut self, tree: &Tree, effects: &[PlantEffect]) -> Result<(), PlantError> {
         self.external.fill(0.0);
         let mut placed = false;
         for effect in effects {
-            let Effect::ExternalForce { body, point, force } = effect else { continue };
+            let PlantEffect::ExternalForce { body, point, force } = effect else { continue };
             if !placed {
                 tree.forward_kinematics(&self.q, &mut self.placements)?;
                 placed = true;
