@@ -194,7 +194,7 @@ impl<'a> Curriculum<'a> {
         run.logs.push(measured.clone());
         let mut doubted = open_rivalry(&run.rivals, &run.history).is_some();
         let (mut found, mut believed, mut refuted) = (Found::default(), Vec::new(), Vec::new());
-        // What stood in the place of the answer, and is not true, makes way for it.
+        // Effects that the likelihood refutes are excluded, and the search is repeated without them.
         for _ in 0..self.settings.most_answers {
             found = growth.look(self.robot, &learning.model, &run.logs, doubted, &refuted)?;
             (learning, believed) =
@@ -306,7 +306,7 @@ impl<'a> Curriculum<'a> {
     /// The columns of effects that were found are left out. With them cond is that of other parameters, in
     /// other units, than before they were found; the offset of a spring is so nearly a weight that cond grows
     /// five-fold, the constraint is never relaxed again, and the same safe motion is asked for until the end.
-    /// What tells effects apart is asked for by rivalry.
+    /// Motions that distinguish effects are chosen by [`Rivalry`].
     ///
     /// # Errors
     /// The run is not of this robot.

@@ -30,7 +30,7 @@ pub trait Experiment: Send + Sync {
         rng: &mut dyn Rng,
     ) -> Result<Trial, CurriculumError>;
 
-    /// Standard deviation of each torque's noise \[N·m, N\], if it is known. An estimator that is assumed
+    /// Standard deviation of each torque's noise \[N·m, N\], if it is known. An estimator that assumes
     /// another one is refused.
     fn known_torque_noise(&self) -> Option<Vec<f64>> {
         None
@@ -40,8 +40,8 @@ pub trait Experiment: Send + Sync {
 /// Share by which two statements of one noise may differ: numbers that were written down and read again.
 const ROUNDED: f64 = 1e-6;
 
-/// The noise is stated where it is made. An estimator that takes it for another weighs what it measures
-/// wrongly, and nothing else would tell.
+/// The experiment states the noise that it makes. An estimator that assumes another one weights its
+/// measurements wrongly, and nothing else would show it.
 ///
 /// # Errors
 /// The experiment knows the noise of a torque, and the estimator is assumed another one. Where there is no noise

@@ -37,8 +37,8 @@ pub struct IterationRecord {
     /// RMS over all motions of the dataset of how far the model's torques have moved in this iteration, over
     /// their RMS; none where the model has grown.
     pub torque_change: Option<f64>,
-    /// The two beliefs that the motion was chosen to tell apart, in words; none if it was chosen for what it
-    /// tells of the parameters.
+    /// The two beliefs that the motion was chosen to tell apart, in words; none if it was chosen for the
+    /// parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub separates: Option<[String; 2]>,
     /// The belief after this iteration.

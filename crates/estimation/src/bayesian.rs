@@ -42,8 +42,8 @@ impl LogNoise {
     }
 }
 
-/// The median over the parameters of their standard deviation over that of independent rows; 1 where nothing
-/// tells.
+/// The median over the parameters of their standard deviation over that of independent rows; 1 where none is
+/// known.
 fn correlation(factor: &Factor, parameters: &[usize], deviations: &[f64]) -> f64 {
     let Ok(independent) = factor.standard_deviations(1.0) else { return 1.0 };
     let ratios = parameters

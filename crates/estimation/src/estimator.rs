@@ -35,8 +35,8 @@ pub trait Estimator: Send + Sync {
         present_parameters: &[f64],
     ) -> Result<Estimate, EstimationError>;
 
-    /// Standard deviation of each torque's noise that it counts on \[N·m, N\]; none from an estimator that is
-    /// not told.
+    /// Standard deviation of each torque's noise that it counts on \[N·m, N\]; none from an estimator that
+    /// assumes none.
     fn torque_noise(&self) -> Option<&[f64]> {
         None
     }

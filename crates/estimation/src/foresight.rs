@@ -4,8 +4,9 @@
 //! of that period. Where a column is linear in both (rigid body, viscous friction, rotor inertia) the
 //! log-determinant of the likelihood accounts for it exactly. Where it is not (a friction that turns with the
 //! sign), nothing simple does: near a reversal the sign is the noise's own, and the slope of a column that
-//! turns within 0.01 rad/s can not be told from an instant of many rows. Such a column is taken of what was
-//! known when the period began: then its product with the noise is nothing on average, whatever its form.
+//! turns within 0.01 rad/s can not be computed from an instant that stands for many rows. Such a column is
+//! taken of what was known when the period began: then its product with the noise is nothing on average,
+//! whatever its form.
 
 use crate::{EstimationError, Measured};
 use phiw_identification::{Design, Effect};

@@ -11,8 +11,8 @@ use phiw_regressor::least_squares::{Group, GroupedFactor};
 /// Many a robot has combinations of parameters that its motions hardly excite. The noise then decides them,
 /// and what was believed at first, bad as it was, is nearer to the truth than what is estimated. With a prior
 /// the estimate is the mean of what the logs and the first belief say, each counted by its own certainty:
-/// where logs tell much it is theirs, where they tell nothing it is the first belief, and nothing has to
-/// decide which is which.
+/// where the logs determine a parameter the estimate is theirs, elsewhere it is the first belief's, and no
+/// threshold has to decide between them.
 ///
 /// Of a body, a mass m is uncertain by `share`·m, a first moment by `share`·m·0.2 m and a moment of inertia
 /// by `share`·m·(0.2 m)² ([`phiw_regressor::parameter_scales`]), whatever its own value: one that is zero in

@@ -38,7 +38,7 @@ impl Robot {
     /// A robot with viscous friction in every joint: D = base parameters + joints.
     ///
     /// `base_link` are the ten parameters of the link that stands on the floor, in the world's frame: no
-    /// joint torque feels it, so it is never estimated and must be declared (a scale and a look at it tell
+    /// joint torque feels it, so it is never estimated and must be declared (weighing it and measuring it is
     /// enough); the ZMP feels it.
     ///
     /// # Errors
@@ -67,8 +67,8 @@ impl Robot {
         Self::with_base(tree, base, base_link, declared, catalogue)
     }
 
-    /// A robot of which not all motions are possible, with the base parameters that those tell apart which
-    /// are.
+    /// A robot of which not all motions are possible, with the base parameters that are identifiable from
+    /// those that are.
     ///
     /// # Errors
     /// The base floats, or an effect is unknown.
@@ -189,13 +189,13 @@ impl RobotModel {
 
     /// The model with the parameter vector `parameters` over the rigid body and the effects `specs`.
     ///
-    /// Controller (13) and ZMP (8) need standard parameters, of which motion tells only the base parameters.
-    /// Of all standard parameters that have them, those nearest to the present belief are taken, distances
-    /// weighed by each body's mass ([`BaseParameters::to_standard`]): what was measured is believed exactly,
-    /// and what no joint torque feels stays as it was believed, for nothing has been learnt of it. Joint
-    /// torques do not depend on the choice. The ZMP does: the directions that torques do not feel keep the
-    /// error of the first belief (the mass of the first link, the sideways place of a trunk that only
-    /// pitches).
+    /// Controller (13) and ZMP (8) need standard parameters, of which only the base parameters are
+    /// identifiable. Of all standard parameters that have them, those nearest to the present belief are
+    /// taken, distances weighed by each body's mass ([`BaseParameters::to_standard`]): what was measured is
+    /// believed exactly, and what no joint torque feels stays as it was believed, for nothing has been learnt
+    /// of it. Joint torques do not depend on the choice. The ZMP does: the directions that torques do not
+    /// feel keep the error of the first belief (the mass of the first link, the sideways place of a trunk
+    /// that only pitches).
     ///
     /// # Errors
     /// There are not as many parameters as the robot and the effects have.

@@ -39,7 +39,7 @@ const CHUNK: usize = 256;
 impl MotionLikelihood {
     /// What each of the `candidates` would save beside a model that has been fitted to these logs with this
     /// estimator. None for one that the model already contains, that would break its own bounds, or whose
-    /// columns look ahead in time: of those, noise that the future holds can not be told.
+    /// columns look ahead in time: these depend on the noise of later periods.
     ///
     /// # Errors
     /// A log or a candidate is not of this robot.

@@ -18,7 +18,7 @@ pub struct NewtonSettings {
     pub curvature_every: usize,
     /// Of so many instants one counts in that curvature; all count in the gradient. Default: 4.
     pub instants_every: usize,
-    /// Share of the foretold decrease that a step must achieve (Armijo). Default: 0.1.
+    /// Share of the predicted decrease that a step must achieve (Armijo). Default: 0.1.
     pub sufficient_decrease: f64,
     /// Share of a whole step below which the search along it is given up. Default: 10⁻⁶.
     pub shortest_step: f64,

@@ -11,7 +11,7 @@ pub struct ScoreTestSettings {
     /// (arithmetic, not a count).
     pub least_merit: f64,
     /// Effects of at least this share of the best one's merit are fitted in full beside it. Lower costs fits;
-    /// higher misses an effect whose score is foretold too small. Default: 0.6, not calibrated.
+    /// higher misses an effect whose gain the score predicts too small. Default: 0.6, not calibrated.
     pub near: f64,
     /// Effects at most that are fitted in full at a time. Default: 5, a limit on the time.
     pub most_near: usize,
@@ -62,8 +62,8 @@ pub struct Winner {
 }
 
 impl ScoreTestSettings {
-    /// How many effects are fitted in full, of those with these foretold `merits`, the largest first. None of
-    /// them if the best is not worth its price.
+    /// How many effects are fitted in full, of those with these predicted `merits`, the largest first. None
+    /// of them if the best is not worth its price.
     pub fn shortlist(&self, merits: &[f64]) -> usize {
         let Some(best) = merits.first().filter(|best| **best >= self.least_merit) else { return 0 };
         merits.iter().take_while(|merit| **merit >= self.near * best).count().min(self.most_near)

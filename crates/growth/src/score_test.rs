@@ -14,8 +14,8 @@ use std::sync::Arc;
 /// The likelihood knows that noise moves the robot, and needs no residual with a colour: what many rows say
 /// together is enough, however far below the noise of one row an effect is. Effects whose columns look ahead
 /// in time or need derivatives of the model's torque (delay, elasticity, an encoder's offset) are no
-/// candidates: what is known when a period begins is not enough to tell them. [`crate::TraceResidual`] asks
-/// for them.
+/// candidates: what is known when a period begins is not enough to identify them. [`crate::TraceResidual`]
+/// asks for them.
 #[derive(Clone)]
 pub struct ScoreTest {
     /// The estimator that the curriculum runs with.
@@ -103,8 +103,8 @@ impl ScoreTest {
     }
 
     /// The effects of `near` once everything has been fitted again beside `known`, each with its constants
-    /// refined, and what it is then worth. What the score foretells of a large effect is rough, and one that
-    /// does half of its work may be foretold as much.
+    /// refined, and what it is then worth. The score predicts the gain of a large effect only roughly, and
+    /// may predict as much for an effect that explains half of it.
     fn contenders(
         &self,
         robot: &Robot,

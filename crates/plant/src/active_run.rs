@@ -23,7 +23,7 @@ pub(crate) struct ActiveRun {
     encoder_rng: ChaCha8Rng,
     /// Integration steps of a control period.
     substeps: usize,
-    /// Of base and joints.
+    /// Configuration and velocity of base and joints.
     q: Vec<f64>,
     v: Vec<f64>,
     drive_angle: Vec<f64>,

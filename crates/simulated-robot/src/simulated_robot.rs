@@ -44,7 +44,7 @@ pub struct SimulatedRobot {
 /// When a base or a foot counts as still: rows in which it moves are no rows of a robot that stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stillness {
-    /// Turning rate of a base \[rad/s\]. Default: 0.01, what a gyroscope tells from its own noise.
+    /// Turning rate of a base \[rad/s\]. Default: 0.01, what a gyroscope can distinguish from its own noise.
     pub base_turning: f64,
     /// Time around a movement of the base that does not count either, since it lands before it rests \[s\].
     /// Default: 0.1.
@@ -112,7 +112,7 @@ impl SimulatedRobot {
         (0..self.tree.joint_count()).map(noise).collect()
     }
 
-    /// Lets a plant of its own follow a motion of its motors.
+    /// Builds a plant and has it follow a motion of the motors.
     pub(crate) fn run(
         &self,
         robot: &Robot,
@@ -140,8 +140,8 @@ impl SimulatedRobot {
         plant.run(&reference, motion.duration_s(), rng).map_err(CurriculumError::of_experiment)
     }
 
-    /// For each row of the log, whether the base stood still until the next, as a gyroscope in it would tell;
-    /// empty on a fixed base.
+    /// For each row of the log, whether the base stood still until the next, as a gyroscope in it would
+    /// measure; empty on a fixed base.
     fn still(&self, history: &History) -> Vec<bool> {
         let period_s = self.timing.control_period_s;
         let row = |t_s: f64| ((t_s - history.start_s) / history.step_s).round() as usize;

@@ -94,8 +94,8 @@ fn of_motors(motion: &Motion) -> Result<Motion, CurriculumError> {
 /// velocities belong to the middles between its positions. Taken for those of one instant they do harm where
 /// noise moves the robot: the mean velocity over a period then follows the noise of the period by more than
 /// half of what the noise does to the velocity, and the estimate takes the difference for negative friction
-/// (−1.6 N·m·s/rad in a waist that has 1.3, from 4 N·m of noise and periods of two steps). The history tells
-/// λ.
+/// (−1.6 N·m·s/rad in a waist that has 1.3, from 4 N·m of noise and periods of two steps). λ is computed from
+/// the history.
 fn position_lead_s(history: &History) -> f64 {
     let (mut along, mut square) = (0.0, 0.0);
     let next = history.link_speed.iter().zip(&history.link_angle).skip(history.joints);

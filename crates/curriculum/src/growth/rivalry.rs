@@ -53,8 +53,9 @@ impl Rivalry {
 /// Which pair of rival beliefs the next motion has to tell apart, from the names of all pairs and of those
 /// that each earlier motion was chosen to separate.
 ///
-/// A pair has one motion, and then the parameters have one: what tells rivals apart need not tell anything
-/// else, and rivals that one motion has not told may be rivals for ever.
+/// Each pair gets one motion, and the motion after it is chosen for the parameters: a motion that
+/// distinguishes rivals may identify nothing else, and a pair that one motion has not distinguished may stay
+/// undecided for ever.
 pub fn rivals_to_separate(rivals: &[[String; 2]], separated: &[Option<[String; 2]>]) -> Option<usize> {
     if separated.last().is_some_and(Option::is_some) {
         return None;

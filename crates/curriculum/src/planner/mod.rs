@@ -26,7 +26,7 @@ pub struct Belief<'a> {
     pub model: &'a RobotModel,
     /// What was believed before anything was measured. α of the first iteration follows from it.
     pub initial: &'a RobotModel,
-    /// Two beliefs that the motion has to tell apart; none if it has to tell the parameters.
+    /// Two beliefs that the motion has to distinguish; none if it is chosen for the parameters.
     pub rivalry: Option<&'a Rivalry>,
 }
 
@@ -70,8 +70,7 @@ pub struct Policy<'a> {
 pub struct Plan {
     /// The motion, and why.
     pub choice: Choice,
-    /// The two beliefs that it is to tell apart, in words; none if it is chosen for what it tells of the
-    /// parameters.
+    /// The two beliefs that it is to tell apart, in words; none if it is chosen for the parameters.
     pub separates: Option<[String; 2]>,
     /// The motions that could be chosen, ascending.
     pub allowed: Vec<usize>,

@@ -1,4 +1,4 @@
-//! What each motion of the dataset would tell: its factor, computed once for all iterations and all runs.
+//! The factor of each motion of the dataset, computed once for all iterations and all runs.
 
 use super::Triangle;
 use crate::CurriculumError;

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 pub struct Question<'a> {
     /// All motions: their names, tasks and durations.
     pub dataset: &'a MotionDataset,
-    /// What each would tell, in the same order.
+    /// The factor of each, in the same order.
     pub candidates: &'a MotionCandidates,
     /// Those that the constraint allows, as indices; never empty.
     pub allowed: &'a [usize],

@@ -37,7 +37,7 @@ impl Selection for AOptimal {
 /// dataset: what the torque error (19) measures.
 ///
 /// The paper's cond does not change when Φ is done again, so that where one motion keeps it small it is
-/// chosen again and again, though another sample of it tells little. The variance of the predictions counts
+/// chosen again and again, though another sample of it adds little. The variance of the predictions counts
 /// both: each direction of w as much as the motions feel it, and how often it was seen. It is the I- or
 /// V-optimality of the design of experiments (Atkinson, Donev and Tobias, Optimum Experimental Designs, 2007,
 /// §10.6), over a finite set of motions.

@@ -37,7 +37,7 @@ impl Selection for SmallestCondition {
         bounds.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut best: [Option<(f64, usize)>; 2] = [None, None];
         for (bound, motion) in bounds {
-            // The runner-up is told too, so it must be certain as well.
+            // The runner-up is reported too, so it must be exact as well.
             if best[1].is_some_and(|(second, _)| bound > second) {
                 break;
             }

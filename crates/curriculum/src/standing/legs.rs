@@ -1,4 +1,4 @@
-//! Legs that follow: base and upper body move as they are told, and the legs keep the feet where they are.
+//! Legs that follow: the motion of base and upper body is given, and the legs keep the feet where they are.
 
 use super::{Feet, VIRTUAL_JOINTS};
 use crate::CurriculumError;
@@ -23,7 +23,7 @@ pub struct Legs {
     joints: Vec<usize>,
 }
 
-/// Random states with the feet on the floor, in which is sought what motions can tell apart.
+/// Random states with the feet on the floor, from which the base parameters are computed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StandingStates {
     /// How many: each gives a row for each joint, so 200 are many times the columns of a humanoid.
