@@ -11,7 +11,7 @@ use crate::random::{Purpose, random};
 use crate::relaxation::{ConditionRelaxation, Relaxation};
 use crate::selection::{MotionCandidates, Selection, SmallestCondition, Triangle};
 use crate::{CurriculumError, CurriculumRun, Experiment, IterationRecord};
-use phiw_estimation::{Estimate, Estimator, Evidence, Measured, Robot, RobotModel, RowsAt};
+use phiw_estimation::{Estimate, Estimator, Evidence, MotionLog, Robot, RobotModel, RowsAt};
 use phiw_identification::EffectSpec;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -184,7 +184,7 @@ impl<'a> Curriculum<'a> {
     }
 
     /// Line 14, and the search for what the model lacks.
-    fn learn(&self, run: &mut CurriculumRun, measured: &Measured) -> Result<Learning, CurriculumError> {
+    fn learn(&self, run: &mut CurriculumRun, measured: &MotionLog) -> Result<Learning, CurriculumError> {
         let evidence = match run.evidence.take() {
             Some(evidence) => evidence,
             None => Evidence::none(&self.robot.design_of(&run.model)?, self.rows_at)?,
@@ -224,7 +224,7 @@ impl<'a> Curriculum<'a> {
         &self,
         learning: Learning,
         mut effects: Vec<EffectSpec>,
-        logs: &[Measured],
+        logs: &[MotionLog],
         least_gain: f64,
     ) -> Result<(Learning, Vec<EffectSpec>), CurriculumError> {
         let mut with = self.fitted(&learning, &effects, logs)?;
@@ -261,7 +261,7 @@ impl<'a> Curriculum<'a> {
         &self,
         learning: &Learning,
         effects: &[EffectSpec],
-        logs: &[Measured],
+        logs: &[MotionLog],
     ) -> Result<Learning, CurriculumError> {
         let specs = &[self.robot.declared(), effects].concat();
         if learning.model.specs() == *specs {
@@ -277,7 +277,7 @@ impl<'a> Curriculum<'a> {
         &self,
         mut evidence: Evidence,
         present: &RobotModel,
-        logs: &[Measured],
+        logs: &[MotionLog],
     ) -> Result<Learning, CurriculumError> {
         let design = self.robot.design_of(present)?;
         for log in logs {

@@ -2,14 +2,14 @@
 
 use crate::CurriculumError;
 use crate::motion::Motion;
-use phiw_estimation::{Estimator, Measured, Robot, RobotModel};
+use phiw_estimation::{Estimator, MotionLog, Robot, RobotModel};
 use rand::Rng;
 
 /// What happened when a motion was tried.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trial {
     /// The log.
-    pub measured: Measured,
+    pub measured: MotionLog,
     /// When the robot fell, since the motion's start \[s\].
     pub fell_at_s: Option<f64>,
     /// RMS of each joint's tracking error \[rad, m\].

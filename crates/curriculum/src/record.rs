@@ -3,7 +3,7 @@
 use crate::end::EndReason;
 use crate::growth::Rivalry;
 use crate::selection::Choice;
-use phiw_estimation::{Evidence, Measured, RobotModel};
+use phiw_estimation::{Evidence, MotionLog, RobotModel};
 use serde::{Deserialize, Serialize};
 
 /// One iteration.
@@ -63,7 +63,7 @@ pub struct CurriculumRun {
     /// All that was measured; none before the first measurement, and once the run has ended.
     pub evidence: Option<Evidence>,
     /// The logs themselves, where the model may grow: new columns need them.
-    pub logs: Vec<Measured>,
+    pub logs: Vec<MotionLog>,
     /// Beliefs that the logs can not tell apart; the next motion is to separate them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rivals: Vec<Rivalry>,

@@ -10,7 +10,7 @@ use phiw_regressor::RegressorError;
 pub enum EstimationError {
     /// A log lacks what the estimate needs.
     #[error("the motion as measured: {0}")]
-    Measured(&'static str),
+    Log(&'static str),
     /// A number lies outside what makes sense.
     #[error("{what} is {value}: it must be {must_be}")]
     Value {

@@ -2,7 +2,7 @@
 
 use super::foresight;
 use super::stored::StoredFactor;
-use crate::{EstimationError, Measured};
+use crate::{EstimationError, MotionLog};
 use phiw_identification::{Design, Fold, IdentificationError, accumulate};
 use phiw_regressor::factor::Factor;
 use phiw_regressor::least_squares::{Group, GroupedFactor};
@@ -131,7 +131,7 @@ impl Evidence {
     ///
     /// # Errors
     /// It is not of this robot, or has no derivatives where [`RowsAt`] asks for them.
-    pub fn add(&mut self, design: &Design, measured: &Measured) -> Result<(), EstimationError> {
+    pub fn add(&mut self, design: &Design, measured: &MotionLog) -> Result<(), EstimationError> {
         let block = match self.settings.rows_at {
             RowsAt::Stamps => measured.at_stamps()?,
             RowsAt::Periods => measured.over_periods(),

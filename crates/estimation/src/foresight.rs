@@ -8,7 +8,7 @@
 //! taken of what was known when the period began: then its product with the noise is nothing on average,
 //! whatever its form.
 
-use crate::{EstimationError, Measured};
+use crate::{EstimationError, MotionLog};
 use phiw_identification::{Design, Effect};
 use phiw_regressor::factor::FactorBuilder;
 use phiw_regressor::least_squares::{Group, GroupedFactor};
@@ -47,7 +47,7 @@ fn of_parameters(design: &Design, asked: impl Fn(&dyn Effect, usize) -> bool) ->
 pub(super) fn rows(
     design: &Design,
     foreseen: &[bool],
-    measured: &Measured,
+    measured: &MotionLog,
     mut take: impl FnMut(&[f64]) -> Result<(), EstimationError>,
 ) -> Result<(), EstimationError> {
     let (mut block, mut begun) = (measured.over_periods(), measured.begun());
@@ -78,7 +78,7 @@ pub(super) fn rows(
 pub(super) fn factor(
     design: &Design,
     foreseen: &[bool],
-    measured: &Measured,
+    measured: &MotionLog,
 ) -> Result<GroupedFactor, EstimationError> {
     let mut builders: Vec<FactorBuilder> =
         design.rows().iter().map(|layout| FactorBuilder::new(layout.range.len())).collect();

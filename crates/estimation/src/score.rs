@@ -10,7 +10,7 @@ use super::likelihood::column;
 use super::response::Response;
 use super::sensitivity::Sensitivity;
 use super::{Evidence, MotionLikelihood, RowsAt, foresight};
-use crate::{EstimationError, Measured, Robot, RobotModel};
+use crate::{EstimationError, MotionLog, Robot, RobotModel};
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, Mat, Par, Side};
@@ -47,7 +47,7 @@ impl MotionLikelihood {
         &self,
         robot: &Robot,
         model: &RobotModel,
-        logs: &[Measured],
+        logs: &[MotionLog],
         candidates: &[EffectSpec],
     ) -> Result<Vec<Option<Gain>>, EstimationError> {
         let present = robot.design_of(model)?;

@@ -4,7 +4,7 @@ use crate::contest::{Contender, ScoreTestSettings, Winner};
 use phiw_curriculum::CurriculumError;
 use phiw_curriculum::growth::{Found, Growth};
 use phiw_effects::{Catalogue, Constants, EffectKind, JointRange, SignalRanges};
-use phiw_estimation::{Estimator, Evidence, Gain, Measured, MotionLikelihood, Robot, RobotModel, RowsAt};
+use phiw_estimation::{Estimator, Evidence, Gain, MotionLikelihood, MotionLog, Robot, RobotModel, RowsAt};
 use phiw_identification::EffectSpec;
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ impl ScoreTest {
         &self,
         robot: &Robot,
         model: &RobotModel,
-        logs: &[Measured],
+        logs: &[MotionLog],
     ) -> Result<Vec<Gain>, CurriculumError> {
         let ranges = ranges(robot, logs);
         let present = model.specs();
@@ -72,7 +72,7 @@ impl ScoreTest {
         robot: &Robot,
         model: &RobotModel,
         effects: &[EffectSpec],
-        logs: &[Measured],
+        logs: &[MotionLog],
     ) -> Result<RobotModel, CurriculumError> {
         Ok(self.fit(robot, model, effects, logs)?.0)
     }
@@ -83,7 +83,7 @@ impl ScoreTest {
         robot: &Robot,
         model: &RobotModel,
         effects: &[EffectSpec],
-        logs: &[Measured],
+        logs: &[MotionLog],
     ) -> Result<(RobotModel, f64), CurriculumError> {
         let specs = [robot.declared(), effects].concat();
         let model = model.with_effects(robot, &specs)?;
@@ -111,7 +111,7 @@ impl ScoreTest {
         model: &RobotModel,
         known: &[EffectSpec],
         near: &[Gain],
-        logs: &[Measured],
+        logs: &[MotionLog],
     ) -> Result<(Vec<EffectSpec>, Vec<Contender>), CurriculumError> {
         let (_, without) = self.fit(robot, model, known, logs)?;
         let (mut effects, mut contenders) = (Vec::new(), Vec::new());
@@ -130,7 +130,7 @@ impl ScoreTest {
         &self,
         robot: &Robot,
         model: &RobotModel,
-        logs: &[Measured],
+        logs: &[MotionLog],
         mut best: Gain,
     ) -> Result<Gain, CurriculumError> {
         let kind = self.catalogue.kind(&best.effect.kind)?;
@@ -162,12 +162,12 @@ impl Growth for ScoreTest {
         &self,
         robot: &Robot,
         model: &RobotModel,
-        logs: &[Measured],
+        logs: &[MotionLog],
         _doubted: bool,
         refuted: &[EffectSpec],
     ) -> Result<Found, CurriculumError> {
         let mut found = Found::default();
-        if logs.iter().map(Measured::duration_s).sum::<f64>() < self.settings.least_s {
+        if logs.iter().map(MotionLog::duration_s).sum::<f64>() < self.settings.least_s {
             return Ok(found);
         }
         // From the declared model on: what was found before may have been the wrong half of the truth.
@@ -242,13 +242,13 @@ fn candidates(
 
 /// What the logs cover. No period of a ripple is known from a residual that is mostly noise, so there is none
 /// to try.
-fn ranges(robot: &Robot, logs: &[Measured]) -> SignalRanges {
+fn ranges(robot: &Robot, logs: &[MotionLog]) -> SignalRanges {
     let joints = robot.tree().joint_count();
     let joint = |joint: usize| {
-        let each = |pick: fn(&Measured) -> &Vec<f64>| {
+        let each = |pick: fn(&MotionLog) -> &Vec<f64>| {
             logs.iter().flat_map(move |log| pick(log).iter().skip(joint).step_by(joints.max(1)).copied())
         };
-        let rms = |pick: fn(&Measured) -> &Vec<f64>| {
+        let rms = |pick: fn(&MotionLog) -> &Vec<f64>| {
             let (sum, count) = each(pick).fold((0.0, 0_usize), |(sum, count), x| (sum + x * x, count + 1));
             (sum / count.max(1) as f64).sqrt()
         };
@@ -262,7 +262,7 @@ fn ranges(robot: &Robot, logs: &[Measured]) -> SignalRanges {
     };
     SignalRanges {
         joints: (0..joints).map(joint).collect(),
-        session: (0.0, logs.iter().map(Measured::duration_s).fold(0.0, f64::max)),
+        session: (0.0, logs.iter().map(MotionLog::duration_s).fold(0.0, f64::max)),
         period: logs.first().map_or(0.0, |log| log.period_s),
         ripple_frequencies: vec![Vec::new(); joints],
         temperature: false,

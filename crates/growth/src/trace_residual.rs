@@ -4,7 +4,7 @@ use crate::whiteness::{WhitenessSettings, coloured, residual};
 use phiw_curriculum::CurriculumError;
 use phiw_curriculum::growth::{Found, Growth};
 use phiw_effects::{Catalogue, SignalRanges};
-use phiw_estimation::{Measured, Robot, RobotModel, torques_along};
+use phiw_estimation::{MotionLog, Robot, RobotModel, torques_along};
 use phiw_identification::{BlockSource, Data, EffectCatalogue, EffectSpec, Fold, identify};
 use phiw_residual::trace::{TraceInput, TraceOptions, trace};
 use phiw_telemetry::{Block, Recording, Survey, arrange_session};
@@ -103,11 +103,11 @@ impl Growth for TraceResidual {
         &self,
         robot: &Robot,
         model: &RobotModel,
-        logs: &[Measured],
+        logs: &[MotionLog],
         doubted: bool,
         refuted: &[EffectSpec],
     ) -> Result<Found, CurriculumError> {
-        if logs.iter().map(Measured::duration_s).sum::<f64>() < self.least_s {
+        if logs.iter().map(MotionLog::duration_s).sum::<f64>() < self.least_s {
             return Ok(Found::default());
         }
         let present = &model.specs()[robot.declared().len()..];
@@ -165,7 +165,7 @@ impl Session {
     fn of(
         robot: &Robot,
         model: &RobotModel,
-        logs: &[Measured],
+        logs: &[MotionLog],
         settings: &SessionSettings,
     ) -> Result<Self, CurriculumError> {
         let joints = robot.tree().joint_count();

@@ -1,7 +1,7 @@
 //! Whether what a belief leaves of the logs is noise that nobody could have foreseen.
 
 use phiw_curriculum::CurriculumError;
-use phiw_estimation::{Measured, Robot, RobotModel, torques_along};
+use phiw_estimation::{MotionLog, Robot, RobotModel, torques_along};
 
 /// When a residual is white. Each threshold is in standard deviations of what white noise gives, in any of
 /// all torques: higher asks for fewer traces and misses small effects.
@@ -33,7 +33,7 @@ impl Default for WhitenessSettings {
 pub(crate) fn coloured(
     robot: &Robot,
     model: &RobotModel,
-    logs: &[Measured],
+    logs: &[MotionLog],
     settings: &WhitenessSettings,
 ) -> Result<Vec<usize>, CurriculumError> {
     let joints = robot.tree().joint_count();
@@ -57,7 +57,7 @@ pub(crate) fn coloured(
 pub(crate) fn residual(
     robot: &Robot,
     model: &RobotModel,
-    log: &Measured,
+    log: &MotionLog,
 ) -> Result<Vec<f64>, CurriculumError> {
     let mut block = log.over_periods();
     let torques = torques_along(&robot.design_of(model)?, &model.parameters(robot)?, &mut block, 1)?;

@@ -4,7 +4,7 @@ use crate::Controller;
 use phiw_curriculum::motion::Motion;
 use phiw_curriculum::{CurriculumError, Experiment, Trial};
 use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
-use phiw_estimation::{KnownEffect, Measured, Robot, RobotModel};
+use phiw_estimation::{KnownEffect, MotionLog, Robot, RobotModel};
 use phiw_identification::JointProperty;
 use phiw_plant::{Friction, History, Plant, PlantEffect, PlantRun, PlantSetup, Sensors, Timing};
 use rand::Rng;
@@ -174,12 +174,12 @@ impl Experiment for SimulatedRobot {
         let run = self.run(robot, model, motion, rng)?;
         // A robot that falls at once has no log.
         let measured = match run.recording.len() {
-            0 | 1 => Measured {
+            0 | 1 => MotionLog {
                 joints: motion.joints(),
                 period_s: self.timing.control_period_s,
-                ..Measured::default()
+                ..MotionLog::default()
             },
-            _ => Measured { still: self.still(&run.history), ..Measured::from_recording(&run.recording)? },
+            _ => MotionLog { still: self.still(&run.history), ..MotionLog::from_recording(&run.recording)? },
         };
         Ok(Trial { measured, fell_at_s: run.fell_at_s, tracking_error: run.tracking_error })
     }

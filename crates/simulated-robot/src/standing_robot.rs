@@ -4,7 +4,7 @@ use crate::SimulatedRobot;
 use phiw_curriculum::motion::Motion;
 use phiw_curriculum::standing::{Feet, VIRTUAL_JOINTS, base_coordinates};
 use phiw_curriculum::{CurriculumError, Experiment, Trial};
-use phiw_estimation::{Measured, Robot, RobotModel};
+use phiw_estimation::{MotionLog, Robot, RobotModel};
 use phiw_plant::{History, Sensors};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -123,7 +123,7 @@ impl StandingRobot {
         history: &History,
         end_s: f64,
         rng: &mut ChaCha8Rng,
-    ) -> Result<Measured, CurriculumError> {
+    ) -> Result<MotionLog, CurriculumError> {
         let period_s = self.plant.timing.control_period_s;
         if history.foot_wrenches.len() != 6 * self.feet.all().len() * history.steps() {
             let problem = "the engine does not tell what the floor gives to each foot".to_owned();
@@ -134,7 +134,7 @@ impl StandingRobot {
         let last = history.steps().min(first + (end_s / history.step_s).round() as usize);
         let rows = Rows { starts: (first..=last).step_by(steps).collect(), steps };
         let joints = history.joints + BASE;
-        let mut measured = Measured { joints, period_s, ..Measured::default() };
+        let mut measured = MotionLog { joints, period_s, ..MotionLog::default() };
         [measured.q, measured.qd] = motion(history, &rows);
         measured.still = self.still(&measured)?;
         measured.tau = self.forces(history, &rows, &measured, rng)?;
@@ -142,7 +142,7 @@ impl StandingRobot {
     }
 
     /// For each row, whether no foot moves in it and in the next.
-    fn still(&self, measured: &Measured) -> Result<Vec<bool>, CurriculumError> {
+    fn still(&self, measured: &MotionLog) -> Result<Vec<bool>, CurriculumError> {
         let stillness = &self.plant.stillness;
         let limits = [stillness.foot_speed, stillness.foot_turning];
         let joints = measured.joints;
@@ -160,7 +160,7 @@ impl StandingRobot {
         &self,
         history: &History,
         rows: &Rows,
-        measured: &Measured,
+        measured: &MotionLog,
         rng: &mut ChaCha8Rng,
     ) -> Result<Vec<f64>, CurriculumError> {
         let (joints, period_s) = (measured.joints, measured.period_s);

@@ -5,7 +5,7 @@ mod arm;
 use arm::Arm;
 use phiw_curriculum::{Experiment, unreliable_model};
 use phiw_estimation::{
-    Estimate, Estimator, Evidence, LeastSquares, Measured, MotionLikelihood, NewtonSettings, ParameterPrior,
+    Estimate, Estimator, Evidence, LeastSquares, MotionLikelihood, MotionLog, NewtonSettings, ParameterPrior,
     RowsAt, WeightedLeastSquares,
 };
 use phiw_identification::Design;
@@ -101,7 +101,7 @@ fn what_rows_do_not_determine_keeps_its_present_value() {
     let mut workspace = phiw_dynamics::Workspace::new(&arm.tree);
     arm.tree.inverse_dynamics(&q, &rest, &rest, &mut workspace, &mut tau).unwrap();
     let rows = 40;
-    let measured = Measured {
+    let measured = MotionLog {
         joints,
         period_s: 0.01,
         q: q.repeat(rows),

@@ -6,7 +6,7 @@ use arm::Arm;
 use phiw_curriculum::end::FixedCount;
 use phiw_curriculum::growth::Growth;
 use phiw_curriculum::{Curriculum, CurriculumError, CurriculumRun, Experiment, unreliable_model};
-use phiw_estimation::{Estimator, Evidence, Measured, RobotModel, RowsAt};
+use phiw_estimation::{Estimator, Evidence, MotionLog, RobotModel, RowsAt};
 use phiw_growth::{ScoreTest, ScoreTestSettings};
 use phiw_identification::EffectSpec;
 use phiw_plant::{Friction, Mechanism, PlantEffect};
@@ -16,7 +16,7 @@ use rand_chacha::ChaCha8Rng;
 /// The paper's noise: more than the torque of any secret here.
 const NOISE: f64 = 0.05;
 
-fn logs(arm: &Arm, secret: Option<&PlantEffect>, seed: u64) -> Vec<Measured> {
+fn logs(arm: &Arm, secret: Option<&PlantEffect>, seed: u64) -> Vec<MotionLog> {
     let mut experiment = arm.experiment();
     experiment.effects.extend(secret.cloned());
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -40,7 +40,7 @@ fn secrets(arm: &Arm) -> [(PlantEffect, &'static str, usize); 3] {
 }
 
 /// −log L of a model fitted to the logs.
-fn negative_log_likelihood(arm: &Arm, model: &RobotModel, logs: &[Measured]) -> f64 {
+fn negative_log_likelihood(arm: &Arm, model: &RobotModel, logs: &[MotionLog]) -> f64 {
     let design = arm.robot.design_of(model).unwrap();
     let mut evidence = Evidence::none(&design, RowsAt::Periods).unwrap();
     logs.iter().for_each(|log| evidence.add(&design, log).unwrap());

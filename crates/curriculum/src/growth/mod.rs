@@ -5,7 +5,7 @@ mod rivalry;
 pub use rivalry::{Rivalry, rivals_to_separate};
 
 use crate::CurriculumError;
-use phiw_estimation::{Measured, Robot, RobotModel};
+use phiw_estimation::{MotionLog, Robot, RobotModel};
 use phiw_identification::EffectSpec;
 
 /// What was found beside the declared model.
@@ -32,7 +32,7 @@ pub trait Growth: Send + Sync {
         &self,
         robot: &Robot,
         model: &RobotModel,
-        logs: &[Measured],
+        logs: &[MotionLog],
         doubted: bool,
         refuted: &[EffectSpec],
     ) -> Result<Found, CurriculumError>;

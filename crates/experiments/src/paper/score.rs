@@ -4,7 +4,7 @@ use super::setup::{Setup, Validation};
 use phiw_curriculum::selection::Question;
 use phiw_curriculum::{Curriculum, CurriculumRun};
 use phiw_estimation::{
-    EstimationError, Estimator, Evidence, LeastSquares, Measured, RobotModel, RowsAt, WeightedLeastSquares,
+    EstimationError, Estimator, Evidence, LeastSquares, MotionLog, RobotModel, RowsAt, WeightedLeastSquares,
 };
 use phiw_identification::accuracy::{parameter_rmse, torque_rmse};
 use phiw_identification::{TorqueError, torque_error};
@@ -47,7 +47,7 @@ impl Setup {
     ///
     /// # Errors
     /// The belief is not of this robot.
-    pub fn torque_error(&self, model: &RobotModel, logs: &[Measured]) -> anyhow::Result<TorqueError> {
+    pub fn torque_error(&self, model: &RobotModel, logs: &[MotionLog]) -> anyhow::Result<TorqueError> {
         let design = self.robot.design_of(model)?;
         let mut evidence = Evidence::none(&design, RowsAt::Periods)?.without_noise();
         for log in logs {

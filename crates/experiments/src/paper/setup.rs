@@ -19,8 +19,8 @@ use phiw_curriculum::relaxation::{ConditionRelaxation, Relaxation, UncertaintyRe
 use phiw_curriculum::selection::MotionCandidates;
 use phiw_dynamics::{PARAMETERS_PER_BODY, Workspace, World};
 use phiw_estimation::{
-    Estimator, Evidence, LeastSquares, Measured, MotionLikelihood, ParameterPrior, Robot, RobotModel, RowsAt,
-    WeightedLeastSquares,
+    Estimator, Evidence, LeastSquares, MotionLikelihood, MotionLog, ParameterPrior, Robot, RobotModel,
+    RowsAt, WeightedLeastSquares,
 };
 use phiw_growth::{ScoreTest, TraceResidual};
 use phiw_identification::{parameter_name, standard_unit};
@@ -60,7 +60,7 @@ pub struct Setup {
 /// Logs of held-out motions, and what they are under the declared columns.
 pub struct Validation {
     /// The logs, without noise.
-    pub logs: Vec<Measured>,
+    pub logs: Vec<MotionLog>,
     /// R of [Φ f], and the number of samples T.
     pub declared: (Factor, f64),
 }
@@ -312,9 +312,9 @@ impl Setup {
         &self,
         backend: Engine,
         secret: Option<&PlantEffect>,
-    ) -> anyhow::Result<Vec<Measured>> {
+    ) -> anyhow::Result<Vec<MotionLog>> {
         let experiment = self.trial_ground(backend, false, 0.0, secret);
-        let measure = |(index, motion): (usize, &Motion)| -> anyhow::Result<Measured> {
+        let measure = |(index, motion): (usize, &Motion)| -> anyhow::Result<MotionLog> {
             let mut rng = ChaCha8Rng::seed_from_u64(VALIDATION_SEED);
             rng.set_stream(index as u64);
             Ok(experiment.perform(&self.robot, &self.truth, motion, &mut rng)?.measured)
@@ -326,7 +326,7 @@ impl Setup {
     ///
     /// # Errors
     /// The belief is not of this robot.
-    pub fn validation_of(&self, model: &RobotModel, logs: &[Measured]) -> anyhow::Result<(Factor, f64)> {
+    pub fn validation_of(&self, model: &RobotModel, logs: &[MotionLog]) -> anyhow::Result<(Factor, f64)> {
         let design = self.robot.design_of(model)?;
         let mut evidence = Evidence::none(&design, RowsAt::Periods)?.without_noise();
         for log in logs {

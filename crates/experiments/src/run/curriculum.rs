@@ -11,7 +11,7 @@ use crate::paper::{
 };
 use anyhow::Context;
 use phiw::console::Console;
-use phiw_estimation::{Measured, RobotModel};
+use phiw_estimation::{MotionLog, RobotModel};
 use phiw_identification::TorqueError;
 use phiw_plant::PlantEffect;
 use std::path::{Path, PathBuf};
@@ -84,7 +84,7 @@ pub fn run(out: &Path) -> anyhow::Result<(PathBuf, String)> {
     }
     let [open, closed]: [RunFile; 2] = runs.try_into().map_err(|_| anyhow::anyhow!("a run is missing"))?;
     let secret = setup.secret(SECRET, SEED)?;
-    let logs: Vec<Measured> = setup.validation_logs(engine, Some(&secret))?;
+    let logs: Vec<MotionLog> = setup.validation_logs(engine, Some(&secret))?;
     let error = |model: &RobotModel| setup.torque_error(model, &logs);
     let errors = [error(&closed.run.initial)?, error(&open.run.model)?, error(&closed.run.model)?];
     let outcome = Outcome { setup, secret, runs: [open, closed], errors };

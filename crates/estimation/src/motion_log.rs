@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// A log with velocities, evenly sampled. Arrays are row-major, `[row × joints]`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Measured {
+pub struct MotionLog {
     /// Number of joints.
     pub joints: usize,
     /// Time between two rows \[s\].
@@ -25,21 +25,21 @@ pub struct Measured {
     pub still: Vec<bool>,
 }
 
-impl Measured {
+impl MotionLog {
     /// From a recording.
     ///
     /// # Errors
     /// It has no velocities, or fewer than two rows.
     pub fn from_recording(recording: &Recording) -> Result<Self, EstimationError> {
         let [first, .., last] = recording.t.as_slice() else {
-            return Err(EstimationError::Measured("it has fewer than two rows"));
+            return Err(EstimationError::Log("it has fewer than two rows"));
         };
         let period_s = (last - first) / (recording.t.len() - 1) as f64;
         let qd = recording
             .qd
             .clone()
-            .ok_or(EstimationError::Measured("it has no velocities: let the sensors measure them"))?;
-        Ok(Measured {
+            .ok_or(EstimationError::Log("it has no velocities: let the sensors measure them"))?;
+        Ok(MotionLog {
             joints: recording.joints.len(),
             period_s,
             q: recording.q.clone(),
@@ -73,7 +73,7 @@ impl Measured {
     pub(crate) fn at_stamps(&self) -> Result<Block, EstimationError> {
         if self.qdd.len() != self.q.len() {
             let problem = "it has no accelerations: take rows over periods, which need none";
-            return Err(EstimationError::Measured(problem));
+            return Err(EstimationError::Log(problem));
         }
         let signals = [self.q.clone(), self.qd.clone(), self.qdd.clone()];
         Ok(self.counted(0.0, signals, self.tau.clone()))
