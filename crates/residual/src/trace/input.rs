@@ -62,7 +62,7 @@ impl Default for TraceOptions {
             least_size: 0.01,
             negligible_share: 0.005,
             floor_margin: 1.15,
-            structured_share: 0.01,
+            structured_share: 0.03,
             structured_ratio: 8.0,
             torques: None,
             excluded: Vec::new(),
