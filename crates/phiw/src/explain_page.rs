@@ -251,7 +251,7 @@ fn remaining(analysis: &Analysis<'_>, tracing: &Tracing) -> Remaining {
 /// What the logs leave no trace of, kind by kind.
 pub fn cannot_be_told(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<CannotBeToldJson> {
     let mut kinds: Vec<CannotBeToldJson> = Vec::new();
-    for spec in &tracing.remaining.silent {
+    for spec in &tracing.remaining.unidentifiable {
         match kinds.iter_mut().find(|other| other.kind == spec.kind) {
             Some(kind) => kind.joints.push(spec.joints.clone()),
             None => kinds.push(CannotBeToldJson {

@@ -167,13 +167,13 @@ impl Search<'_> {
 
     fn is_within_bounds(&self, fit: &Fit, member: &Member) -> bool {
         let variant = self.problem.variant(*member);
-        let heard = |parameter: usize| fit.place[parameter].is_some_and(|place| fit.heard[place]);
+        let determined = |parameter: usize| fit.place[parameter].is_some_and(|place| fit.determined[place]);
         let within = |(&parameter, (low, high)): (&usize, &(f64, f64))| {
             let value = fit.values[parameter];
-            !heard(parameter) || (*low <= value && value <= *high)
+            !determined(parameter) || (*low <= value && value <= *high)
         };
         self.is_small_enough(fit, member)
-            && variant.parameters.iter().any(|&parameter| heard(parameter))
+            && variant.parameters.iter().any(|&parameter| determined(parameter))
             && variant.parameters.iter().zip(&variant.bounds).all(within)
     }
 }

@@ -20,14 +20,14 @@ pub(super) fn criterion(problem: &Problem, members: &[Member], fit: &Fit, rows: 
     likelihood + fit.prior_squares(problem) + columns + choices(problem, members)
 }
 
-/// What the columns and constants of a member cost; columns that `fit` does not hear cost nothing.
+/// What the columns and constants of a member cost; columns that `fit` does not determine cost nothing.
 pub(super) fn price(problem: &Problem, member: Member, fit: Option<&Fit>, rows: &[f64]) -> f64 {
     let hypothesis = &problem.hypotheses[member.hypothesis];
     let variant = problem.variant(member);
-    let heard = |parameter: &&usize| {
-        fit.is_none_or(|fit| fit.place[**parameter].is_none_or(|place| fit.heard[place]))
+    let determined = |parameter: &&usize| {
+        fit.is_none_or(|fit| fit.place[**parameter].is_none_or(|place| fit.determined[place]))
     };
-    let columns = variant.parameters.iter().filter(heard).count();
+    let columns = variant.parameters.iter().filter(determined).count();
     let constants = if hypothesis.declared || columns == 0 { 0 } else { variant.constants };
     let columns = if hypothesis.declared { 0 } else { columns };
     price_of(hypothesis.torques.iter().map(|&torque| rows[torque]).sum(), columns + constants)

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 /// Folds below which nothing can be said of the residual's correlation.
 const LEAST_FOLDS: usize = 4;
 /// Squared share of a column that must be left beside the model for it to be asked.
-const HEARD: f64 = 1e-3;
+const DETERMINED: f64 = 1e-3;
 
 /// Effective rows of each torque: its rows over the median, over the columns that could act on it, of what
 /// the scores' spread from fold to fold is against that of independent rows.
@@ -36,7 +36,7 @@ fn design_effect(problem: &Problem, fit: &Fit, torque: usize) -> f64 {
     // The scores of the model's own columns, fold by fold: what a column beside them shares with them goes
     // out.
     let active: Vec<(usize, usize)> =
-        fit.own[torque].iter().filter(|(_, place)| fit.heard[*place]).copied().collect();
+        fit.own[torque].iter().filter(|(_, place)| fit.determined[*place]).copied().collect();
     let of_model: Vec<Vec<f64>> = rows
         .folds
         .iter()
@@ -54,7 +54,7 @@ fn design_effect(problem: &Problem, fit: &Fit, torque: usize) -> f64 {
             let beside = Beside::new(problem, fit, &[parameter], &[torque]);
             let norm = fit.weights[torque] * rows.whole.column(column)[column];
             let left = beside.left(0, 0);
-            if left <= HEARD * norm || norm <= 0.0 {
+            if left <= DETERMINED * norm || norm <= 0.0 {
                 continue;
             }
             let shares = fit.backward(beside.into_part());

@@ -26,7 +26,7 @@ pub(crate) struct Fit {
     /// For each torque (column, value) of the absent ones whose absence is a value.
     absent: Vec<Vec<(usize, f64)>>,
     /// Whether the rows determine it beside those before it.
-    pub heard: Vec<bool>,
+    pub determined: Vec<bool>,
     /// L of the system's Cholesky factor, row-major.
     triangle: Vec<f64>,
     /// L⁻¹ of the right-hand side.
@@ -76,7 +76,7 @@ impl Fit {
     /// The same weights and rows with some of the active parameters absent: values and residuals only, by the
     /// constraint's Schur complement. `None` where these parameters are not told apart.
     pub fn pinned(&self, problem: &Problem, places: &[usize]) -> Option<Self> {
-        let places: Vec<usize> = places.iter().copied().filter(|&place| self.heard[place]).collect();
+        let places: Vec<usize> = places.iter().copied().filter(|&place| self.determined[place]).collect();
         let column = |&place: &usize| {
             let mut unit = vec![0.0; self.active.len()];
             unit[place] = 1.0;
@@ -89,7 +89,7 @@ impl Fit {
             .collect();
         let solved = solve_block(&places, &inverse, &change)?;
         let mut values = self.values.clone();
-        for (at, &parameter) in self.active.iter().enumerate().filter(|(at, _)| self.heard[*at]) {
+        for (at, &parameter) in self.active.iter().enumerate().filter(|(at, _)| self.determined[*at]) {
             let change: f64 = inverse.iter().zip(&solved).map(|(column, value)| column[at] * value).sum();
             values[parameter] -= change;
         }
@@ -99,7 +99,7 @@ impl Fit {
             place: self.place.clone(),
             own: self.own.clone(),
             absent: self.absent.clone(),
-            heard: self.heard.clone(),
+            determined: self.determined.clone(),
             triangle: Vec::new(),
             half: Vec::new(),
             values,
@@ -114,7 +114,7 @@ impl Fit {
     /// The same parameters fitted with the same weights to the rows of all folds but some.
     pub fn without(&self, problem: &Problem, folds: &Range<usize>) -> Self {
         let mut fit = self.clone();
-        fit.heard.fill(true);
+        fit.determined.fill(true);
         fit.solve_rows(problem, None, folds);
         fit
     }
@@ -139,7 +139,7 @@ impl Fit {
         Fit {
             own: problem.torques.iter().map(of_torque).collect(),
             absent: problem.torques.iter().map(absent_of).collect(),
-            heard: vec![true; active.len()],
+            determined: vec![true; active.len()],
             active,
             place,
             triangle: Vec::new(),
@@ -210,7 +210,7 @@ impl Fit {
                 system[row * size..row * size + row + 1]
                     .copy_from_slice(&start.triangle[row * other..row * other + row + 1]);
             }
-            self.heard[..kept].copy_from_slice(&start.heard[..kept]);
+            self.determined[..kept].copy_from_slice(&start.determined[..kept]);
         }
         let mut right = vec![0.0; size];
         for (torque, rows) in problem.torques.iter().enumerate() {
@@ -254,8 +254,8 @@ impl Fit {
         self.half = self.forward(&right);
         let solution = self.backward(self.half.clone());
         self.values.clone_from(&problem.absent);
-        for ((&parameter, value), heard) in self.active.iter().zip(&solution).zip(&self.heard) {
-            self.values[parameter] = if *heard { *value } else { problem.absent[parameter] };
+        for ((&parameter, value), determined) in self.active.iter().zip(&solution).zip(&self.determined) {
+            self.values[parameter] = if *determined { *value } else { problem.absent[parameter] };
         }
     }
 
@@ -274,7 +274,7 @@ impl Fit {
             let own = &mut rest[..size];
             let norm = own[row];
             for column in 0..row {
-                own[column] = match self.heard[column] {
+                own[column] = match self.determined[column] {
                     true => {
                         let other = &before[column * size..column * size + column + 1];
                         (own[column] - dot(&own[..column], &other[..column])) / other[column]
@@ -284,8 +284,8 @@ impl Fit {
             }
             let left = norm - dot(&own[..row], &own[..row]);
             let least = if row < model { DEPENDENT } else { ABSORBED };
-            self.heard[row] = left > least * norm && left > 0.0;
-            if self.heard[row] {
+            self.determined[row] = left > least * norm && left > 0.0;
+            if self.determined[row] {
                 own[row] = left.sqrt();
             } else {
                 own[..row].fill(0.0);
@@ -305,7 +305,7 @@ impl Fit {
     fn forward_rows(&self, x: &[f64], y: &mut [f64]) {
         let size = self.active.len();
         for row in 0..size {
-            if self.heard[row] {
+            if self.determined[row] {
                 let own = &self.triangle[row * size..row * size + row + 1];
                 y[row] = (x[row] - dot(&own[..row], &y[..row])) / own[row];
             }
@@ -316,7 +316,7 @@ impl Fit {
     pub fn backward(&self, mut y: Vec<f64>) -> Vec<f64> {
         let size = self.active.len();
         for row in (0..size).rev() {
-            if !self.heard[row] {
+            if !self.determined[row] {
                 y[row] = 0.0;
                 continue;
             }

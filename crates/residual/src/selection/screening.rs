@@ -64,11 +64,11 @@ impl Beside {
     pub fn solve(&self, fit: &Fit) -> (f64, Vec<Option<f64>>) {
         let count = self.right.len();
         let mut triangle: Vec<Vec<f64>> = Vec::new();
-        let mut heard: Vec<usize> = Vec::new();
+        let mut determined: Vec<usize> = Vec::new();
         let mut reduced: Vec<f64> = Vec::new();
         for column in 0..count {
-            let mut along: Vec<f64> = Vec::with_capacity(heard.len() + 1);
-            for (place, &before) in heard.iter().enumerate() {
+            let mut along: Vec<f64> = Vec::with_capacity(determined.len() + 1);
+            for (place, &before) in determined.iter().enumerate() {
                 let known = dot(&along, &triangle[place][..place]);
                 along.push((self.left(column, before) - known) / triangle[place][place]);
             }
@@ -81,14 +81,14 @@ impl Beside {
             reduced.push((right - dot(&along, &reduced)) / rest.sqrt());
             along.push(rest.sqrt());
             triangle.push(along);
-            heard.push(column);
+            determined.push(column);
         }
         let mut values = vec![None; count];
-        for place in (0..heard.len()).rev() {
-            let known: f64 = (place + 1..heard.len())
-                .map(|other| triangle[other][place] * values[heard[other]].unwrap_or(0.0))
+        for place in (0..determined.len()).rev() {
+            let known: f64 = (place + 1..determined.len())
+                .map(|other| triangle[other][place] * values[determined[other]].unwrap_or(0.0))
                 .sum();
-            values[heard[place]] = Some((reduced[place] - known) / triangle[place][place]);
+            values[determined[place]] = Some((reduced[place] - known) / triangle[place][place]);
         }
         (reduced.iter().map(|value| value * value).sum(), values)
     }
@@ -147,7 +147,7 @@ pub(super) fn screen(problem: &Problem, fit: &Fit, rows: &[f64], open: &[usize])
 }
 
 /// Hypotheses of which nothing is left beside the model, whatever their variant.
-pub(super) fn silent(problem: &Problem, fit: &Fit, open: &[usize]) -> Vec<usize> {
+pub(super) fn unidentifiable(problem: &Problem, fit: &Fit, open: &[usize]) -> Vec<usize> {
     let is_silent = |hypothesis: &&usize| {
         let own = &problem.hypotheses[**hypothesis];
         own.variants.iter().all(|variant| {

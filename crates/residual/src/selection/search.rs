@@ -5,7 +5,7 @@ use super::cross_validation::cross_validated;
 use super::design_effect::effective_rows;
 use super::fit::Fit;
 use super::problem::{Member, Problem};
-use super::screening::{screen, silent};
+use super::screening::{screen, unidentifiable};
 use super::wald::{certainty, squares_of};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -39,7 +39,7 @@ pub(crate) struct Outcome {
     /// For each member what could stand in its place, best first.
     pub alternatives: Vec<Vec<Alternative>>,
     /// Hypotheses of which the model leaves nothing.
-    pub silent: Vec<usize>,
+    pub unidentifiable: Vec<usize>,
 }
 
 /// Members with their variants chosen.
@@ -347,7 +347,7 @@ impl<'a> Search<'a> {
             .collect();
         Outcome {
             alternatives,
-            silent: silent(self.problem, &self.model.fit, &self.open()),
+            unidentifiable: unidentifiable(self.problem, &self.model.fit, &self.open()),
             members: self.model.members,
             fit: self.model.fit,
             rows: self.rows,

@@ -50,12 +50,14 @@ pub(super) fn squares_of(problem: &Problem, fit: &Fit, member: Member) -> f64 {
     if own.is_empty() { 0.0 } else { model_squares(&own, &inverse, &values).unwrap_or(0.0) }
 }
 
-/// The places of a member's columns that are heard, their columns of the system's inverse, and their values
+/// The places of a member's columns that are determined, their columns of the system's inverse, and their values
 /// less those that stand for absence.
 fn block(problem: &Problem, fit: &Fit, member: Member) -> (Vec<usize>, Vec<Vec<f64>>, Vec<f64>) {
     let parameters = problem.variant(member).parameters.iter().copied();
-    let own: Vec<usize> =
-        parameters.filter_map(|parameter| fit.place[parameter]).filter(|&place| fit.heard[place]).collect();
+    let own: Vec<usize> = parameters
+        .filter_map(|parameter| fit.place[parameter])
+        .filter(|&place| fit.determined[place])
+        .collect();
     let value = |&place: &usize| fit.values[fit.active[place]] - problem.absent[fit.active[place]];
     let column = |&place: &usize| {
         let mut unit = vec![0.0; fit.active.len()];
@@ -103,5 +105,5 @@ fn fold_scores(problem: &Problem, fit: &Fit, influence: &[f64]) -> Vec<f64> {
 /// Effective rows less the parameters.
 fn degrees_of_freedom(problem: &Problem, fit: &Fit) -> f64 {
     let rows: f64 = (0..problem.torques.len()).map(|torque| fit.weights[torque] * fit.rss[torque]).sum();
-    (rows - fit.heard.iter().filter(|heard| **heard).count() as f64).max(1.0)
+    (rows - fit.determined.iter().filter(|determined| **determined).count() as f64).max(1.0)
 }

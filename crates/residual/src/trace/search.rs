@@ -72,7 +72,7 @@ pub(super) struct Chosen {
     /// with it.
     pub alternatives: Vec<Vec<(EffectSpec, f64)>>,
     /// Hypotheses of which the model leaves nothing.
-    pub silent: Vec<EffectSpec>,
+    pub unidentifiable: Vec<EffectSpec>,
 }
 
 /// A model on its way.
@@ -141,7 +141,11 @@ impl Search<'_> {
             alternatives: found
                 .map(|(_, others)| others.iter().map(|other| (spec(&other.member), other.excess)).collect())
                 .collect(),
-            silent: outcome.silent.iter().map(|&silent| candidates.list[silent].specs[0].clone()).collect(),
+            unidentifiable: outcome
+                .unidentifiable
+                .iter()
+                .map(|&unidentifiable| candidates.list[unidentifiable].specs[0].clone())
+                .collect(),
             hypotheses: problem.hypotheses.iter().filter(|hypothesis| !hypothesis.declared).count(),
             rows: outcome.rows,
         };

@@ -71,7 +71,7 @@ pub struct Remaining {
     pub ranking: Vec<Ranked>,
     /// What these logs cannot tell: candidates of which the motion leaves nothing beside the model's own
     /// columns.
-    pub silent: Vec<EffectSpec>,
+    pub unidentifiable: Vec<EffectSpec>,
 }
 
 /// The result of a trace.

@@ -92,7 +92,10 @@ impl Search<'_> {
         };
         let large: Vec<usize> = (0..error.rmse.len()).filter(large).collect();
         if large.is_empty() {
-            return Ok(Remaining { silent: self.chosen.silent.clone(), ..Remaining::default() });
+            return Ok(Remaining {
+                unidentifiable: self.chosen.unidentifiable.clone(),
+                ..Remaining::default()
+            });
         }
         let positions: Vec<(f64, f64)> =
             self.input.ranges.joints.iter().map(|joint| joint.position).collect();
@@ -118,7 +121,7 @@ impl Search<'_> {
             joints: structured.iter().map(|&row| names[row].clone()).collect(),
             depends_on,
             ranking: Vec::new(),
-            silent: self.chosen.silent.clone(),
+            unidentifiable: self.chosen.unidentifiable.clone(),
         })
     }
 }
