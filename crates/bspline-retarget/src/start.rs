@@ -3,7 +3,8 @@
 use crate::Calibration;
 use crate::problem::Problem;
 use crate::solver::{Arrow, Pattern};
-use phiw_dynamics::{Lanes, Vec3};
+use phiw_dynamics::Vec3;
+use phiw_dynamics::scalar::Lanes;
 
 /// The pose of the static trial over all time, or rest, turned and moved to where the markers are.
 pub(crate) fn start(problem: &Problem<'_>, calibration: Option<&Calibration>) -> Vec<f64> {

@@ -2,11 +2,14 @@
 //! [`BodyKinematics`].
 
 use crate::backend::check_finite;
+use crate::body_kinematics::BodyJoint;
+use crate::check::check_size;
 use crate::configuration::{normalised, quaternion_product};
+use crate::motion::BodyMotion;
 use crate::motion::floating_placement;
 use crate::{
-    BackendError, BodyJoint, BodyKinematics, BodyMotion, DimensionError, DynamicsBackend, SimulationBackend,
-    Tree, Vec3, Workspace, World, check_size,
+    BackendError, BodyKinematics, DimensionError, DynamicsBackend, SimulationBackend, Tree, Vec3, Workspace,
+    World,
 };
 
 /// Largest distance of a quaternion's length from 1.

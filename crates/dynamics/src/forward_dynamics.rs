@@ -1,10 +1,11 @@
 //! Forward dynamics: the articulated body algorithm (ABA), or the mass matrix where mimic joints close loops.
 
 use crate::articulated_body::{ArticulatedBody, ArticulatedInertia};
+use crate::check::check_size;
 use crate::dense::ldl::solve_in_place;
-use crate::{
-    DimensionError, Inertia, JointType, Placement, Scalar, Spatial, Tree, Vec3, Workspace, check_size,
-};
+use crate::inertia::Inertia;
+use crate::scalar::Scalar;
+use crate::{DimensionError, JointType, Placement, Spatial, Tree, Vec3, Workspace};
 
 impl Tree {
     /// Acceleration under the generalised force: `M(q)⁻¹·(force − h(q, v))`, the inverse of

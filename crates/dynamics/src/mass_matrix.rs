@@ -1,6 +1,9 @@
 //! The mass matrix: the composite rigid body algorithm (CRBA).
 
-use crate::{DimensionError, Inertia, JointType, Scalar, Spatial, Tree, Vec3, Workspace, check_size};
+use crate::check::check_size;
+use crate::inertia::Inertia;
+use crate::scalar::Scalar;
+use crate::{DimensionError, JointType, Spatial, Tree, Vec3, Workspace};
 
 impl Tree {
     /// The mass matrix `M(q)`: dense, symmetric, row by row, `velocity_size` × `velocity_size`.

@@ -1,7 +1,8 @@
 //! Random robots and states for tests and benchmarks, the same on every machine for the same seed.
 
+use crate::inertia::Inertia;
 use crate::urdf::{UrdfError, UrdfOptions, read_urdf};
-use crate::{Inertia, JointType, Mat3, Tree, Vec3};
+use crate::{JointType, Mat3, Tree, Vec3};
 use std::fmt::Write;
 
 /// What a random robot is like.

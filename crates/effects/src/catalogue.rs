@@ -4,7 +4,8 @@
 use crate::{Constants, EffectKind, FittedEffect, JointProperty, SignalRanges};
 use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Variants};
+use phiw_identification::effect::{EffectError, EffectParameter};
+use phiw_identification::{Effect, EffectCatalogue, EffectSpec, Variants};
 
 /// Kinds of effects by name, in the order of simplicity: of two that explain alike, the earlier is preferred.
 pub struct Catalogue {

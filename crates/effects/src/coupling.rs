@@ -5,7 +5,8 @@ use crate::fitted::FittedEffect;
 use crate::friction::WIDTH;
 use crate::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Sample};
+use phiw_identification::effect::{EffectParameter, Entry, Evaluator, Sample};
+use phiw_identification::{Effect, EffectSpec};
 
 /// Torque at one joint from the motion of another, both ways or one way.
 ///

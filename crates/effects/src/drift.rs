@@ -5,7 +5,8 @@ use crate::fitted::FittedEffect;
 use crate::friction::WIDTH;
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, values};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, Sample};
+use phiw_identification::Effect;
+use phiw_identification::effect::Sample;
 
 /// Viscous and Coulomb friction times a factor that falls from one to zero: exp(−t / `time_constant`), or
 /// with the temperature where the log has one (`time_constant` zero).

@@ -4,7 +4,8 @@ use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, JointProperty, Signal};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, Needs, Sample};
+use phiw_identification::Effect;
+use phiw_identification::effect::{Needs, Sample};
 
 /// Ia·q̈.
 pub struct RotorInertia;

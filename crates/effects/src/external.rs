@@ -2,8 +2,10 @@
 
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal};
-use phiw_dynamics::{PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree};
-use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
+use phiw_dynamics::Tree;
+use phiw_dynamics::inertia::{PARAMETER_NAMES, PARAMETERS_PER_BODY};
+use phiw_identification::effect::{EffectParameter, Entry, Evaluator, Needs, Sample};
+use phiw_identification::{Effect, EffectSpec};
 use phiw_regressor::JointTorqueRegressor;
 
 /// A rigid body held at a link: mass, first moment and inertia.

@@ -1,7 +1,8 @@
 //! An effect with its fitted values, and how it is said to a user.
 
 use crate::Catalogue;
-use phiw_identification::{EffectParameter, EffectSpec};
+use phiw_identification::EffectSpec;
+use phiw_identification::effect::EffectParameter;
 
 /// An effect and the values of its parameters, as its kind's sentence needs them
 /// ([`crate::EffectKind::sentence`]).

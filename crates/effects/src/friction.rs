@@ -6,7 +6,8 @@ use crate::kind::{
     Constants, EffectKind, JointProperty, Signal, SignalRanges, around, constant, product, values,
 };
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, Needs, Sample};
+use phiw_identification::Effect;
+use phiw_identification::effect::{Needs, Sample};
 
 /// The constant of every smoothed sign: the speed over which it turns \[rad/s, m/s\].
 pub(crate) const WIDTH: &str = "sign_width";

@@ -4,7 +4,8 @@ use crate::columns::{Formula, OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, SignalRanges, around, constant, values};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, Sample};
+use phiw_identification::Effect;
+use phiw_identification::effect::Sample;
 
 /// A torque that depends on the way since the last reversal (Dahl 1968): dz = (1 − sign(q̇)·z)·dq /
 /// `presliding`.

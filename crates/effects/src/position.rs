@@ -4,7 +4,8 @@ use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant, product, values};
 use phiw_dynamics::{JointType, Tree};
-use phiw_identification::{Effect, Sample};
+use phiw_identification::Effect;
+use phiw_identification::effect::Sample;
 
 /// k·(q − q0).
 pub struct JointSpring;

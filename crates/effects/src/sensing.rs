@@ -4,7 +4,8 @@ use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant, values};
 use phiw_dynamics::{JointType, Tree};
-use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
+use phiw_identification::effect::{EffectParameter, Entry, Evaluator, Needs, Sample};
+use phiw_identification::{Effect, EffectSpec};
 use phiw_telemetry::Block;
 
 /// The torque is stamped later (positive) or earlier than the position: on one joint, or on all alike.

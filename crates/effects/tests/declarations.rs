@@ -3,7 +3,8 @@
 use phiw_dynamics::Tree;
 use phiw_dynamics::random_tree::{RandomNumbers, RandomTreeOptions, random_state, random_tree};
 use phiw_effects::{Catalogue, JointRange, SignalRanges};
-use phiw_identification::{Design, Effect, EffectCatalogue, EffectParameter, EffectSpec, ReferenceModel};
+use phiw_identification::effect::{EffectParameter, ReferenceModel};
+use phiw_identification::{Design, Effect, EffectCatalogue, EffectSpec};
 use phiw_regressor::BaseParameters;
 use phiw_telemetry::Block;
 use proptest::prelude::*;

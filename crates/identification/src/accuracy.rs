@@ -2,7 +2,7 @@
 //! paper's section 5.
 //!
 //! They need the true parameters, or motion without noise, which no robot gives. For a real one
-//! [`torque_error`](crate::torque_error) on folds held out is what can be had.
+//! [`torque_error`](crate::fit::torque_error) on folds held out is what can be had.
 
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::Factor;

@@ -1,5 +1,7 @@
 //! Whether logs and a robot fit each other, before anything is computed.
 
+pub use crate::robot_findings::robot_findings;
+
 use crate::{Design, Effect};
 use phiw_dynamics::{JointType, Tree};
 use phiw_limits::Limits;

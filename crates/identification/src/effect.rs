@@ -2,7 +2,9 @@
 //!
 //! This crate knows no effect by name. A catalogue (`phiw-effects` is one) or a user brings them.
 
-use crate::{Needs, Sample};
+pub use crate::reference::ReferenceModel;
+pub use crate::sample::{BlockReference, Needs, Sample};
+
 use phiw_dynamics::Tree;
 use phiw_telemetry::Block;
 use serde::{Deserialize, Serialize};

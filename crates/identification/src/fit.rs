@@ -1,6 +1,7 @@
 //! The fit of a design to its training folds, and its error on those held out.
 
-use crate::{Design, IdentificationError, InputError};
+use crate::checks::InputError;
+use crate::{Design, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::Factor;
 use phiw_regressor::least_squares::{GroupedFactor, weighted_least_squares};

@@ -1,9 +1,9 @@
 //! The declared model, identified: constants chosen, parameters fitted, error held out.
 
-use crate::{
-    BlockSource, Design, Effect, Fit, Fold, IdentificationError, ReferenceModel, TorqueError, accumulate,
-    fit, merge, torque_error,
-};
+use crate::accumulate::accumulate;
+use crate::fit::{Fit, TorqueError, fit, merge, torque_error};
+use crate::reference::ReferenceModel;
+use crate::{BlockSource, Design, Effect, Fold, IdentificationError};
 use phiw_dynamics::Tree;
 use phiw_limits::Limits;
 use phiw_regressor::factor::FactorBuilder;
@@ -58,7 +58,7 @@ pub fn identify(
     let Data { train, held_out, sources, rest_speeds } = data;
     let folds = train.len() + held_out.len();
     let of_variants = effects.iter().flatten().map(|effect| effect.as_ref());
-    crate::check_size_of_robot(tree, of_variants, folds, &Limits::default())?;
+    crate::checks::check_size_of_robot(tree, of_variants, folds, &Limits::default())?;
     let base = BaseParameters::of_tree(tree, BaseParametersOptions::default())?;
     let mut slots = Vec::with_capacity(effects.len());
     let mut all = Vec::new();
@@ -68,7 +68,7 @@ pub fn identify(
     }
     let mut design = Design::new(tree.clone(), base.clone(), all).with_rest_speeds(rest_speeds.clone());
     let all_folds = [train.as_slice(), held_out].concat();
-    crate::check_size_of_factors(&design, all_folds.len(), &Limits::default())?;
+    crate::checks::check_size_of_factors(&design, all_folds.len(), &Limits::default())?;
     let mut folds = accumulate(&design, &all_folds, sources)?;
     if design.needs().of_reference() {
         // Columns made of the model's torque are zero, or the URDF's, before there is a model.
@@ -120,7 +120,7 @@ fn fitted_tree(
     let inertial = determined.iter().zip(&solution.parameters).filter(|(column, _)| **column < base.count());
     inertial.for_each(|(&column, value)| parameters[column] = *value);
     let mut tree = design.tree().clone();
-    tree.set_inertial_parameters(&base.to_standard(&parameters, &crate::with_masses(design.tree()))?)?;
+    tree.set_inertial_parameters(&base.to_standard(&parameters, &crate::model::with_masses(design.tree()))?)?;
     Ok(tree)
 }
 

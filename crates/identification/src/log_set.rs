@@ -1,13 +1,12 @@
 //! The logs of a session: which train, which are held out, and how they are conditioned.
 
-use crate::{BlockSource, Fold, IdentificationError, check_excitation, check_logs};
+use crate::checks::{check_excitation, check_logs};
+use crate::{BlockSource, Fold, IdentificationError};
 use phiw_dynamics::Tree;
 use phiw_telemetry::{Block, Conditioning, ConditioningOptions, LogError, Survey, TorqueColumns};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-/// Share of each training log that is held out when no log is given for validation.
-pub const HELD_OUT_SHARE: f64 = 0.3;
 /// Stretches of time that the training logs are cut into: long against the residual's correlation, enough for
 /// a standard deviation.
 const TRAINING_FOLDS: usize = 10;
@@ -26,6 +25,9 @@ pub struct LogSet {
 }
 
 impl LogSet {
+    /// Share of each training log that is held out when no log is given for validation.
+    pub const HELD_OUT_SHARE: f64 = 0.3;
+
     /// Surveys the logs, checks them against the robot, and chooses how to condition them.
     ///
     /// # Errors
@@ -105,7 +107,7 @@ impl LogSet {
 
     /// Stretches of time to fit.
     pub fn training_folds(&self) -> Vec<Fold> {
-        let share = if self.splits_training_logs() { 1.0 - HELD_OUT_SHARE } else { 1.0 };
+        let share = if self.splits_training_logs() { 1.0 - Self::HELD_OUT_SHARE } else { 1.0 };
         cut(self.training().iter().enumerate().map(|(log, survey)| (log, survey, 0.0, share)), TRAINING_FOLDS)
     }
 
@@ -116,7 +118,7 @@ impl LogSet {
                 .training()
                 .iter()
                 .enumerate()
-                .map(|(log, survey)| (log, survey, 1.0 - HELD_OUT_SHARE, 1.0));
+                .map(|(log, survey)| (log, survey, 1.0 - Self::HELD_OUT_SHARE, 1.0));
             cut(ends, HELD_OUT_FOLDS)
         } else {
             let logs = self.surveys.iter().enumerate().skip(self.train);
@@ -131,7 +133,7 @@ impl LogSet {
         };
         match self.splits_training_logs() {
             true => {
-                format!("the last {:.0} % of {}", 1e2 * HELD_OUT_SHARE, names(self.training()))
+                format!("the last {:.0} % of {}", 1e2 * Self::HELD_OUT_SHARE, names(self.training()))
             }
             false => names(&self.surveys[self.train..]),
         }

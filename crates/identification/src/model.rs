@@ -1,11 +1,14 @@
 //! An identified model as one thing: rigid body, effects, what it was fitted to; written to `model.json` and
 //! read back.
 
-use crate::{
-    Design, Effect, EffectCatalogue, EffectError, EffectSpec, FactorRows, Fit, IdentificationError,
-    ReferenceModel, check_size_of_robot,
-};
-use phiw_dynamics::{PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree};
+use crate::checks::check_size_of_robot;
+use crate::effect::EffectError;
+use crate::factor_rows::FactorRows;
+use crate::fit::Fit;
+use crate::reference::ReferenceModel;
+use crate::{Design, Effect, EffectCatalogue, EffectSpec, IdentificationError};
+use phiw_dynamics::Tree;
+use phiw_dynamics::inertia::{PARAMETER_NAMES, PARAMETERS_PER_BODY};
 use phiw_limits::Limits;
 use phiw_regressor::BaseParameters;
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,8 @@
 //! that no log moves.
 
 use phiw_dynamics::{JointType, Tree};
-use phiw_telemetry::{CheckSettings, Finding, FindingKind, Survey, findings};
+use phiw_telemetry::Survey;
+use phiw_telemetry::findings::{CheckSettings, Finding, FindingKind, findings};
 
 /// Torque over the joint's effort limit from where on it is in another unit: drives exceed their rating
 /// threefold for a moment, mA and per mille by more.

@@ -12,7 +12,8 @@ use crate::report_json::{by_joint, report_json};
 use crate::session::Session;
 use crate::{Error, summary};
 use phiw_effects::SignalRanges;
-use phiw_identification::{Data, Identified, Model, TorqueError, identify};
+use phiw_identification::fitting::TorqueError;
+use phiw_identification::{Data, Identified, Model, identify};
 use phiw_report::ReportJson;
 use phiw_report::json::{
     DrawsJson, EffectJson, EvidenceJson, JointMap, NamedInDrawsJson, ParameterJson, ProgramJson,

@@ -144,16 +144,18 @@ fn section(
     let place = place(tracing, index);
     let info = analysis.identified.design.effects()[place].parameters();
     let named = &analysis.model.effects[place].parameters;
-    let parameter =
-        |(named, info): (&phiw_identification::NamedParameter, phiw_identification::EffectParameter)| {
-            EffectParameter {
-                joint: info.joint,
-                name: named.name.clone(),
-                value: found.spec.constants.get(&named.name).copied().unwrap_or_default() + named.value,
-                std: named.std.unwrap_or(f64::NAN),
-                unit: named.unit.clone(),
-            }
-        };
+    let parameter = |(named, info): (
+        &phiw_identification::model::NamedParameter,
+        phiw_identification::effect::EffectParameter,
+    )| {
+        EffectParameter {
+            joint: info.joint,
+            name: named.name.clone(),
+            value: found.spec.constants.get(&named.name).copied().unwrap_or_default() + named.value,
+            std: named.std.unwrap_or(f64::NAN),
+            unit: named.unit.clone(),
+        }
+    };
     EffectSection {
         kind: found.spec.kind.clone(),
         joints: found.spec.joints.clone(),

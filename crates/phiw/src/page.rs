@@ -4,7 +4,7 @@ use crate::analysis::Analysis;
 use crate::traces::Role;
 use crate::warnings::file_name;
 use crate::{date, not_identified, parameters};
-use phiw_identification::HELD_OUT_SHARE;
+use phiw_identification::LogSet;
 use phiw_report::IdentificationPage;
 use phiw_report::number::{percent, significant};
 use phiw_report::page::{Conditioning, ErrorRow, ErrorTable, InputFile, JointSection, Picture, PooledError};
@@ -130,7 +130,7 @@ pub fn errors_note(analysis: &Analysis<'_>) -> String {
     let held_out = if analysis.session.logs.splits_training_logs() {
         format!(
             "Held out: the last {} % of each training log, since no log was given to validate on.",
-            100.0 * HELD_OUT_SHARE
+            100.0 * LogSet::HELD_OUT_SHARE
         )
     } else {
         "Held out: the logs given to validate on.".to_owned()

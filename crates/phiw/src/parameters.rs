@@ -1,8 +1,8 @@
 //! The parameters as the report lists them.
 
 use crate::analysis::Analysis;
-use phiw_dynamics::Inertia;
-use phiw_identification::{BodyParameters, NamedParameter, parameter_name};
+use phiw_dynamics::inertia::Inertia;
+use phiw_identification::model::{BodyParameters, NamedParameter, parameter_name};
 use phiw_report::number::significant;
 use phiw_report::page::{BaseParameter, ParameterRow, Parameters};
 

@@ -3,7 +3,7 @@
 use crate::analysis::Analysis;
 use crate::page::conditioning_entries;
 use crate::traces::Role;
-use phiw_identification::TorqueError;
+use phiw_identification::fitting::TorqueError;
 use phiw_report::ReportJson;
 use phiw_report::json::{
     JointMap, ProgramJson, RelativeErrors, RemainingJson, SCHEMA, TorqueErrors, Verdict,

@@ -6,10 +6,10 @@ use crate::input::read_text;
 use phiw_dynamics::urdf::{Finding, UrdfOptions, read_urdf};
 use phiw_dynamics::{JointType, Tree};
 use phiw_effects::{Catalogue, SignalRanges};
-use phiw_identification::{
-    BlockSource, Data, EffectError, IdentificationError, InputError, LogFile, LogSet, Progress, Variants,
-    check_excitation, tells_of_torques,
-};
+use phiw_identification::checks::{InputError, check_excitation};
+use phiw_identification::effect::EffectError;
+use phiw_identification::fitting::tells_of_torques;
+use phiw_identification::{BlockSource, Data, IdentificationError, LogFile, LogSet, Progress, Variants};
 use phiw_limits::Limits;
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_telemetry::ConditioningOptions;

@@ -8,7 +8,9 @@ use crate::{JointTorqueRegressor, RegressorError, factor::FactorBuilder};
 use faer::linalg::solvers::ColPivQr;
 use faer::prelude::{Solve, SolveLstsq};
 use faer::{Mat, MatRef};
-use phiw_dynamics::{JointType, PARAMETERS_PER_BODY, Tree, check_size};
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
+use phiw_dynamics::{JointType, Tree};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

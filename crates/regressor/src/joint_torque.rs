@@ -1,10 +1,11 @@
 //! The joint torque regressor φ(q, q̇, q̈): τ = φ · π with π the standard parameters of all bodies (paper,
 //! equation 2).
 
-use phiw_dynamics::{
-    BodyJoint, BodyKinematics, BodyMotion, DimensionError, Lanes, PARAMETERS_PER_BODY, Scalar, Spatial,
-    check_size,
-};
+use phiw_dynamics::body_kinematics::{BodyJoint, BodyMotion};
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
+use phiw_dynamics::scalar::{Lanes, Scalar};
+use phiw_dynamics::{BodyKinematics, DimensionError, Spatial};
 
 /// Which bodies act on which torque, and the kernel that fills in their numbers.
 ///

@@ -7,7 +7,9 @@ use crate::inertial::PrincipalInertia;
 use crate::mjcf::{feet_of_corners, mjcf};
 use crate::simulation::{Simulation, Sizes};
 use crate::{Integrator, MujocoError};
-use phiw_dynamics::{BackendError, BodyJoint, DynamicsBackend, SimulationBackend, Tree, World, check_size};
+use phiw_dynamics::body_kinematics::BodyJoint;
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::{BackendError, DynamicsBackend, SimulationBackend, Tree, World};
 use std::cell::RefCell;
 
 /// Largest distance of a quaternion's length from 1.

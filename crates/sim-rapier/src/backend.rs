@@ -6,9 +6,10 @@ use crate::body_kinematics::LinkMotions;
 use crate::floor::Soles;
 use crate::probe::Probe;
 use crate::{NAME, error};
+use phiw_dynamics::body_kinematics::{BodyJoint, BodyMotion};
+use phiw_dynamics::check::check_size;
 use phiw_dynamics::{
-    AnalyticBackend, BackendError, BodyJoint, BodyKinematics, BodyMotion, DynamicsBackend, Placement,
-    SimulationBackend, Tree, World, check_size,
+    AnalyticBackend, BackendError, BodyKinematics, DynamicsBackend, Placement, SimulationBackend, Tree, World,
 };
 use rapier3d_f64::prelude::PhysicsWorld;
 

@@ -3,7 +3,8 @@
 use crate::Controller;
 use phiw_curriculum::standing::{Feet, VIRTUAL_JOINTS};
 use phiw_curriculum::{CurriculumError, Robot, RobotModel};
-use phiw_dynamics::{DimensionError, Tree, Workspace, check_size};
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::{DimensionError, Tree, Workspace};
 use phiw_effects::JointProperty;
 use phiw_plant::{ComputedTorque, Gains, TorqueModel};
 

@@ -1,7 +1,8 @@
 //! How logs are conditioned: chosen once for a session, applied to each log.
 
+use crate::clock::ClockChoice;
 use crate::cutoff::{self, BANDWIDTHS, CutoffSuggestion};
-use crate::{ClockChoice, LogError, Survey};
+use crate::{LogError, Survey};
 use std::fmt;
 
 /// What the user fixes; what is left `None` is chosen from the data.

@@ -1,6 +1,7 @@
 //! A cut-off frequency from the data's own spectrum.
 
-use crate::{Spectrum, Survey};
+use crate::Survey;
+use crate::spectrum::Spectrum;
 use std::f64::consts::PI;
 use std::fmt;
 
@@ -62,7 +63,7 @@ pub(crate) fn suggest(survey: &Survey, log: usize) -> Vec<CutoffSuggestion> {
     let longest = survey.segments.iter().map(|segment| segment.t_end - segment.t_start).fold(0.0, f64::max);
     let lowest = (LEAST_PERIODS / longest).min(highest);
     let moving = survey.joints.iter().enumerate().filter(|(_, joint)| joint.travel() > 0.0);
-    let suggestion = |(index, joint): (usize, &crate::JointSurvey)| {
+    let suggestion = |(index, joint): (usize, &crate::joint_survey::JointSurvey)| {
         let (cutoff, bound) = match survey.spectrum.windows {
             0 => (highest, Bound::SampleRate),
             _ => from_spectrum(&survey.spectrum, index),

@@ -1,7 +1,12 @@
 //! What should be known of a log before anything is fitted to it: what sensors, drives and loggers did to it,
 //! what follows, and how to mend it.
 
-use crate::{Alignment, CheckSettings, JointSurvey, SignalShape, Survey, TorqueSurvey};
+pub use crate::check_settings::CheckSettings;
+
+use crate::Survey;
+use crate::alignment::Alignment;
+use crate::joint_survey::{JointSurvey, TorqueSurvey};
+use crate::signal_shape::SignalShape;
 use std::fmt;
 
 /// What is wrong.

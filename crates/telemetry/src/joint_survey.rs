@@ -1,10 +1,14 @@
 //! What a log shows of one joint.
 
-use crate::alignment::{Alignment, AlignmentCollector};
+pub use crate::alignment::Alignment;
+pub use crate::signal_shape::{SignalShape, Still};
+pub use crate::spectrum::Spectrum;
+
+use crate::alignment::AlignmentCollector;
 use crate::check_settings::CheckSettings;
 use crate::clock::{stamped_misfit, uniform_misfit};
 use crate::histogram::Histogram;
-use crate::signal_shape::{ShapeCollector, SignalShape};
+use crate::signal_shape::ShapeCollector;
 
 /// What a log shows of one joint, over all usable rows.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,8 @@
 //! Rows of a log, one at a time.
 
 use crate::columns::{Columns, Layout, TorqueColumns};
-use crate::{GapReason, LogError, number};
+use crate::gap::GapReason;
+use crate::{LogError, number};
 use phiw_limits::Limits;
 use std::cell::RefCell;
 use std::fs::File;

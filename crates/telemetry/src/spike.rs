@@ -1,10 +1,11 @@
 //! Spikes in a log, found in the survey's pass and left out in the passes that follow.
 
+use crate::LogError;
 use crate::columns::Layout;
 use crate::gap::GapReason;
 use crate::histogram::Histogram;
 use crate::reader::{Row, Rows};
-use crate::{LogError, SpikeCount};
+use crate::segments::SpikeCount;
 use phiw_spikes::{SpikeSettings, WINDOW, bend, excursion, excursion_at_edge, spike_length};
 use std::collections::VecDeque;
 use std::path::Path;

@@ -3,10 +3,11 @@
 use crate::blocks::BlockMaker;
 use crate::clock::Resampler;
 use crate::reader::{LogReader, Rows};
+use crate::segments::Segment;
 use crate::segments::{SegmentSink, split};
 use crate::spike::WithoutSpikes;
 use crate::still::WithoutStill;
-use crate::{Block, Conditioning, LogError, LogPlan, Segment, Survey};
+use crate::{Block, Conditioning, LogError, LogPlan, Survey};
 use std::ops::ControlFlow;
 
 /// What a [`stream`] gave.

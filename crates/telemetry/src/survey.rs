@@ -1,15 +1,20 @@
 //! The first pass over a log: what is in it, without changing anything.
 
+use crate::LogError;
+use crate::check_settings::CheckSettings;
 use crate::clock::{Clock, uniform_misfit};
 use crate::columns::{Layout, TorqueColumns};
+use crate::gap::GapReason;
 use crate::histogram::Histogram;
+use crate::joint_survey::JointSurvey;
 use crate::joint_survey::{Five, JointCollector};
 use crate::reader::{LogReader, Row, Rows};
+use crate::segments::{GapCount, Segment};
 use crate::segments::{RowCounts, SegmentSink, SpikeCount, split};
+use crate::spectrum::Spectrum;
 use crate::spectrum::SpectrumEstimator;
 use crate::spike::{SpikeFinder, WithoutSpikes};
 use crate::still::{StillFinder, WithoutStill};
-use crate::{CheckSettings, GapCount, GapReason, JointSurvey, LogError, Segment, Spectrum};
 use phiw_spikes::{SpikeSettings, WINDOW};
 use std::path::{Path, PathBuf};
 

@@ -5,7 +5,8 @@
 
 use super::kinematics::{HumanScratch, Kinematics, Source};
 use super::masses::Masses;
-use phiw_dynamics::{Scalar, Spatial, Vec3};
+use phiw_dynamics::scalar::Scalar;
+use phiw_dynamics::{Spatial, Vec3};
 
 impl Kinematics {
     /// Σ weight · |p − measured|²; after [`Self::place`].

@@ -5,7 +5,8 @@ use super::pass::Batch;
 use super::samples::{LANES, Lane};
 use crate::human::{HumanBody, HumanScratch, Segment, rotate, rotate_back};
 use crate::robot::{BodyPoint, Correspondence, RobotModel, world};
-use phiw_dynamics::{Lanes, Placement, Scalar, Spatial, Tree, Vec3};
+use phiw_dynamics::scalar::{Lanes, Scalar};
+use phiw_dynamics::{Placement, Spatial, Tree, Vec3};
 
 /// A correspondence, prepared for one body and robot.
 pub(super) struct Line {

@@ -5,7 +5,8 @@ use super::{Collect, Problem};
 use crate::human::HumanScratch;
 use crate::solver::{Arrow, Pattern};
 use crate::weights::Cost;
-use phiw_dynamics::{Lanes, Placement, Scalar, Spatial, Vec3};
+use phiw_dynamics::scalar::{Lanes, Scalar};
+use phiw_dynamics::{Placement, Spatial, Vec3};
 
 /// Room for a pass.
 pub(crate) struct Scratch {

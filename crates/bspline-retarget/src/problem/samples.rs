@@ -3,7 +3,8 @@
 use crate::bspline::Basis;
 use crate::human::HumanBody;
 use crate::recording::MarkerRecording;
-use phiw_dynamics::{Lanes, Vec3};
+use phiw_dynamics::Vec3;
+use phiw_dynamics::scalar::Lanes;
 
 /// Samples that are worked on at once: what a 256-bit register holds.
 pub(super) const LANES: usize = 4;

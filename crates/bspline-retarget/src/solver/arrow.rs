@@ -13,8 +13,8 @@ use faer::linalg::cholesky::llt::factor::{
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::{matmul::matmul, triangular_solve};
 use faer::{Accum, MatMut, MatRef, Par, Spec};
-use phiw_dynamics::Lanes;
 use phiw_dynamics::dense::dot;
+use phiw_dynamics::scalar::Lanes;
 
 /// A symmetric matrix \[H, B'; B, C\]; only what lies on or below the diagonal is used.
 #[derive(Clone)]

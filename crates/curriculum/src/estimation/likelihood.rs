@@ -9,7 +9,7 @@ use crate::robot::spheres;
 use crate::{CurriculumError, RobotModel};
 use faer::prelude::Solve;
 use faer::{Mat, Side};
-use phiw_dynamics::check_size;
+use phiw_dynamics::check::check_size;
 use phiw_identification::Design;
 use phiw_regressor::least_squares::GroupedFactor;
 

@@ -2,7 +2,8 @@
 
 use super::{Feet, VIRTUAL_JOINTS};
 use crate::{CurriculumError, Motion};
-use phiw_dynamics::{Foot, JointType, Tree, Vec3, check_size};
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::{Foot, JointType, Tree, Vec3};
 use phiw_regressor::BaseParameters;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -5,7 +5,8 @@ use super::robot::{Inertial, Joint, JointKind, Link, Robot};
 use super::topology::Topology;
 use super::{Finding, UrdfError, UrdfReading};
 use super::{inertial, joint};
-use crate::{Body, Inertia, JointType, Limits, PARAMETERS_PER_BODY, Placement, Tree, Vec3};
+use crate::inertia::{Inertia, PARAMETERS_PER_BODY};
+use crate::{Body, JointType, Limits, Placement, Tree, Vec3};
 
 /// Gravity of a robot whose URDF's z axis points up \[m/s²\].
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];

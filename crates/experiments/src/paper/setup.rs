@@ -16,8 +16,9 @@ use phiw_curriculum::{
     MotionDataset, MotionLikelihood, Prior, Relaxation, Robot, RobotModel, RowsAt, ScoreTest, TraceResidual,
     UncertaintyRelaxation, WeightedLeastSquares, ZmpConstraint,
 };
-use phiw_dynamics::{PARAMETERS_PER_BODY, Workspace, World};
-use phiw_identification::{parameter_name, standard_unit};
+use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
+use phiw_dynamics::{Workspace, World};
+use phiw_identification::model::{parameter_name, standard_unit};
 use phiw_plant::{Effect, Sensors, Timing};
 use phiw_regressor::factor::Factor;
 use phiw_simulated_robot::{FeedForward, SimulatedRobot};

@@ -4,8 +4,9 @@
 use super::page::Page;
 use super::{Example, Scene};
 use phiw_bspline_retarget::bspline::Basis;
+use phiw_bspline_retarget::markers::MarkerRecording;
 use phiw_bspline_retarget::solver::{Iterations, QuasiNewton, Solution, quasi_newton, solve};
-use phiw_bspline_retarget::{Calibration, MarkerRecording, Problem, RetargetOptions, Retargeter};
+use phiw_bspline_retarget::{Calibration, Problem, RetargetOptions, Retargeter};
 use phiw_report::plot::{BoxGroup, BoxPlot, box_plot};
 use phiw_report::statistics::median;
 use rand::SeedableRng;

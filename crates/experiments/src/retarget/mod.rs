@@ -34,7 +34,8 @@ mod stick_figure;
 use crate::environment;
 use anyhow::Context;
 use phiw_bspline_retarget::human::MarkerMap;
-use phiw_bspline_retarget::{RetargetOptions, Retargeter, read_recording};
+use phiw_bspline_retarget::markers::read_recording;
+use phiw_bspline_retarget::{RetargetOptions, Retargeter};
 use phiw_dynamics::Tree;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
 use std::path::PathBuf;
@@ -167,7 +168,7 @@ impl Scene {
 /// One recording and what is needed to retarget it.
 struct Example {
     retargeter: Retargeter,
-    recording: phiw_bspline_retarget::MarkerRecording,
+    recording: phiw_bspline_retarget::markers::MarkerRecording,
     calibration: Option<phiw_bspline_retarget::Calibration>,
     name: String,
 }

@@ -5,7 +5,7 @@ use crate::paper::{RunFile, Score, balance, choices};
 use phiw_curriculum::RobotModel;
 use phiw_dynamics::Tree;
 use phiw_effects::sentence;
-use phiw_identification::TorqueError;
+use phiw_identification::fitting::TorqueError;
 use phiw_plant::{Effect, Friction};
 use phiw_report::number::{percent, significant};
 use phiw_report::page::{ExperimentPage, Picture, Section, Table};

@@ -9,11 +9,14 @@ use phiw_curriculum::{
     BayesianLeastSquares, Candidates, CurriculumError, Estimate, Estimator, Evidence, LogNoise, Prior, Robot,
     RobotModel, RowsAt, Triangle,
 };
-use phiw_dynamics::{InertialParameters, Tree};
+use phiw_dynamics::Tree;
+use phiw_dynamics::inertia::InertialParameters;
 use phiw_effects::Catalogue;
+use phiw_identification::checks::check_size_of_robot;
+use phiw_identification::fitting::{fit, merge};
+use phiw_identification::model::with_masses;
 use phiw_identification::{
-    Design, EffectCatalogue, EffectSpec, IdentificationError, Identified, Progress, check_size_of_robot, fit,
-    identify, merge, with_masses,
+    Design, EffectCatalogue, EffectSpec, IdentificationError, Identified, Progress, identify,
 };
 use phiw_limits::Limits;
 use phiw_regressor::{BaseParameters, RegressorError};

@@ -6,7 +6,7 @@
 
 use crate::RegressorError;
 use crate::factor::{Factor, FactorBuilder};
-use phiw_dynamics::{check_index, check_size};
+use phiw_dynamics::check::{check_index, check_size};
 
 /// The rows of one torque.
 #[derive(Clone, Debug)]

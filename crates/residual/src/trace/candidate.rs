@@ -162,7 +162,7 @@ mod tests {
     use super::*;
     use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
     use phiw_effects::{JointRange, OwnTorque, ParameterKind};
-    use phiw_identification::Sample;
+    use phiw_identification::effect::Sample;
 
     /// A kind of two constants, of which one belongs to the joint.
     struct Rubbing;

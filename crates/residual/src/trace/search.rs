@@ -8,9 +8,8 @@ use super::stage::{Fixed, Prior, Stage};
 use super::tracing::{FoundEffect, Tracing};
 use super::verdict::Account;
 use phiw_effects::SignalRanges;
-use phiw_identification::{
-    BlockSource, Data, Design, EffectSpec, IdentificationError, KeptBlocks, TorqueError, torque_error,
-};
+use phiw_identification::fitting::{TorqueError, torque_error};
+use phiw_identification::{BlockSource, Data, Design, EffectSpec, IdentificationError, KeptBlocks};
 use phiw_regressor::factor::Factor;
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_regressor::{BaseParameters, RegressorError};

@@ -4,9 +4,9 @@ use super::candidate::{Candidate, Candidates};
 use super::evidence::{Evidence, Refit};
 use phiw_dynamics::Tree;
 use phiw_effects::Catalogue;
-use phiw_identification::{
-    Data, Design, Effect, EffectCatalogue, EffectSpec, IdentificationError, ReferenceModel, accumulate, merge,
-};
+use phiw_identification::effect::ReferenceModel;
+use phiw_identification::fitting::{accumulate, merge};
+use phiw_identification::{Data, Design, Effect, EffectCatalogue, EffectSpec, IdentificationError};
 use phiw_regressor::factor::{Factor, FactorBuilder};
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_regressor::{BaseParameters, RegressorError};

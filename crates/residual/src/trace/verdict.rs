@@ -6,7 +6,8 @@ use super::search::{Fitted, Search, relative};
 use super::signal_shapes::neighbours;
 use super::stage::Stage;
 use super::tracing::{Ranked, Remaining, Tracing, Verdict};
-use phiw_identification::{EffectSpec, IdentificationError, Identified, TorqueError, fit, torque_error};
+use phiw_identification::fitting::{TorqueError, fit, torque_error};
+use phiw_identification::{EffectSpec, IdentificationError, Identified};
 use phiw_regressor::RegressorError;
 use phiw_regressor::least_squares::{Group, GroupedFactor};
 
