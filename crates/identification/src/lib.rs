@@ -31,8 +31,8 @@ pub use log_set::{LogFile, LogSet, Progress};
 pub use model::Model;
 pub use predict::{Prediction, predict};
 
-/// The steps of [`identify()`] by themselves: blocks to factors, factors to parameters, and their error on the
-/// folds held out.
+/// The steps of [`identify()`] by themselves: blocks to factors, factors to parameters, and their error on
+/// the folds held out.
 pub mod fitting {
     pub use crate::accumulate::accumulate;
     pub use crate::factor_rows::FactorRows;

@@ -96,7 +96,8 @@ fn closed_loop_tracking() {
     for name in ARMS {
         let tree = robot(name);
         check(name, suite::step::tracking_difference(&runge_kutta, &suite::analytic, &tree, 1e-3, 1e-9));
-        check(name, suite::step::tracking_difference(&implicit, &suite::analytic, &tree, 1e-3, 3e-3)); // order one
+        // This integrator is of order one.
+        check(name, suite::step::tracking_difference(&implicit, &suite::analytic, &tree, 1e-3, 3e-3));
     }
 }
 
