@@ -125,3 +125,9 @@ impl EffectCatalogue for Catalogue {
         Ok(kind.build(tree, &site, &spec.constants))
     }
 }
+
+/// What an effect of [`Catalogue::default`] means, with its fitted values; kinds that it does not know get
+/// their name and numbers.
+pub fn sentence(spec: &EffectSpec, parameters: &[EffectParameter], fitted: &[f64]) -> String {
+    Catalogue::default().sentence(spec, parameters, fitted)
+}

@@ -1,8 +1,8 @@
 //! A short film: person and robot as sticks, from the front and from the side.
 
 use super::page::Page;
+use super::scene::{Example, Scene};
 use super::stick_figure::{Figure, HEIGHT, View, WIDTH, label};
-use super::{Example, Scene};
 use phiw_bspline_retarget::human::{JointMode, Segment, Side};
 use phiw_bspline_retarget::markers::MarkerRecording;
 use phiw_bspline_retarget::robot::RobotModel;

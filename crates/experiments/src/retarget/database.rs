@@ -1,8 +1,8 @@
 //! Whole databases through `phiw retarget`: the seated set, two-handed motions made from it, the embedded
 //! motions.
 
-use super::Scene;
 use super::page::Page;
+use super::scene::Scene;
 use anyhow::Context;
 use phiw::arguments::{Derivatives, RetargetArguments};
 use phiw::console::Console;

@@ -1,7 +1,8 @@
 //! mink, frame by frame, on the same markers: as near to the same problem as its tasks go.
 
+use super::mjcf;
 use super::page::Page;
-use super::{Example, Scene, mjcf};
+use super::scene::{Example, Scene};
 use crate::oracle::python::Python;
 use anyhow::Context;
 use phiw_bspline_retarget::human::{Segment, Side};
