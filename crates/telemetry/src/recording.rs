@@ -1,7 +1,8 @@
 //! A log in memory: for simulators and small files.
 
 use crate::columns::{Layout, Optional};
-use crate::reader::{LogReader, Row, Rows, unusable};
+use crate::log_file::open_log;
+use crate::reader::{Row, Rows, unusable};
 use crate::stream::stream_rows;
 use crate::survey::survey_rows;
 use crate::{Block, Conditioning, LogColumns, LogError, LogWriter, Survey, TorqueColumns};
@@ -37,7 +38,7 @@ impl Recording {
     /// What [`survey`](crate::survey()) finds but for time running backwards, which is seen when the
     /// recording is used.
     pub fn from_csv(path: &Path, joints: &[String], torque: TorqueColumns) -> Result<Self, LogError> {
-        let mut reader = LogReader::open(path, joints, torque)?;
+        let mut reader = open_log(path, joints, torque)?;
         let layout = reader.layout().clone();
         let n = joints.len();
         let mut values = vec![0.0; layout.width];

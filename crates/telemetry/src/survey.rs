@@ -8,7 +8,8 @@ use crate::gap::GapReason;
 use crate::histogram::Histogram;
 use crate::joint_survey::JointSurvey;
 use crate::joint_survey::{Five, JointCollector};
-use crate::reader::{LogReader, Row, Rows};
+use crate::log_file::open_log;
+use crate::reader::{Row, Rows};
 use crate::segments::{GapCount, Segment};
 use crate::segments::{RowCounts, SegmentSink, SpikeCount, split};
 use crate::spectrum::Spectrum;
@@ -138,10 +139,10 @@ pub fn survey(
     torque: TorqueColumns,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Survey, LogError> {
-    let mut open = || LogReader::open(path, joints, torque);
+    let mut open = || open_log(path, joints, torque);
     let (mut survey, reader) = survey_rows(&mut open, joints, progress)?;
     survey.torque = torque;
-    survey.ignored_columns.clone_from(&reader.columns().ignored);
+    survey.ignored_columns = reader.ignored_columns().to_vec();
     survey.content_hash = reader.content_hash();
     Ok(survey)
 }
