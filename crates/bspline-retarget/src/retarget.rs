@@ -37,7 +37,7 @@ pub struct RetargetOptions {
     /// The largest RMS distance \[m\] of the markers from the person that is still a fit. The worst of 302
     /// recordings has 0.0098 (`cargo xtask retarget databases`).
     pub largest_marker_rms_m: f64,
-    /// What tells samples that are no measurements.
+    /// Which samples of markers are taken for no measurements.
     pub markers: MarkerSettings,
 }
 
@@ -193,7 +193,7 @@ impl Retargeter {
         Err(RetargetError::Frozen { frozen: recording.frozen(&markers, settings).len(), seen })
     }
 
-    /// What a static trial tells: the lengths and the pose that fit the markers whose place the map gives,
+    /// Calibrates on a static trial: the lengths and the pose that fit the markers whose place the map gives,
     /// and from them the places of all.
     ///
     /// # Errors
@@ -252,8 +252,8 @@ impl Retargeter {
         Ok(Basis::uniform(self.options.degree, spans + self.options.degree, 0.0, duration)?)
     }
 
-    /// The person of a recording, by the markers alone: places of markers that shift are told here, and held
-    /// from then on.
+    /// The person of a recording, by the markers alone: places of markers that shift are estimated here, and
+    /// held from then on.
     ///
     /// # Errors
     /// The map does not fit the recording, or this is too short.

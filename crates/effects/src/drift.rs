@@ -13,7 +13,7 @@ use phiw_identification::effect::Sample;
 pub struct ThermalDrift;
 
 const TIME_CONSTANT: &str = "time_constant";
-/// Temperatures enter over this span \[K\], so that the parameters are torques at a change worth speaking of.
+/// Temperatures enter over this span \[K\], so that the parameters are torques at a change that is usual.
 const TEMPERATURE_SPAN: f64 = 10.0;
 const ROOM_TEMPERATURE: f64 = 20.0;
 

@@ -87,7 +87,7 @@ pub trait EffectKind: Send + Sync {
         false
     }
 
-    /// The motion, or the signal, that would tell it from its rivals.
+    /// The motion, or the signal, that would distinguish it from its rivals.
     fn telling_motion(&self) -> &'static str;
 
     /// What it means when it was found, with its fitted values, in one sentence to a user: its name and

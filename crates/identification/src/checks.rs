@@ -295,7 +295,7 @@ fn check_size(
     if bytes > most { Err(InputError::TooLarge { joints, parameters, bytes, most }) } else { Ok(()) }
 }
 
-/// Checks that every joint moves in some log: what stands still tells nothing of itself.
+/// Checks that every joint moves in some log: the parameters of what stands still are unidentifiable.
 ///
 /// # Errors
 /// The first joint that does not.

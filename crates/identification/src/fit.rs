@@ -108,7 +108,7 @@ const LEAST_ROWS: u64 = 8;
 ///
 /// # Errors
 /// The folds are of different designs.
-pub fn tells_of_torques(folds: &[GroupedFactor]) -> Result<Vec<bool>, RegressorError> {
+pub fn torques_with_enough_rows(folds: &[GroupedFactor]) -> Result<Vec<bool>, RegressorError> {
     let all = merge(folds)?;
     Ok(all.groups().iter().map(|group| group.factor.rows() >= LEAST_ROWS).collect())
 }

@@ -36,5 +36,5 @@ pub use predict::{Prediction, predict};
 pub mod fitting {
     pub use crate::accumulate::accumulate;
     pub use crate::factor_rows::FactorRows;
-    pub use crate::fit::{Fit, TorqueError, fit, merge, tells_of_torques, torque_error};
+    pub use crate::fit::{Fit, TorqueError, fit, merge, torque_error, torques_with_enough_rows};
 }

@@ -14,7 +14,7 @@ const HELD_OUT_FOLDS: usize = 8;
 /// Speed of a joint at rest over its RMS speed.
 const REST_SHARE: f64 = 0.01;
 
-/// Tells how far a pass over the logs is: what is being done, bytes done, bytes in total.
+/// Reports how far a pass over the logs is: what is being done, bytes done, bytes in total.
 pub type Progress<'a> = &'a (dyn Fn(&str, u64, u64) + Sync);
 
 /// Logs, surveyed and with their conditioning chosen.

@@ -60,7 +60,7 @@ mod tests {
     use super::torque_unit;
 
     #[test]
-    fn torques_in_another_unit_are_told_by_the_effort_limit() {
+    fn torques_beyond_the_effort_limit_are_in_another_unit() {
         for (largest, effort, odd) in [
             (80.0, 100.0, false),
             (350.0, 100.0, false),

@@ -14,7 +14,7 @@ fn exact_bytes(design: &phiw_identification::Design) -> u64 {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
 
-    /// What the search for base parameters finds is never less than what is told from the joints alone: no
+    /// What the search for base parameters finds is never less than what the joints alone say: no
     /// robot whose factors fit is refused early.
     #[test]
     fn no_robot_is_refused_early_whose_factors_fit(seed in 0u64..100_000, joints in 1usize..9) {

@@ -227,7 +227,7 @@ fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
     };
     let program = base.phiw.clone().map(|program| ProgramJson {
         evidence: tracing.effects.iter().map(evidence).collect(),
-        cannot_be_told: explain_page::cannot_be_told(analysis, tracing),
+        unidentifiable: explain_page::unidentifiable(analysis, tracing),
         ..program
     });
     ReportJson {

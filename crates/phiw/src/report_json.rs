@@ -54,7 +54,7 @@ pub fn program(analysis: &Analysis<'_>) -> ProgramJson {
             validate: analysis.traces.relative_with_rests(Role::HeldOut),
         }),
         evidence: Vec::new(),
-        cannot_be_told: Vec::new(),
+        unidentifiable: Vec::new(),
         draws: None,
     }
 }

@@ -66,7 +66,7 @@ fn specimen(joints: usize, explain: bool) -> IdentificationPage {
             ],
             candidates: candidates(4),
             pictures: vec![scatter("joint_1", 0.4, None)],
-            cannot_be_told: Vec::new(),
+            unidentifiable: Vec::new(),
         });
     }
     page

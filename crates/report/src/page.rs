@@ -12,7 +12,7 @@ mod parameters;
 mod parts;
 
 pub use conditioning::Conditioning;
-pub use effects::{CandidateRow, CannotBeTold, EffectParameter, EffectSection, Remaining, Rival};
+pub use effects::{CandidateRow, EffectParameter, EffectSection, Remaining, Rival, UnidentifiableEffect};
 pub use errors::{ErrorRow, ErrorTable, PooledError};
 pub use experiment::{ExperimentPage, Section, Table};
 pub use joints::{JointSection, TorqueTrace};

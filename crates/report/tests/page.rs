@@ -97,7 +97,11 @@ fn page(number: f64, joints: usize, samples: usize) -> IdentificationPage {
             description: words(),
             candidates,
             pictures: vec![picture()],
-            cannot_be_told: vec![CannotBeTold { kind: word(), joints: words(), telling_motion: word() }],
+            unidentifiable: vec![UnidentifiableEffect {
+                kind: word(),
+                joints: words(),
+                telling_motion: word(),
+            }],
         }),
         joints: vec![joint; joints],
         conditioning: Conditioning { entries: vec![(word(), word())], pictures: vec![picture()] },

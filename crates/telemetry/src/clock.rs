@@ -31,19 +31,18 @@ pub enum ClockChoice {
     /// The one under which the positions are smoother; see [`Survey::clock`](crate::Survey::clock).
     #[default]
     Auto,
-    /// As told.
+    /// This one.
     Fixed(Clock),
 }
 
 /// Error of the middle of five samples against the cubic through the other four, at equal distances. White
-/// noise of deviation σ
-/// gives σ·√70/6.
-pub(crate) fn uniform_misfit(x: [f64; 5]) -> f64 {
+/// noise of deviation σ gives σ·√70/6.
+pub(crate) fn uniform_interpolation_error(x: [f64; 5]) -> f64 {
     x[2] - (4.0 * (x[1] + x[3]) - x[0] - x[4]) / 6.0
 }
 
 /// Error of the middle of five samples against the cubic through the other four, at the stamps `t`.
-pub(crate) fn stamped_misfit(t: [f64; 5], x: [f64; 5]) -> f64 {
+pub(crate) fn stamped_interpolation_error(t: [f64; 5], x: [f64; 5]) -> f64 {
     let weights = lagrange([t[0], t[1], t[3], t[4]], t[2]);
     x[2] - (weights[0] * x[0] + weights[1] * x[1] + weights[2] * x[3] + weights[3] * x[4])
 }

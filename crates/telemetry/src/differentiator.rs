@@ -57,9 +57,8 @@ impl Differentiator {
 
     /// Smooths and differentiates several signals of a segment of `length` samples.
     ///
-    /// `wanted` tells for each signal which of value, first and second derivative are asked for; `x(signal,
-    /// k)` is sample k, known within a
-    /// half-length around `range`; `put(signal, order, k, value)` gets the results for all k in `range`.
+    /// `wanted` says for each signal which of value, first and second derivative are asked for; `x(signal,
+    /// k)` is sample k, known within a half-length around `range`; `put(signal, order, k, value)` gets the results for all k in `range`.
     pub fn apply(
         &mut self,
         wanted: &[[bool; 3]],

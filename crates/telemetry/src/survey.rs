@@ -2,7 +2,7 @@
 
 use crate::LogError;
 use crate::check_settings::CheckSettings;
-use crate::clock::{Clock, uniform_misfit};
+use crate::clock::{Clock, uniform_interpolation_error};
 use crate::columns::{Layout, TorqueColumns};
 use crate::gap::GapReason;
 use crate::histogram::Histogram;
@@ -126,9 +126,8 @@ pub fn arrange_session(surveys: &mut [Survey]) {
 
 /// Reads a log once and says what is in it.
 ///
-/// Constant memory: statistics, histograms and spectra, and one small record a segment. `progress` is told
-/// the bytes done and the
-/// bytes in total now and then.
+/// Constant memory: statistics, histograms and spectra, and one small record a segment. `progress` is
+/// called with the bytes done and the bytes in total now and then.
 ///
 /// # Errors
 /// A file that can't be read, columns that are missing, cells that are not numbers, time that runs backwards,
@@ -396,7 +395,7 @@ impl SegmentSink for Collector<'_> {
         }
         if self.in_segment >= 5 {
             let t = self.five(Some(0));
-            let uneven = uniform_misfit(t).abs() > UNEVEN * self.steps.median;
+            let uneven = uniform_interpolation_error(t).abs() > UNEVEN * self.steps.median;
             for i in 0..n {
                 let torque = self.layout.torque.then_some(tau + i);
                 let (q, tau) = (self.five(Some(q + i)), self.five(torque));

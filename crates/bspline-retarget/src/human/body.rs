@@ -7,7 +7,7 @@ use crate::recording::MarkerRecording;
 use phiw_dynamics::Vec3;
 use std::collections::BTreeMap;
 
-/// Standard deviation of a length that a static trial told \[m\].
+/// Standard deviation of a length that a static trial measured \[m\].
 const CALIBRATED_SPREAD_M: f64 = 0.01;
 
 /// A marker's place on its segment \[m\], from the segment's joint or from its end.
@@ -55,8 +55,8 @@ pub struct HumanBody {
 }
 
 impl HumanBody {
-    /// The body for a recording. `calibrated` are places of markers that a static trial told, and the lengths
-    /// it told (one for each of [`SEGMENT_PARAMETERS`]); `robot_coordinates` columns are left free between
+    /// The body for a recording. `calibrated` are places of markers from a static trial, and its
+    /// lengths (one for each of [`SEGMENT_PARAMETERS`]); `robot_coordinates` columns are left free between
     /// trajectories and parameters.
     pub(crate) fn new(
         map: &MarkerMap,

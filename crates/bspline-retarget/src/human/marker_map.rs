@@ -49,7 +49,7 @@ pub enum JointMode {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SegmentMarkers {
-    /// Markers whose place on the segment a static trial tells.
+    /// Markers whose place on the segment is measured in a static trial.
     #[serde(default)]
     pub cluster: Vec<String>,
     /// Markers at a place \[m\] from the joint before the segment: x forward, y left, z up, arms hanging.

@@ -55,7 +55,7 @@ impl Gradient for Objective<'_> {
 /// spline it is the paper's method; over a basis of degree 1 with a control point for each sample it is the
 /// one without splines.
 ///
-/// `seen` is told the objective whenever it is computed: how far one is at what time.
+/// `seen` is called with the objective whenever it is computed, so that its decrease over time can be recorded.
 pub fn quasi_newton(
     problem: &Problem<'_>,
     start: Vec<f64>,

@@ -1,4 +1,4 @@
-//! A page that tells an experiment: headline, then sections of sentences, tables and pictures.
+//! The page of an experiment: headline, then sections of sentences, tables and pictures.
 
 use super::parts::Picture;
 use super::{list, shell};
