@@ -1,4 +1,4 @@
-//! What the traits promise apart from numbers: names, sizes, errors, what changes and what does not.
+//! The contract of the traits apart from numbers: names, sizes, errors, and which calls change the state.
 
 use crate::measured::{largest_difference, worse};
 use crate::{Builder, Failure, Measured};

@@ -1,4 +1,4 @@
-//! What the articulated body algorithm keeps of a body.
+//! The quantities of one body in the articulated body algorithm.
 
 use crate::inertia::Inertia;
 use crate::scalar::Scalar;

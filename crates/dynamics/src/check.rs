@@ -1,4 +1,4 @@
-//! Arguments held against the robot: sizes and indices.
+//! Checks of arguments against the robot: sizes and indices.
 
 /// An argument that does not match the robot.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

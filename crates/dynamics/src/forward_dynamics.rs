@@ -145,8 +145,8 @@ impl Tree {
         let upward = Spatial { linear: -Vec3::constant(self.gravity), angular: Vec3::zero() };
         for (index, body) in self.bodies.iter().enumerate() {
             if body.joint_type == JointType::Floating {
-                // What the base feels is its acceleration less gravity; the coordinates want the acceleration
-                // itself.
+                // The recursion computes the base's acceleration minus gravity; the coordinates need the
+                // acceleration itself.
                 let rotation = crate::motion::floating_placement(q).rotation;
                 let gravity = rotation.transpose_mul(Vec3::constant(self.gravity));
                 for axis in 0..3 {

@@ -67,7 +67,8 @@ impl Tree {
                         matrix[column * size + row] += component;
                     }
                 } else {
-                    // A mimic may be its leader's descendant: then both land on the diagonal, as they should.
+                    // A mimic joint may be its leader's descendant: both contributions are then on the
+                    // diagonal, correctly.
                     let column = ancestor.velocity_index;
                     let coupling = ancestor.motion_axis().dot(force);
                     matrix[row * size + column] += coupling;

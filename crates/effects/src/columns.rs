@@ -1,4 +1,4 @@
-//! What most effects are built of: a formula for some columns in one joint's own torque.
+//! Most effects are a formula for some columns in one joint's own torque.
 
 use crate::Constants;
 use phiw_dynamics::{JointType, Tree};

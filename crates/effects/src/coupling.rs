@@ -1,4 +1,5 @@
-//! Two joints behind one transmission: each feels the other's motion, or their sum (differential wrists).
+//! Two joints behind one transmission: the torque of each depends on the other's motion, or on their sum
+//! (differential wrists).
 
 use crate::columns::{ParameterKind, smooth_sign};
 use crate::fitted::FittedEffect;
@@ -188,7 +189,7 @@ fn distance(tree: &Tree, first: usize, second: usize) -> usize {
     };
     let (first, second) = (path(first), path(second));
     let shared = first.iter().rev().zip(second.iter().rev()).take_while(|(a, b)| a == b).count();
-    // Siblings hang on the world or on one body: count the way over it.
+    // Siblings have the world or one body as their parent: the distance between them goes over it.
     first.len() + second.len() - 2 * shared
 }
 

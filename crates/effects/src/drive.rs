@@ -1,4 +1,4 @@
-//! What the motor and its measurement add: rotor inertia, offset, gain.
+//! Effects of the motor and its torque measurement: rotor inertia, offset, gain.
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;

@@ -1,4 +1,4 @@
-//! What acts from outside or has been added: a payload, a force, gravity from another direction.
+//! External effects: a payload, a force, gravity from another direction.
 
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal};

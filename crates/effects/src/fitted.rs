@@ -1,4 +1,4 @@
-//! An effect with its fitted values, and how it is said to a user.
+//! An effect with its fitted values, and its description for a user.
 
 use phiw_identification::EffectSpec;
 use phiw_identification::effect::EffectParameter;

@@ -236,7 +236,7 @@ impl EffectKind for Stribeck {
             } else {
                 relative.powf(exponent)
             };
-            // Far above the Stribeck velocity nothing is left.
+            // Far above the Stribeck velocity the exponential is below the last digit of one.
             out[0] = if power > 40.0 { 0.0 } else { (-power).exp() * smooth_sign(velocity, width) };
         };
         let parameters = [("fs", ParameterKind::Torque, 0.0)];

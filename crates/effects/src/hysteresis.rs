@@ -59,7 +59,7 @@ impl Formula for Dahl {
 
     fn columns(&self, memory: &mut Self::Memory, sample: &Sample<'_>, columns: &mut [f64]) {
         let position = sample.q()[self.joint];
-        // Before the first move nothing is known of the past: start relaxed.
+        // The motion before the log is unknown: the hysteresis starts relaxed.
         let (state, before) = memory.unwrap_or((0.0, position));
         let way = position - before;
         // The exact solution over a monotonic step.

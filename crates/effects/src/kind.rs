@@ -1,4 +1,4 @@
-//! What the catalogue knows of a kind of effect.
+//! The description of a kind of effect in the catalogue.
 
 use crate::FittedEffect;
 use phiw_dynamics::Tree;

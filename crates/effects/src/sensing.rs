@@ -1,4 +1,4 @@
-//! What stands between the torque that acts and the numbers in the log: delay, encoder offset, saturation.
+//! Effects of measurement on the logged torque and position: delay, encoder offset, saturation.
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
@@ -223,8 +223,8 @@ impl EffectKind for ActuatorSaturation {
         "actuator_saturation"
     }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
-        // A drive that clips most of the time would be no drive: and below the torque's own level the column
-        // is the torque itself.
+        // A level that most samples exceed is implausible for a drive, and its column would be the torque
+        // itself.
         let range = ranges.joints[site[0]];
         let (lowest, highest) = (1.2 * range.torque_rms, 0.97 * range.torque_peak);
         if lowest >= highest {

@@ -27,7 +27,7 @@ pub trait BlockSource: Sync {
 /// Blocks in memory, such as those of a [`Recording`](phiw_telemetry::Recording::blocks).
 impl BlockSource for Vec<Block> {
     fn stream(&self, sink: &mut dyn FnMut(Block) -> ControlFlow<()>) -> Result<(), LogError> {
-        // A sink that has seen enough is no failure.
+        // A sink that stops early is not an error.
         let _ = self.iter().cloned().try_for_each(sink);
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! What an effect is to a fit: some columns beside the inertial ones.
+//! An effect as a fit sees it: columns beside those of the rigid body.
 //!
 //! This crate knows no effect by name. A catalogue (`phiw-effects` is one) or a user brings them.
 

@@ -49,7 +49,8 @@ pub struct TorqueError {
 pub fn fit(design: &Design, folds: &[GroupedFactor]) -> Result<Fit, IdentificationError> {
     let all = merge(folds)?;
     check_length(design, &all)?;
-    // Equal columns need not be exactly equal in the logs' digits: what is left of them decides nothing.
+    // Columns that are equal in theory differ by the logs' rounding; the difference must not determine
+    // parameters.
     let undetermined = undetermined(&all)?;
     let determined: Vec<usize> =
         (0..design.parameter_count()).filter(|parameter| !undetermined.contains(parameter)).collect();
@@ -150,8 +151,8 @@ fn jackknife(
     for factor in phiw_regressor::factor::leave_one_out(&weighted?)? {
         match factor.solve() {
             Ok(solution) => solutions.push(solution.parameters),
-            // Without this fold some parameter is not determined: all its weight lies there, and nothing can
-            // be said of its spread.
+            // Without this fold some parameter is not determined, so the folds say nothing about its standard
+            // deviation.
             Err(RegressorError::RankDeficient { .. }) => return Ok(absent),
             Err(error) => return Err(error),
         }

@@ -71,7 +71,8 @@ pub fn identify(
     crate::checks::check_size_of_factors(&design, all_folds.len(), &Limits::default())?;
     let mut folds = accumulate(&design, &all_folds, sources)?;
     if design.needs().of_reference() {
-        // Columns made of the model's torque are zero, or the URDF's, before there is a model.
+        // Columns that need the model's torque take the URDF's model in the first pass (zero without
+        // inertials).
         for _ in 0..REFERENCE_PASSES {
             let reference = ReferenceModel::new(fitted_tree(&design, &slots, &folds[..train.len()])?);
             design = design.with_reference(reference);
@@ -142,8 +143,8 @@ fn choose(
         return Ok(chosen);
     }
     let undetermined = undetermined_with(design, &chosen, factors)?;
-    // The columns of the slot that is being chosen all stay, so that its variants have equally many: which of
-    // them are determined differs.
+    // The columns of the slot that is being chosen are kept even where undetermined, so that all its variants
+    // have equally many columns.
     let columns = |chosen: &[usize], open: Option<usize>| -> Vec<usize> {
         let of_effect = |(slot, &effect): (usize, &usize)| {
             let stays = open == Some(slot);

@@ -157,7 +157,7 @@ fn cut<'a>(parts: impl Iterator<Item = (usize, &'a Survey, f64, f64)>, count: us
     let spans: Vec<(usize, f64, f64)> = parts
         .map(|(log, survey, from, to)| {
             let (first, last) = survey.time_range();
-            // A fold does not hold its end, and the last moment of a log belongs to its last fold.
+            // A fold excludes its end, so the last fold of a log ends just after the last sample.
             let last_moment =
                 if to >= 1.0 { last + 0.5 * survey.period } else { first + to * (last - first) };
             (log, first + from * (last - first), last_moment)

@@ -1,5 +1,4 @@
-//! An identified model as one thing: rigid body, effects, what it was fitted to; written to `model.json` and
-//! read back.
+//! An identified model: rigid body, effects, and the data of the fit; written to `model.json` and read back.
 
 use crate::checks::check_size_of_robot;
 use crate::effect::EffectError;

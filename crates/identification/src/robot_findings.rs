@@ -1,4 +1,4 @@
-//! What logs and robot together show, beyond what ends an identification: torques in another unit, joints
+//! Findings about logs and robot together that do not end an identification: torques in another unit, joints
 //! that no log moves.
 
 use phiw_dynamics::{JointType, Tree};
@@ -49,7 +49,7 @@ fn torque_unit(largest: f64, effort: f64, unit: &str) -> Option<String> {
         return None;
     }
     let ratio = largest / effort;
-    // A torque far below the limit says nothing: limits of 1000 are written where nobody knew one.
+    // A torque far below the limit is not reported: many URDFs have a limit of 1000 where it is unknown.
     (ratio > BEYOND_EFFORT).then(|| {
         format!("reaches {largest:.4}, {ratio:.2e} times the URDF's effort limit of {effort} {unit}")
     })

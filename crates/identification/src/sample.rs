@@ -1,4 +1,4 @@
-//! What an effect sees of one sample.
+//! The data of one sample that an effect's columns are computed from.
 
 use phiw_telemetry::Block;
 

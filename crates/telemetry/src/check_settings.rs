@@ -1,4 +1,4 @@
-//! From where on it is worth saying what a sensor, a drive or a logger did to a log.
+//! Thresholds from which on an artefact of a sensor, a drive or a logger is reported.
 
 use crate::alignment::Alignment;
 

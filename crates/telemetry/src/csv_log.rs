@@ -190,7 +190,7 @@ impl Read for Tap {
         let most = Limits::default().log_line_bytes;
         for part in buffer[..count].split_inclusive(|&byte| byte == b'\n') {
             self.line_bytes += part.len();
-            // The reader behind would hold all of the line in memory.
+            // The CSV reader holds a whole line in memory, so its length is limited here.
             if self.line_bytes > most {
                 let line = self.line;
                 return Err(io::Error::other(format!(

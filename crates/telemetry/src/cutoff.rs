@@ -24,8 +24,7 @@ pub enum Bound {
     /// A higher one would let more noise into the acceleration than it saves of the signal.
     Noise,
     /// It is eight times the frequency below which all but a thousandth of the velocity's power lies:
-    /// vibration above it is no motion of the
-    /// rigid body.
+    /// vibration above it is no motion of the rigid body.
     Motion,
     /// The sample rate allows no more.
     SampleRate,
@@ -85,9 +84,8 @@ const LEAST_PERIODS: f64 = 10.0;
 /// the least.
 ///
 /// Signal is what rises to twice the noise. The noise's density does not fall with frequency (it is a
-/// position's, differentiated twice), so it is no
-/// more than the lowest density at any higher frequency; under the signal it goes on as a white position
-/// noise would, with ω⁴.
+/// position's, differentiated twice), so it is no more than the lowest density at any higher frequency; under
+/// the signal it goes on as a white position noise would, with ω⁴.
 fn from_spectrum(spectrum: &Spectrum, joint: usize) -> (f64, Bound) {
     let density = smoothed(&spectrum.acceleration[joint]);
     let bins = density.len();

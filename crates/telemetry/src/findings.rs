@@ -222,7 +222,7 @@ impl CheckSettings {
         let shape = &torque.shape;
         let mut found = Vec::new();
         let flat_top = self.flat_top(torque, shape);
-        // What stands still at a flat top is the flat top.
+        // A signal that stands still at its limit is reported as a flat top, not twice.
         let at_top = |value: f64| flat_top.is_some() && (value == torque.max || value == torque.min);
         let still = shape.still.filter(|still| still.rows as f64 > self.still_runs * shape.mean_run);
         if let Some(still) = still.filter(|still| !at_top(still.value)) {
@@ -258,7 +258,7 @@ impl CheckSettings {
             found.push((FindingKind::FlatTop, measured));
         }
         let across = shape.smallest > (self.steps_across_zero * shape.step).max(self.dead_band * torque.rms);
-        // Where it rests at 0 for seconds there is no need of a threshold.
+        // Long stretches of zeros have been reported above; they are no dead band.
         if still.is_none_or(|still| still.value != 0.0) && shape.zero_share > self.zero_share && across {
             found.push((
                 FindingKind::TorqueDeadBand,

@@ -28,10 +28,8 @@ pub struct JointSurvey {
     /// The torque, where the log has it.
     pub torque: Option<TorqueSurvey>,
     /// Standard deviation of the position's white noise, from fourth differences: their median magnitude,
-    /// over windows where the
-    /// reading changes at all, divided by what unit white noise gives. Low-passed noise looks smaller than it
-    /// is, motion fast for
-    /// the sample rate looks like noise. In rad or m.
+    /// over windows where the reading changes at all, divided by what unit white noise gives. Low-passed
+    /// noise looks smaller than it is, motion fast for the sample rate looks like noise. In rad or m.
     pub position_noise_std: f64,
     /// What the encoder made of the position.
     pub position_shape: SignalShape,
@@ -85,8 +83,7 @@ pub struct DerivativeSurvey {
     /// Largest.
     pub max: f64,
     /// Slope of the derivative of the signal below (`q` for `qd`, `qd` for `qdd`; by central differences)
-    /// over this column, by least
-    /// squares: 1 where the two agree; NaN where there is too little motion.
+    /// over this column, by least squares: 1 where the two agree; NaN where there is too little motion.
     pub agreement: f64,
     /// Of a velocity, how it relates to the positions in detail; `None` where there is too little motion.
     pub alignment: Option<Alignment>,
@@ -121,7 +118,8 @@ pub(crate) struct JointCollector {
     /// Sum of squared slopes over four steps, their number, and the sum of 2 over the squared time that each
     /// took.
     slopes: [f64; 3],
-    /// Interpolation errors at places where the stamps are uneven: under equal distances, and under the stamps.
+    /// Interpolation errors at places where the stamps are uneven: under equal distances, and under the
+    /// stamps.
     uneven: [Histogram; 2],
     qd: Option<Derivative>,
     qdd: Option<Derivative>,

@@ -31,8 +31,7 @@ pub struct Recording {
 
 impl Recording {
     /// Reads a whole log into memory. Rows that can't be used become rows of NaN, so that gaps stay gaps; a
-    /// joint without a
-    /// signal that others have gets NaN for it.
+    /// joint without a signal that others have gets NaN for it.
     ///
     /// # Errors
     /// What [`survey`](crate::survey()) finds but for time running backwards, which is seen when the

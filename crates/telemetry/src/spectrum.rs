@@ -1,4 +1,4 @@
-//! Power spectra of the signals, estimated while they stream by.
+//! Power spectra of the signals, estimated in one pass.
 
 use crate::columns::Layout;
 use realfft::num_complex::Complex;
@@ -9,8 +9,8 @@ use std::sync::Arc;
 /// One-sided power spectral densities (Welch 1967: Hann windows, half overlapped, never across a gap).
 ///
 /// Of a position it is the density of its second difference, the acceleration: a position has so much power
-/// near 0 Hz that it
-/// would leak through the window and hide the noise at high frequency; its second difference does not.
+/// near 0 Hz that it would leak through the window and hide the noise at high frequency; its second
+/// difference does not.
 #[derive(Debug, Clone, Default)]
 pub struct Spectrum {
     /// Distance of the bins, in Hz; bin k is at k times it. The last one is half the sample rate.

@@ -36,7 +36,7 @@ impl SpikeFinder {
     /// The last samples of a segment.
     pub fn end(&mut self, place: usize, mut window: [f64; WINDOW]) {
         let most = &mut self.columns[place].1;
-        // What the samples behind them are too few for in `push`.
+        // Samples at the end of a segment, which `push` has not judged as too few samples follow them.
         for start in 1..WINDOW - 2 {
             *most = most.max(excursion(&window[start..]).0);
         }
@@ -48,7 +48,7 @@ impl SpikeFinder {
     /// not looked for.
     pub fn bounds(&self, layout: &Layout, settings: SpikeSettings) -> Option<Vec<f64>> {
         let bound = |place: usize, (usual, _): &(Histogram, f64)| match place {
-            // Stamps are judged by the segments; a temperature is no part of the fit.
+            // Stamps are checked where segments are split; a temperature is not fitted.
             0 => f64::INFINITY,
             place if layout.may_be_missing(place) => f64::INFINITY,
             _ => settings.bound(usual.total() as usize, |share| usual.quantile(share)),
@@ -191,7 +191,7 @@ impl<R: Rows> Rows for WithoutSpikes<R> {
                 self.before[0].replace(next.values)
             }
             Row::Gap { reason: GapReason::Spike, .. } => Some(next.values),
-            // The segment is over: nothing before is compared with.
+            // A new segment starts: it is not compared with samples of the one before.
             _ => {
                 self.spare.extend(self.before.iter_mut().filter_map(Option::take));
                 Some(next.values)

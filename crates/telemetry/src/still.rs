@@ -1,5 +1,4 @@
-//! Rows in which the drives had stopped logging: no torque changes though the robot moves. They say nothing,
-//! and are left out.
+//! Rows in which the drives had stopped logging: no torque changes though the robot moves. They are left out.
 
 use crate::LogError;
 use crate::check_settings::CheckSettings;

@@ -30,8 +30,8 @@ pub struct StreamSummary {
 
 /// Reads a surveyed log again and hands its conditioned samples to `sink`, block by block, in order.
 ///
-/// Memory is that of one block and the filters' reach, whatever the length of the log. `progress` is called with
-/// the bytes done and the bytes in total now and then. The sink can break off.
+/// Memory is that of one block and the filters' reach, whatever the length of the log. `progress` is called
+/// with the bytes done and the bytes in total now and then. The sink can break off.
 ///
 /// # Errors
 /// What [`survey`](crate::survey()) finds, if the file has changed since; [`LogError::Cutoff`] and

@@ -55,7 +55,8 @@ impl Gradient for Objective<'_> {
 /// spline it is the paper's method; over a basis of degree 1 with a control point for each sample it is the
 /// one without splines.
 ///
-/// `seen` is called with the objective whenever it is computed, so that its decrease over time can be recorded.
+/// `seen` is called with the objective whenever it is computed, so that its decrease over time can be
+/// recorded.
 pub fn quasi_newton(
     problem: &Problem<'_>,
     start: Vec<f64>,
