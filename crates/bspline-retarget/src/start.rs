@@ -85,8 +85,11 @@ pub(crate) fn align(problem: &Problem<'_>, variables: &mut [f64]) {
     let mut last_yaw: Option<f64> = None;
     for point in 0..points {
         let sample = problem.sample_near(point);
-        let measured = |(point, &rest)| problem.measured_at(sample, point).map(|measured| (rest, measured));
-        let seen: Vec<(Vec3<f64>, Vec3<f64>)> = rest.iter().enumerate().filter_map(measured).collect();
+        let seen: Vec<(Vec3<f64>, Vec3<f64>)> = rest
+            .iter()
+            .enumerate()
+            .filter_map(|(point, &rest)| problem.measured_at(sample, point).map(|measured| (rest, measured)))
+            .collect();
         let Some(mut pose) = pose(&seen) else { continue };
         // Yaw goes on where it was: a turn has no seam.
         if let Some(last) = last_yaw {

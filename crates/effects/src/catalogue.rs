@@ -1,7 +1,7 @@
 //! The catalogue finds kinds of effects by name, declares them for a robot, and builds them from a model's
 //! file.
 
-use crate::{Constants, EffectKind, FittedEffect, JointProperty, SignalRanges};
+use crate::{EffectKind, FittedEffect, JointProperty, SignalRanges};
 use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};
 use phiw_dynamics::Tree;
 use phiw_identification::effect::{EffectError, EffectParameter};
@@ -95,11 +95,10 @@ impl Catalogue {
         let Some(declared) = kind.declared_constants() else {
             return Err(EffectError::NotDeclarable { kind: name.to_owned() });
         };
-        let agrees = |constants: &Constants| {
-            declared.iter().all(|(name, value)| constants.get(name).is_none_or(|other| other == value))
-        };
         let variants = |site: Vec<usize>| -> Variants {
-            let scanned = kind.scan(&site, ranges).into_iter().filter(agrees);
+            let scanned = kind.scan(&site, ranges).into_iter().filter(|constants| {
+                declared.iter().all(|(name, value)| constants.get(name).is_none_or(|other| other == value))
+            });
             scanned.map(|constants| kind.build(tree, &site, &constants)).collect()
         };
         Ok(kind.sites(tree).into_iter().map(variants).collect())
@@ -109,11 +108,14 @@ impl Catalogue {
 impl EffectCatalogue for Catalogue {
     fn build(&self, spec: &EffectSpec, tree: &Tree) -> Result<Box<dyn Effect>, EffectError> {
         let kind = self.kind(&spec.kind)?;
-        let index = |joint: &String| {
-            let unknown = EffectError::UnknownJoint { kind: spec.kind.clone(), joint: joint.clone() };
-            tree.joint_index(joint).ok_or(unknown)
-        };
-        let site: Result<Vec<usize>, EffectError> = spec.joints.iter().map(index).collect();
+        let site: Result<Vec<usize>, EffectError> = spec
+            .joints
+            .iter()
+            .map(|joint| {
+                let unknown = EffectError::UnknownJoint { kind: spec.kind.clone(), joint: joint.clone() };
+                tree.joint_index(joint).ok_or(unknown)
+            })
+            .collect();
         let site = site?;
         if !kind.accepts(tree, &site) {
             return Err(EffectError::WrongJoints {

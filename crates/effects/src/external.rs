@@ -246,11 +246,12 @@ fn body_of(tree: &Tree, joint: usize) -> usize {
 
 /// Rows that a body acts on, and the place of its ten numbers in the regressor's pairs.
 fn pairs_of(regressor: &JointTorqueRegressor, body: usize) -> Vec<(usize, usize)> {
-    let place = |row: usize| {
-        let position = regressor.row_bodies(row).iter().position(|&other| other == body)?;
-        Some((row, regressor.row_range(row).start + PARAMETERS_PER_BODY * position))
-    };
-    (0..regressor.rows()).filter_map(place).collect()
+    (0..regressor.rows())
+        .filter_map(|row| {
+            let position = regressor.row_bodies(row).iter().position(|&other| other == body)?;
+            Some((row, regressor.row_range(row).start + PARAMETERS_PER_BODY * position))
+        })
+        .collect()
 }
 
 fn standard_unit(name: &str) -> &'static str {

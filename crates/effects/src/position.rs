@@ -43,8 +43,10 @@ impl EffectKind for GravityBalancer {
         "gravity_balancer"
     }
     fn sites(&self, tree: &Tree) -> Vec<Vec<usize>> {
-        let turns = |&joint: &usize| tree.joint(joint).joint_type != JointType::Prismatic;
-        (0..tree.joint_count()).filter(turns).map(|joint| vec![joint]).collect()
+        (0..tree.joint_count())
+            .filter(|&joint| tree.joint(joint).joint_type != JointType::Prismatic)
+            .map(|joint| vec![joint])
+            .collect()
     }
     fn acts_on(&self) -> &'static str {
         "one joint that turns"

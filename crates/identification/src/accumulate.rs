@@ -50,18 +50,24 @@ pub fn accumulate(
     });
     let mut merged: Vec<Vec<Option<Factor>>> = vec![vec![None; design.rows().len()]; folds.len()];
     try_for_each_batch(sources, |batch| reduce(design, &folds, batch, &mut merged))?;
-    let group = |(factor, layout): (Option<Factor>, &crate::design::RowLayout)| Group {
-        factor: factor.unwrap_or_else(|| Factor::empty(layout.range.len())),
-        parameters: layout.parameters.clone(),
-    };
     let grouped = |rows: Vec<Option<Factor>>| {
-        let groups = rows.into_iter().zip(design.rows()).map(group).collect();
+        let groups = rows
+            .into_iter()
+            .zip(design.rows())
+            .map(|(factor, layout)| Group {
+                factor: factor.unwrap_or_else(|| Factor::empty(layout.range.len())),
+                parameters: layout.parameters.clone(),
+            })
+            .collect();
         Ok(GroupedFactor::new(design.parameter_count(), groups)?)
     };
     let read: Vec<GroupedFactor> =
         merged.into_iter().map(grouped).collect::<Result<_, IdentificationError>>()?;
-    let of_fold = |fold: &Fold| folds.iter().position(|other| other == fold);
-    Ok(named.iter().filter_map(of_fold).map(|place| read[place].clone()).collect())
+    Ok(named
+        .iter()
+        .filter_map(|fold| folds.iter().position(|other| other == fold))
+        .map(|place| read[place].clone())
+        .collect())
 }
 
 fn reduce(

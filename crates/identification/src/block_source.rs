@@ -81,10 +81,11 @@ mod tests {
     use crate::IdentificationError;
 
     fn blocks(count: usize) -> Vec<Block> {
-        let block = |index: usize| {
-            Block::unfiltered(1, vec![index as f64], [vec![0.0], vec![0.0], vec![0.0]], vec![0.0])
-        };
-        (0..count).map(block).collect()
+        (0..count)
+            .map(|index| {
+                Block::unfiltered(1, vec![index as f64], [vec![0.0], vec![0.0], vec![0.0]], vec![0.0])
+            })
+            .collect()
     }
 
     /// Each pass kept an error aside and read the log to its end.

@@ -126,11 +126,14 @@ fn check_length(design: &Design, all: &GroupedFactor) -> Result<(), Identificati
 }
 
 pub(crate) fn undetermined(all: &GroupedFactor) -> Result<Vec<usize>, RegressorError> {
-    let scale = |group: &phiw_regressor::least_squares::Group| {
-        let square = group.factor.right_hand_side_sum_of_squares() / group.factor.rows().max(1) as f64;
-        if square > 0.0 { 1.0 / square.sqrt() } else { 1.0 }
-    };
-    let weights: Vec<f64> = all.groups().iter().map(scale).collect();
+    let weights: Vec<f64> = all
+        .groups()
+        .iter()
+        .map(|group| {
+            let square = group.factor.right_hand_side_sum_of_squares() / group.factor.rows().max(1) as f64;
+            if square > 0.0 { 1.0 / square.sqrt() } else { 1.0 }
+        })
+        .collect();
     Ok(all.combine(&weights)?.undetermined_columns())
 }
 
@@ -158,10 +161,11 @@ fn jackknife(
         }
     }
     let count = solutions.len() as f64;
-    let deviation = |parameter: usize| {
-        let mean = solutions.iter().map(|solution| solution[parameter]).sum::<f64>() / count;
-        let square: f64 = solutions.iter().map(|solution| (solution[parameter] - mean).powi(2)).sum();
-        (square * (count - 1.0) / count).sqrt()
-    };
-    Ok((0..determined.len()).map(deviation).collect())
+    Ok((0..determined.len())
+        .map(|parameter| {
+            let mean = solutions.iter().map(|solution| solution[parameter]).sum::<f64>() / count;
+            let square: f64 = solutions.iter().map(|solution| (solution[parameter] - mean).powi(2)).sum();
+            (square * (count - 1.0) / count).sqrt()
+        })
+        .collect())
 }

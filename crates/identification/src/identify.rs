@@ -146,13 +146,13 @@ fn choose(
     // The columns of the slot that is being chosen are kept even where undetermined, so that all its variants
     // have equally many columns.
     let columns = |chosen: &[usize], open: Option<usize>| -> Vec<usize> {
-        let of_effect = |(slot, &effect): (usize, &usize)| {
+        let base = (0..design.base().count()).filter(|parameter| !undetermined.contains(parameter));
+        base.chain(chosen.iter().enumerate().flat_map(|(slot, &effect)| {
             let stays = open == Some(slot);
             let parameters = design.effect_parameters(effect);
             parameters.filter(|parameter| stays || !undetermined.contains(parameter)).collect::<Vec<_>>()
-        };
-        let base = (0..design.base().count()).filter(|parameter| !undetermined.contains(parameter));
-        base.chain(chosen.iter().enumerate().flat_map(of_effect)).collect()
+        }))
+        .collect()
     };
     for _ in 0..SWEEPS {
         let before = chosen.clone();

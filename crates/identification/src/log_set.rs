@@ -56,12 +56,14 @@ impl LogSet {
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
         let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
-        let survey = |path: &PathBuf| {
-            let mut report = |done: u64, total: u64| progress(&reading("surveying", path), done, total);
-            phiw_telemetry::survey(path, &joints, TorqueColumns::Required, &mut report)
-        };
-        let mut surveys =
-            train.iter().chain(validate).map(survey).collect::<Result<Vec<Survey>, LogError>>()?;
+        let mut surveys = train
+            .iter()
+            .chain(validate)
+            .map(|path| {
+                let mut report = |done: u64, total: u64| progress(&reading("surveying", path), done, total);
+                phiw_telemetry::survey(path, &joints, TorqueColumns::Required, &mut report)
+            })
+            .collect::<Result<Vec<Survey>, LogError>>()?;
         phiw_telemetry::arrange_session(&mut surveys);
         let (training, held_out) = surveys.split_at(train.len());
         check_logs(tree, training, held_out)?;

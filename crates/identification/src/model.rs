@@ -249,11 +249,14 @@ impl Model {
         tree: &Tree,
         catalogue: &dyn EffectCatalogue,
     ) -> Result<ReferenceModel, IdentificationError> {
-        let with_values = |effect: &EffectParameters| {
-            let values = effect.parameters.iter().map(|parameter| parameter.value).collect();
-            Ok((catalogue.build(&effect.spec, tree)?, values))
-        };
-        let effects: Result<Vec<_>, EffectError> = self.effects.iter().map(with_values).collect();
+        let effects: Result<Vec<_>, EffectError> = self
+            .effects
+            .iter()
+            .map(|effect| {
+                let values = effect.parameters.iter().map(|parameter| parameter.value).collect();
+                Ok((catalogue.build(&effect.spec, tree)?, values))
+            })
+            .collect();
         Ok(ReferenceModel::new(self.identified_tree(tree)?).with_effects(effects?))
     }
 

@@ -192,10 +192,9 @@ impl BaseParameters {
     /// `standard` has the wrong length.
     pub fn from_standard(&self, standard: &[f64]) -> Result<Vec<f64>, RegressorError> {
         check_size("standard parameters", standard.len(), self.standard_size)?;
-        let dot = |row: usize| {
-            (0..self.standard_size).map(|column| self.map[(row, column)] * standard[column]).sum()
-        };
-        Ok((0..self.count()).map(dot).collect())
+        Ok((0..self.count())
+            .map(|row| (0..self.standard_size).map(|column| self.map[(row, column)] * standard[column]).sum())
+            .collect())
     }
 
     /// The standard parameters nearest to `reference` that have the base parameters `base` exactly.

@@ -72,11 +72,14 @@ impl JointTorqueRegressor {
             .iter()
             .enumerate()
             .map(|(body, chain)| {
-                let axis = |(position, &row): (usize, &usize)| ChainAxis {
-                    pair: row_offsets[row] + row_bodies[row].partition_point(|&other| other < body),
-                    accumulate: chain[..position].contains(&row),
-                };
-                chain.iter().enumerate().map(axis).collect()
+                chain
+                    .iter()
+                    .enumerate()
+                    .map(|(position, &row)| ChainAxis {
+                        pair: row_offsets[row] + row_bodies[row].partition_point(|&other| other < body),
+                        accumulate: chain[..position].contains(&row),
+                    })
+                    .collect()
             })
             .collect();
         JointTorqueRegressor { joints, velocity_size, row_bodies, row_offsets, chains }

@@ -185,8 +185,7 @@ impl MujocoBackend {
         start.acceleration.copy_from_slice(world.acceleration());
         self.foot_wrenches.fill([0.0; 6]);
         world.add_contact_wrenches(&self.feet_of_shapes, &mut self.foot_wrenches);
-        let sum = |axis: usize| self.foot_wrenches.iter().map(|wrench| wrench[axis]).sum();
-        let ground = std::array::from_fn(sum);
+        let ground = std::array::from_fn(|axis| self.foot_wrenches.iter().map(|wrench| wrench[axis]).sum());
         if !(solved && world.integrate(self.integrator)) {
             return Err(self.singular());
         }

@@ -104,11 +104,12 @@ fn from_spectrum(spectrum: &Spectrum, joint: usize) -> (f64, Bound) {
     let velocity: Vec<f64> = (0..bins).map(|bin| signal[bin] / (bin.max(1) as f64).powi(2)).collect();
 
     let error = |cutoff: usize| -> f64 {
-        let at = |bin: usize| {
-            let gain = gain(bin as f64 / cutoff as f64);
-            signal[bin] * (1.0 - gain).powi(2) + noise[bin] * gain * gain
-        };
-        (1..bins).map(at).sum()
+        (1..bins)
+            .map(|bin| {
+                let gain = gain(bin as f64 / cutoff as f64);
+                signal[bin] * (1.0 - gain).powi(2) + noise[bin] * gain * gain
+            })
+            .sum()
     };
     let errors: Vec<f64> = (1..bins).map(error).collect();
     let least = errors.iter().copied().fold(f64::INFINITY, f64::min);

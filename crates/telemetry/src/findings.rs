@@ -278,8 +278,8 @@ impl CheckSettings {
             let rows = shape.at_ends[side];
             rows >= self.flat_rows && rows as f64 > self.flat_share * shape.near_ends[side] as f64
         };
-        let fine = |&(end, _): &(f64, usize)| shape.step < self.torque_step * end.abs();
-        let (end, side) = ends.into_iter().filter(fine).find(flat)?;
+        let (end, side) =
+            ends.into_iter().filter(|&(end, _)| shape.step < self.torque_step * end.abs()).find(flat)?;
         Some(format!("has a flat top: {} rows at exactly {end:.4}", shape.at_ends[side]))
     }
 }

@@ -92,9 +92,10 @@ impl Recording {
     /// [`LogError::Shape`], [`LogError::Unwritable`].
     pub fn write_csv(&self, path: &Path) -> Result<(), LogError> {
         self.check()?;
-        let unwritable = |source| LogError::Unwritable { path: path.into(), source };
         let mut writer = LogWriter::create(path, &self.joints, self.columns())?;
-        self.write_rows(&mut writer).and_then(|()| writer.finish()).map_err(unwritable)?;
+        self.write_rows(&mut writer)
+            .and_then(|()| writer.finish())
+            .map_err(|source| LogError::Unwritable { path: path.into(), source })?;
         Ok(())
     }
 

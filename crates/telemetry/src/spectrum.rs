@@ -175,7 +175,9 @@ impl Welch {
         }
         let energy: f64 = self.window.iter().map(|w| w * w).sum();
         let scale = 2.0 / (rate * energy * self.windows as f64);
-        let one = |power: &[f64]| power.iter().map(|p| p * scale).collect();
-        self.power.chunks_exact(self.samples / 2 + 1).map(one).collect()
+        self.power
+            .chunks_exact(self.samples / 2 + 1)
+            .map(|power| power.iter().map(|p| p * scale).collect())
+            .collect()
     }
 }

@@ -61,11 +61,14 @@ impl SpikeFinder {
     /// The largest excursion of each column but the time, as a multiple of what is usual; 0 where that is not
     /// known.
     pub fn multiples(&self, settings: SpikeSettings) -> Vec<f64> {
-        let multiple = |(usual, most): &(Histogram, f64)| {
-            let bound = settings.bound(usual.total() as usize, |share| usual.quantile(share));
-            if bound.is_finite() && bound > 0.0 { settings.multiple * most.max(0.0) / bound } else { 0.0 }
-        };
-        self.columns.iter().skip(1).map(multiple).collect()
+        self.columns
+            .iter()
+            .skip(1)
+            .map(|(usual, most)| {
+                let bound = settings.bound(usual.total() as usize, |share| usual.quantile(share));
+                if bound.is_finite() && bound > 0.0 { settings.multiple * most.max(0.0) / bound } else { 0.0 }
+            })
+            .collect()
     }
 }
 

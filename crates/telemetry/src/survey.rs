@@ -272,13 +272,14 @@ struct Collector<'a> {
 
 impl<'a> Collector<'a> {
     fn new(layout: &Layout, steps: Steps, progress: &'a mut dyn FnMut(u64, u64)) -> Self {
-        let joint = |i: usize| {
-            let has = |places: &[Option<usize>]| places[i].is_some();
-            let optional = [&layout.qd, &layout.qdd, &layout.temp].map(|places| has(places));
-            JointCollector::new(steps.median, layout.torque, optional)
-        };
         Collector {
-            joints: (0..layout.joints).map(joint).collect(),
+            joints: (0..layout.joints)
+                .map(|i| {
+                    let has = |places: &[Option<usize>]| places[i].is_some();
+                    let optional = [&layout.qd, &layout.qdd, &layout.temp].map(|places| has(places));
+                    JointCollector::new(steps.median, layout.torque, optional)
+                })
+                .collect(),
             spectrum: SpectrumEstimator::new(layout, steps.median),
             spikes: SpikeFinder::new(layout),
             still: StillFinder::new(layout),

@@ -141,12 +141,14 @@ impl Section {
             } else {
                 255
             });
-        let padded = |text: &&str| {
-            let mut bytes = text.as_bytes()[..text.len().min(length)].to_vec();
-            bytes.resize(length, b' ');
-            bytes
-        };
-        let data: Vec<u8> = texts.iter().flat_map(padded).collect();
+        let data: Vec<u8> = texts
+            .iter()
+            .flat_map(|text| {
+                let mut bytes = text.as_bytes()[..text.len().min(length)].to_vec();
+                bytes.resize(length, b' ');
+                bytes
+            })
+            .collect();
         self.parameter(group, name, -1, &[length as u8, texts.len() as u8], &data);
     }
 

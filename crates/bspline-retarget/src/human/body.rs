@@ -200,12 +200,15 @@ impl HumanBody {
             let index = self.parameters.iter().position(|parameter| parameter.name == name);
             index.map(|index| parameters[index])
         };
-        let place = |(name, placed): (&String, &Placed)| {
-            let local = ["x", "y", "z"].map(|axis| value(format!("{name}.{axis}")));
-            let local_m = std::array::from_fn(|axis| local[axis].unwrap_or(placed.local_m[axis]));
-            (name.clone(), Placed { local_m, ..*placed })
-        };
-        self.marker_names.iter().zip(&self.placed).map(place).collect()
+        self.marker_names
+            .iter()
+            .zip(&self.placed)
+            .map(|(name, placed)| {
+                let local = ["x", "y", "z"].map(|axis| value(format!("{name}.{axis}")));
+                let local_m = std::array::from_fn(|axis| local[axis].unwrap_or(placed.local_m[axis]));
+                (name.clone(), Placed { local_m, ..*placed })
+            })
+            .collect()
     }
 
     fn slide_along(

@@ -55,10 +55,14 @@ impl HumanBody {
     /// The markers that the model has.
     pub fn markers(&self) -> Vec<BodyMarker> {
         let points = self.kinematics.points().iter().zip(&self.markers).zip(&self.marker_names);
-        let marker = |((point, &recorded), name): ((&super::kinematics::Point, &usize), &String)| {
-            BodyMarker { name: name.clone(), recorded, joint: point.node, local_m: point.local.0 }
-        };
-        points.map(marker).collect()
+        points
+            .map(|((point, &recorded), name)| BodyMarker {
+                name: name.clone(),
+                recorded,
+                joint: point.node,
+                local_m: point.local.0,
+            })
+            .collect()
     }
 
     /// Where the coordinates that move over time rest \[rad, m\].

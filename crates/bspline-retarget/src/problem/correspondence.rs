@@ -34,12 +34,15 @@ struct Axis {
 
 impl Line {
     pub fn all(body: &HumanBody, robot: &RobotModel, weight: f64) -> Vec<Self> {
-        let line = |correspondence: &Correspondence| Line {
-            weight: weight * correspondence.weight,
-            human: turns(body, correspondence),
-            robot: axes(&robot.tree, correspondence),
-        };
-        robot.correspondences.iter().map(line).collect()
+        robot
+            .correspondences
+            .iter()
+            .map(|correspondence| Line {
+                weight: weight * correspondence.weight,
+                human: turns(body, correspondence),
+                robot: axes(&robot.tree, correspondence),
+            })
+            .collect()
     }
 }
 

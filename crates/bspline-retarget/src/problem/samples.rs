@@ -72,8 +72,10 @@ impl Samples {
     /// The samples of a batch, and 1 for those that are there; what is beyond the last is the last again.
     pub fn batch(&self, batch: usize) -> ([usize; LANES], Lane) {
         let first = batch * LANES;
-        let present = |lane| if first + lane < self.count { 1.0 } else { 0.0 };
-        (std::array::from_fn(|lane| (first + lane).min(self.count - 1)), Lanes(std::array::from_fn(present)))
+        (
+            std::array::from_fn(|lane| (first + lane).min(self.count - 1)),
+            Lanes(std::array::from_fn(|lane| if first + lane < self.count { 1.0 } else { 0.0 })),
+        )
     }
 }
 

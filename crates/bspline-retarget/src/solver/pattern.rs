@@ -35,8 +35,10 @@ impl Pattern {
             }
             runs
         };
-        let row = |row| [runs(row, row..point), runs(row, point..size)];
-        Pattern { size, runs: (0..point).map(row).collect() }
+        Pattern {
+            size,
+            runs: (0..point).map(|row| [runs(row, row..point), runs(row, point..size)]).collect(),
+        }
     }
 
     /// Runs of columns in a row: coordinates, and parameters.
