@@ -16,11 +16,9 @@ pub fn generate(folder: &Path) -> anyhow::Result<Vec<String>> {
     let packages = metadata["packages"].as_array().context("cargo metadata names no packages")?;
     for package in packages.iter().filter(|package| package["publish"].is_null()) {
         let name = package["name"].as_str().context("a package without a name")?;
+        let missing = |key: &&str| package[key].is_null() || package[key] == Value::Array(vec![]);
         let keys = ["description", "license", "keywords", "categories"].into_iter();
-        problems.extend(
-            keys.filter(|key| package[key].is_null() || package[key] == Value::Array(vec![]))
-                .map(|key| format!("{name} has no {key}")),
-        );
+        problems.extend(keys.filter(missing).map(|key| format!("{name} has no {key}")));
         let manifest = Path::new(package["manifest_path"].as_str().unwrap_or_default());
         let readme = fs::read_to_string(manifest.with_file_name("README.md")).unwrap_or_default();
         match examples(&readme, &name.replace('-', "_")) {
@@ -59,9 +57,9 @@ pub fn arguments(folder: &Path) -> anyhow::Result<Vec<String>> {
 /// and what that uses or is tested with.
 fn write_crate(folder: &Path, name: &str, package: &Value, tests: &str) -> anyhow::Result<()> {
     let all = package["dependencies"].as_array().into_iter().flatten();
+    let named = |other: &&str| tests.contains(&format!("{}::", other.replace('-', "_")));
     let all = all.filter_map(|dependency| dependency["name"].as_str());
-    let dependencies: BTreeSet<&str> =
-        all.filter(|other| tests.contains(&format!("{}::", other.replace('-', "_")))).chain([name]).collect();
+    let dependencies: BTreeSet<&str> = all.filter(named).chain([name]).collect();
     let dependencies: String =
         dependencies.iter().map(|dependency| format!("{dependency}.workspace = true\n")).collect();
     let manifest = format!(
