@@ -27,6 +27,6 @@ pub use backend::{BackendError, DynamicsBackend, SimulationBackend};
 pub use body_kinematics::BodyKinematics;
 pub use check::DimensionError;
 pub use spatial::{Mat3, Placement, Spatial, Vec3};
-pub use tree::{Body, JointType, Limits, Tree};
+pub use tree::{Body, JointLimits, JointType, Tree};
 pub use workspace::Workspace;
 pub use world::{Foot, World, WorldError};

@@ -19,7 +19,7 @@ pub enum JointType {
 
 /// Limits of a joint; an absent one is infinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
+pub struct JointLimits {
     /// Lowest position \[rad, m\].
     pub lower: f64,
     /// Highest position \[rad, m\].
@@ -46,7 +46,7 @@ pub struct Body {
     /// Unit axis in the joint frame (unused for a floating base).
     pub axis: Vec3<f64>,
     /// Limits of the joint.
-    pub limits: Limits,
+    pub limits: JointLimits,
     /// Index of the body's first velocity coordinate. Mimic joints share that of their leader.
     pub velocity_index: usize,
     /// Position = `ratio` · coordinate + `offset`; 1 and 0 but for `<mimic>` joints.

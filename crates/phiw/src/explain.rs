@@ -173,7 +173,7 @@ fn verdict(verdict: trace::Verdict) -> Verdict {
 
 fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
     let joints = analysis.joints();
-    let error = |error: &TorqueError| phiw_report::json::TorqueError {
+    let error = |error: &TorqueError| phiw_report::json::TorqueErrorJson {
         rmse: by_joint(&joints, &error.rmse),
         relative: Some(error.relative),
     };

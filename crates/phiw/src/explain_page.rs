@@ -8,7 +8,7 @@ use phiw_report::IdentificationPage;
 use phiw_report::json::{UnidentifiableJson, Verdict};
 use phiw_report::number::percent;
 use phiw_report::page::{
-    CandidateRow, EffectParameter, EffectSection, Picture, Remaining, Rival, UnidentifiableEffect,
+    CandidateRow, EffectParameterRow, EffectSection, Picture, Remaining, Rival, UnidentifiableEffect,
 };
 use phiw_report::plot::{Line, ResidualAgainstSignal, residual_against_signal};
 use phiw_residual::trace::{self, FoundEffect, Ranked, Tracing};
@@ -148,7 +148,7 @@ fn section(
         &phiw_identification::model::NamedParameter,
         phiw_identification::effect::EffectParameter,
     )| {
-        EffectParameter {
+        EffectParameterRow {
             joint: info.joint,
             name: named.name.clone(),
             value: found.spec.constants.get(&named.name).copied().unwrap_or_default() + named.value,

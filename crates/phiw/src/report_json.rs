@@ -35,7 +35,7 @@ pub fn report_json(analysis: &Analysis<'_>) -> ReportJson {
 /// The errors of an analysis' model.
 pub fn errors(analysis: &Analysis<'_>) -> TorqueErrors {
     let joints = analysis.joints();
-    let error = |error: &TorqueError| phiw_report::json::TorqueError {
+    let error = |error: &TorqueError| phiw_report::json::TorqueErrorJson {
         rmse: by_joint(&joints, &error.rmse),
         relative: Some(error.relative),
     };

@@ -58,14 +58,14 @@ pub enum Verdict {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct TorqueErrors {
     /// On the motion that the model was fitted to.
-    pub train: TorqueError,
+    pub train: TorqueErrorJson,
     /// On held-out motion; empty where there is none.
-    pub validate: TorqueError,
+    pub validate: TorqueErrorJson,
 }
 
 /// Torque errors over one set of logs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct TorqueError {
+pub struct TorqueErrorJson {
     /// RMS error of each joint (N·m or N).
     #[serde(default, deserialize_with = "numbers_or_nan", skip_serializing_if = "IndexMap::is_empty")]
     pub rmse: JointMap<f64>,

@@ -37,7 +37,8 @@ fn candidates(number: f64) -> Vec<CandidateRow> {
 }
 
 fn effect(number: f64, samples: usize) -> EffectSection {
-    let parameter = EffectParameter { joint: word(), name: word(), value: number, std: number, unit: word() };
+    let parameter =
+        EffectParameterRow { joint: word(), name: word(), value: number, std: number, unit: word() };
     EffectSection {
         kind: word(),
         joints: words(),
@@ -104,8 +105,8 @@ fn page(number: f64, joints: usize, samples: usize) -> IdentificationPage {
             }],
         }),
         joints: vec![joint; joints],
-        conditioning: Conditioning { entries: vec![(word(), word())], pictures: vec![picture()] },
-        parameters: Parameters {
+        conditioning: ConditioningSection { entries: vec![(word(), word())], pictures: vec![picture()] },
+        parameters: ParametersSection {
             rows: vec![ParameterRow { name: word(), value: number, std: number, unit: word() }; 14 * joints],
             note: word(),
         },
@@ -247,7 +248,7 @@ fn long_logs_and_many_of_them_make_small_pages() {
 #[test]
 fn parameters_are_sorted_and_the_poor_ones_marked() {
     let row = |name: &str, std: f64| ParameterRow { name: name.into(), value: 2.0, std, unit: "kg".into() };
-    let parameters = Parameters {
+    let parameters = ParametersSection {
         rows: vec![row("unknown", f64::NAN), row("poor", 1.0), row("good", 0.02), row("fair", 0.4)],
         note: String::new(),
     };

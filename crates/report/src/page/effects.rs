@@ -17,7 +17,7 @@ pub struct EffectSection {
     /// The sentence that explains it.
     pub sentence: String,
     /// Its fitted parameters.
-    pub parameters: Vec<EffectParameter>,
+    pub parameters: Vec<EffectParameterRow>,
     /// Pooled held-out error before it came in (1 is all).
     pub relative_before: f64,
     /// Pooled held-out error with it in.
@@ -39,7 +39,7 @@ pub struct EffectSection {
 
 /// A fitted parameter of an effect.
 #[derive(Debug, Clone, Default)]
-pub struct EffectParameter {
+pub struct EffectParameterRow {
     /// The joint that it belongs to.
     pub joint: String,
     /// Its name.
@@ -174,7 +174,7 @@ impl Rival {
     }
 }
 
-fn parameters(parameters: &[EffectParameter]) -> Markup {
+fn parameters(parameters: &[EffectParameterRow]) -> Markup {
     html! {
         div.scroll { table.fit {
             thead { tr { th { "Joint" } th { "Parameter" } th.number { "Value" } th.number { "Std" } th { "Unit" } } }
