@@ -1,4 +1,4 @@
-//! What cameras and files do to markers: samples that are no measurements, found and taken out.
+//! Artefacts of cameras and files: samples of markers that are no measurements are found and removed.
 
 use crate::marker_settings::MarkerSettings;
 use crate::recording::MarkerRecording;

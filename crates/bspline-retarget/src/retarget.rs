@@ -1,4 +1,4 @@
-//! From a recording to a motion of the robot: calibration, start, solution, and what it is worth.
+//! From a recording to a motion of the robot: calibration, start, solution, quality.
 
 use crate::artefacts::Artefact;
 use crate::bspline::{Basis, Curve};
@@ -274,7 +274,7 @@ impl Retargeter {
         let solution = solve(&problem, first, &rough);
         let (control, parameters) =
             solution.variables.split_at(alone.trajectories() * basis.control_points());
-        // Those of the static trial alone stay known by name.
+        // Markers of the static trial alone keep their places, by name.
         let mut markers = markers.clone();
         markers.extend(alone.markers_placed(parameters));
         let map = self.firm_map();
@@ -409,7 +409,7 @@ fn mean_frame(recording: &MarkerRecording) -> MarkerRecording {
                 count += 1.0;
             }
         }
-        // No frame shows it: 0/0 is missing.
+        // A marker that no frame shows gets 0/0 = NaN, which means missing.
         sum.0.map(|coordinate| coordinate / count)
     };
     MarkerRecording {

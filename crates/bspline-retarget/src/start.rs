@@ -48,7 +48,7 @@ pub(crate) fn through(problem: &Problem<'_>, poses: &[Vec<f64>], variables: &mut
         *fit.diagonal_mut(point) += AT_POSE;
         places.push((at, values));
     }
-    // A basis has a value everywhere and the diagonal is positive: there is a factor.
+    // Basis functions are positive somewhere, so the diagonal is positive and the factor exists.
     if !fit.factor() {
         return;
     }
@@ -91,7 +91,7 @@ pub(crate) fn align(problem: &Problem<'_>, variables: &mut [f64]) {
             .filter_map(|(point, &rest)| problem.measured_at(sample, point).map(|measured| (rest, measured)))
             .collect();
         let Some(mut pose) = pose(&seen) else { continue };
-        // Yaw goes on where it was: a turn has no seam.
+        // Yaw is unwrapped: it continues from the last value.
         if let Some(last) = last_yaw {
             let turns = ((last - pose[3]) / std::f64::consts::TAU).round();
             pose[3] += turns * std::f64::consts::TAU;

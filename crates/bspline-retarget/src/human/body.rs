@@ -148,8 +148,8 @@ impl HumanBody {
         for (name, markers) in &map.segments {
             let Some(segment) = Segment::from_name(name) else { continue };
             for name in &markers.cluster {
-                // Whether it is placed is asked after it has been found: an absent marker should be called
-                // that.
+                // The place is looked up after the marker was found, so that an absent marker is reported
+                // as absent.
                 let index = map.find(name, recording)?;
                 match calibrated.get(name) {
                     Some(&placed) => self.place(name, index, placed, map, first_parameter),

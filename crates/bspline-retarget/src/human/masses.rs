@@ -1,4 +1,4 @@
-//! Unit points at the markers, in sum.
+//! Sums over unit point masses at the markers.
 
 use phiw_dynamics::scalar::Scalar;
 use phiw_dynamics::{Spatial, Vec3};

@@ -1,4 +1,4 @@
-//! The body for whoever draws it, or has kinematics of their own.
+//! The body's joints and markers as plain data, for pictures and for other kinematics.
 
 use super::body::HumanBody;
 use super::kinematics::{MotionKind, Source};

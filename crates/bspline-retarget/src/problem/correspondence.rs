@@ -129,7 +129,7 @@ impl Problem<'_> {
                 }
             }
             if target.is_none() {
-                // The vectors are seen from the pelvis: what turns them turns the pelvis back.
+                // The vectors are expressed in the pelvis' frame, so the pelvis' rotation is subtracted.
                 let force = rotate(&pelvis, &-force);
                 let mut sum = Vec3::zero();
                 for (segment, vector) in &correspondence.human {

@@ -217,7 +217,8 @@ impl pulp::NullaryFnOnce for OverWindows<'_, '_> {
         for (index, span) in windows.spans.iter().enumerate() {
             let Span { first, samples, count } = *span;
             problem.place(variables, samples, batch, row);
-            // What parameters have with parameters is the sum over all windows: only the rest is of these.
+            // The block of parameters with parameters is summed over all windows; the other blocks belong to
+            // one.
             for range in problem.pattern.ranges() {
                 batch.normal[range].fill(Lane::zero());
             }

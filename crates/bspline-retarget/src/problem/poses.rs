@@ -1,4 +1,4 @@
-//! Human and robot in one sample, for whoever looks at a solution.
+//! Poses of human and robot in one sample of a solution.
 
 use super::Problem;
 use super::correspondence::robot_vector;

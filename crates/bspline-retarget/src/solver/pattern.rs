@@ -1,4 +1,5 @@
-//! Which coordinates of a sample meet in J'J: a left hand never meets a right one.
+//! The sparsity of J'J of one sample: coordinates of the left and the right hand are not coupled, for
+//! example.
 
 use std::ops::Range;
 

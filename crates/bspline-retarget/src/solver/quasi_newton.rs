@@ -1,4 +1,4 @@
-//! The paper's way: a quasi-Newton method (limited-memory BFGS, by argmin), blind to the structure.
+//! The paper's method: quasi-Newton (limited-memory BFGS, by argmin), which does not use the structure.
 
 use super::{Solution, Stop};
 use crate::problem::Problem;
