@@ -6,11 +6,13 @@ pub mod dynamics;
 pub mod standing;
 pub mod step;
 
+mod builder;
 mod measured;
 mod motion;
 mod random_robots;
 mod robots;
 
+pub use builder::{Builder, analytic};
 pub use measured::{Failure, Measured};
 pub use random_robots::regressor_predicts_random_robots;
 pub use robots::{Robot, robots, robots_in, standing_robot};
@@ -27,21 +29,7 @@ use dynamics::{
     base_wrench_of_inverse_dynamics, forward_dynamics_undoes_inverse_dynamics,
     inverse_dynamics_is_the_analytic, regressor_predicts_inverse_dynamics,
 };
-use phiw_dynamics::{
-    AnalyticBackend, BackendError, BodyKinematics, DynamicsBackend, SimulationBackend, Tree, World,
-};
-
-/// What makes the backend under test: a robot in a world. `B` is the backend, or the trait of it that is
-/// tested.
-pub type Builder<'a, B = dyn SimulationBackend> = dyn Fn(&Tree, &World) -> Result<Box<B>, BackendError> + 'a;
-
-/// The builder of [`AnalyticBackend`], which knows no world with contacts.
-///
-/// # Errors
-/// The world does not fit the robot, or has feet or position limits.
-pub fn analytic(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
-    Ok(Box::new(AnalyticBackend::in_world(tree.clone(), world)?))
-}
+use phiw_dynamics::{BodyKinematics, DynamicsBackend, Tree};
 
 /// Everything about the robot's own equation that holds for any [`DynamicsBackend`]: the contract, then
 /// inverse and forward dynamics at `states` random states.

@@ -1,8 +1,18 @@
 //! The kinematic tree: bodies in depth-first order, each behind one joint.
 
-use crate::inertia::{InertialParameters, PARAMETERS_PER_BODY};
 use crate::scalar::Scalar;
 use crate::{Mat3, Placement, Spatial, Vec3};
+
+/// Number of standard inertial parameters of a body.
+pub const PARAMETERS_PER_BODY: usize = 10;
+
+/// Names of the standard parameters of a body, in their order (Pinocchio's): mass \[kg\], first moment
+/// \[kg·m\], and inertia about the joint frame's origin \[kg·m²\].
+pub const PARAMETER_NAMES: [&str; PARAMETERS_PER_BODY] =
+    ["m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz"];
+
+/// The standard parameters of one body, in its joint frame, in the order of [`PARAMETER_NAMES`].
+pub type InertialParameters = [f64; PARAMETERS_PER_BODY];
 
 /// How a body moves against its parent.
 #[derive(Clone, Copy, Debug, PartialEq)]
