@@ -51,7 +51,7 @@ pub fn equation_of_motion<B: DynamicsBackend + ?Sized>(
     ])
 }
 
-/// What any [`SimulationBackend`] promises about its state. Steps and floors, whose accuracy is the backend's
+/// What any [`SimulationBackend`](phiw_dynamics::SimulationBackend) promises about its state. Steps and floors, whose accuracy is the backend's
 /// own, have checks of their own.
 ///
 /// # Errors
