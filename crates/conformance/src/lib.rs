@@ -51,8 +51,8 @@ pub fn equation_of_motion<B: DynamicsBackend + ?Sized>(
     ])
 }
 
-/// What any [`SimulationBackend`](phiw_dynamics::SimulationBackend) promises about its state. Steps and floors, whose accuracy is the backend's
-/// own, have checks of their own.
+/// What any [`SimulationBackend`](phiw_dynamics::SimulationBackend) promises about its state. Steps and
+/// floors, whose accuracy is the backend's own, have checks of their own.
 ///
 /// # Errors
 /// The first check that fails.

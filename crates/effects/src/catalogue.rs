@@ -1,10 +1,10 @@
 //! The catalogue finds kinds of effects by name, declares them for a robot, and builds them from a model's
 //! file.
 
-use crate::{EffectKind, FittedEffect, JointProperty, SignalRanges};
+use crate::{EffectKind, FittedEffect, SignalRanges};
 use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};
 use phiw_dynamics::Tree;
-use phiw_identification::effect::{EffectError, EffectParameter};
+use phiw_identification::effect::{EffectError, EffectParameter, JointProperty};
 use phiw_identification::{Effect, EffectCatalogue, EffectSpec, Variants};
 
 /// Kinds of effects by name, in the order of simplicity: of two that explain alike, the earlier is preferred.
@@ -70,11 +70,6 @@ impl Catalogue {
         })
     }
 
-    /// The property of a joint that expresses an effect, if its kind is known and has one.
-    pub fn joint_property(&self, spec: &EffectSpec) -> Option<JointProperty> {
-        self.kind(&spec.kind).ok()?.joint_property()
-    }
-
     /// What an effect means, with its fitted values; a kind that is unknown here gets its name and numbers.
     pub fn sentence(&self, spec: &EffectSpec, parameters: &[EffectParameter], fitted: &[f64]) -> String {
         let found = FittedEffect::new(spec, parameters, fitted);
@@ -125,6 +120,10 @@ impl EffectCatalogue for Catalogue {
             });
         }
         Ok(kind.build(tree, &site, &spec.constants))
+    }
+
+    fn joint_property(&self, spec: &EffectSpec) -> Option<JointProperty> {
+        self.kind(&spec.kind).ok()?.joint_property()
     }
 }
 

@@ -45,7 +45,6 @@
 // wide_table.rs, are each one subject in two files: the ordinary part, and what the wide suites add to it.
 mod case;
 mod certainty;
-mod dice;
 mod draw;
 mod elasticity;
 mod family;
@@ -56,6 +55,7 @@ mod logging;
 mod mechanism;
 mod plant;
 pub(crate) mod report_file;
+mod rng;
 mod robot;
 mod run;
 mod saturation;
