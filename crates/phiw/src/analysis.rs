@@ -4,7 +4,9 @@ use crate::session::Session;
 use crate::traces::Traces;
 use crate::{Error, warnings};
 
-use phiw_identification::{Data, EffectCatalogue, EffectSpec, Identified, JointProperty, Model, merge};
+use phiw_identification::effect::JointProperty;
+use phiw_identification::fitting::merge;
+use phiw_identification::{Data, EffectCatalogue, EffectSpec, Identified, Model};
 use phiw_regressor::RegressorError;
 
 /// A residual up to this many times the noise floor is noise.

@@ -4,7 +4,8 @@ use super::probe::{self, Fit};
 use super::residuals::residual_shape;
 use super::search::Search;
 use super::tracing::{Remaining, Tracing, Verdict};
-use phiw_identification::{IdentificationError, Identified, TorqueError, accumulate, fit, torque_error};
+use phiw_identification::fitting::{TorqueError, accumulate, fit, torque_error};
+use phiw_identification::{IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
 
 impl Search<'_> {
