@@ -5,6 +5,7 @@ pub mod accuracy;
 mod accumulate;
 mod block_source;
 mod checks;
+mod consistent;
 mod design;
 mod effect;
 mod error;
@@ -23,6 +24,7 @@ mod sample;
 pub use accumulate::{Fold, accumulate};
 pub use block_source::{BlockSource, try_for_each_block};
 pub use checks::{InputError, check_excitation, check_logs, check_size_of_factors, check_size_of_robot};
+pub use consistent::{Consistent, ConsistentSettings, Known, consistent, impossible_bodies};
 pub use design::{Design, DesignScratch, RowLayout};
 pub use effect::{Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Entry, Evaluator};
 pub use error::IdentificationError;
@@ -32,7 +34,8 @@ pub use identify::{Data, Identified, Variants, identify};
 pub use kept_blocks::KeptBlocks;
 pub use log_set::{HELD_OUT_SHARE, LogFile, LogSet, Progress};
 pub use model::{
-    BodyParameters, EffectParameters, Model, NamedParameter, parameter_name, standard_unit, with_masses,
+    BodyParameters, ConsistentModel, EffectParameters, Model, NamedParameter, parameter_name, standard_unit,
+    with_masses,
 };
 pub use predict::{Prediction, predict};
 pub use reference::ReferenceModel;
