@@ -40,7 +40,7 @@ impl Default for ConsistentSettings {
         ConsistentSettings {
             weights: (-2..=6).map(|exponent| 10.0_f64.powi(exponent)).collect(),
             default_weight: 1.0,
-            folds: 5,
+            folds: 12,
             least_residual: 1e-5,
             prior: PriorSettings::default(),
             solver: Settings::default(),
@@ -135,10 +135,15 @@ fn row_weights(
     Ok(fit.residual_std.iter().zip(all.groups()).map(weight).collect())
 }
 
-/// The folds as at most `count` weighted factors, neighbours together.
+/// The folds as at most `count` weighted factors. Neighbours are kept apart: logs of one kind of motion follow one
+/// another, and what is left out should not be the only one of its kind.
 fn merged(folds: &[GroupedFactor], count: usize, weights: &[f64]) -> Result<Vec<Factor>, RegressorError> {
-    let size = folds.len().div_ceil(count.max(1)).max(1);
-    folds.chunks(size).map(|chunk| crate::merge(chunk)?.combine(weights)).collect()
+    let count = count.clamp(1, folds.len().max(1));
+    let block = |first: usize| {
+        let own: Vec<GroupedFactor> = folds.iter().skip(first).step_by(count).cloned().collect();
+        crate::merge(&own)?.combine(weights)
+    };
+    (0..count).map(block).collect()
 }
 
 /// The weight with the smallest error on folds that are left out.
