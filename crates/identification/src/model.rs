@@ -213,14 +213,9 @@ impl Model {
             return wrong(format!("body of {} has a number that is no inertial parameter", body.joint));
         }
         if let Some(consistent) = &self.consistent {
-            let names = |bodies: &[BodyParameters]| -> Vec<String> {
-                bodies.iter().map(|body| body.joint.clone()).collect()
-            };
-            let counts: Vec<usize> = self.effects.iter().map(|effect| effect.parameters.len()).collect();
-            if names(&consistent.bodies) != names(&self.bodies)
-                || consistent.effects.iter().map(Vec::len).collect::<Vec<usize>>() != counts
-            {
-                return wrong("consistent parameters are of other bodies or effects".to_owned());
+            let counts = self.effects.iter().map(|effect| effect.parameters.len());
+            if !consistent.effects.iter().map(Vec::len).eq(counts) {
+                return wrong("consistent parameters are of other effects".to_owned());
             }
             let bodies = consistent.bodies.iter().flat_map(|body| &body.inertial);
             if !bodies.chain(consistent.effects.iter().flatten()).all(usable) {
