@@ -234,8 +234,12 @@ impl Problem {
                 wrong: "not positive",
             });
         }
-        let data: f64 = 0.5 * self.target.iter().map(|value| value * value).sum::<f64>();
-        interior_point::solve(self, weight.max(LEAST_WEIGHT * data), settings)
+        interior_point::solve(self, weight.max(self.least_weight()), settings)
+    }
+
+    /// The least weight that [`Self::solve`] solves for.
+    pub fn least_weight(&self) -> f64 {
+        LEAST_WEIGHT * 0.5 * self.target.iter().map(|value| value * value).sum::<f64>()
     }
 
     /// Σ D(P ‖ P⁰) of standard parameters, ten for each body.

@@ -59,11 +59,23 @@ pub fn compare(python: &Python, workspace: &Path, problems: usize, seed: u64) ->
         python.version("clarabel")?
     );
     println!(
+        "possible: our solutions whose bodies can all exist; theirs: problems that Clarabel solves, too"
+    );
+    println!(
         "difference: of the optima, relative; below: theirs less ours at the least; gap: our certificate, relative\n"
     );
     println!(
-        "{:<18} {:>6} {:>9} {:>11} {:>9} {:>9} {:>10} {:>8} {:>11}",
-        "robot", "bodies", "possible", "difference", "below", "gap", "parameters", "steps", "ms, median"
+        "{:<18} {:>6} {:>9} {:>9} {:>11} {:>9} {:>9} {:>10} {:>8} {:>11}",
+        "robot",
+        "bodies",
+        "possible",
+        "theirs",
+        "difference",
+        "below",
+        "gap",
+        "parameters",
+        "steps",
+        "ms, median"
     );
     let mut agrees = true;
     for robot in &robots {
@@ -83,31 +95,35 @@ fn row(python: &Python, folder: &Path, robot: &Case, count: usize, seed: u64) ->
     let answers: Vec<Answer> = serde_json::from_str(&std::fs::read_to_string(folder.join("optima.json"))?)?;
 
     let (mut difference, mut below, mut gap, mut apart) = (0.0_f64, f64::INFINITY, 0.0_f64, 0.0_f64);
-    let (mut possible, mut certified, mut steps) = (0, true, 0);
+    let (mut possible, mut certified, mut steps, mut answered) = (0, true, 0, 0);
     let mut times: Vec<Duration> = Vec::new();
     for (request, answer) in requests.iter().zip(&answers) {
-        anyhow::ensure!(answer.status.starts_with("optimal"), "CVXPY: {} on {}", answer.status, robot.robot);
         let begin = Instant::now();
         let ours = problem(request)?.solve(request.weight, &Settings::default())?;
         times.push(begin.elapsed());
         let unit = 1.0 + ours.objective.abs();
-        difference = difference.max((ours.objective - answer.objective).abs() / unit);
-        below = below.min((answer.objective - ours.objective) / unit);
         gap = gap.max(ours.gap / unit);
         certified &= ours.certified;
         steps = steps.max(ours.iterations);
         let bodies = ours.standard.as_chunks::<PARAMETERS_PER_BODY>().0;
         let all = bodies.iter().all(|body| PseudoInertia::of_parameters(body).is_possible());
         possible += usize::from(all && ours.extras.iter().all(|value| *value >= 0.0));
+        if answer.status != "optimal" {
+            continue;
+        }
+        answered += 1;
+        difference = difference.max((ours.objective - answer.objective).abs() / unit);
+        below = below.min((answer.objective - ours.objective) / unit);
         apart = apart.max(largest_difference(&[ours.standard, ours.extras].concat(), &answer.parameters));
     }
     times.sort();
     let median = times.get(times.len() / 2).map_or(0.0, |time| 1e3 * time.as_secs_f64());
     println!(
-        "{:<18} {:>6} {:>9} {:>11.1e} {:>9.1e} {:>9.1e} {:>10.1e} {:>8} {:>11.2}",
+        "{:<18} {:>6} {:>9} {:>9} {:>11.1e} {:>9.1e} {:>9.1e} {:>10.1e} {:>8} {:>11.2}",
         robot.robot,
         requests.first().map_or(0, |request| request.priors.len() / PARAMETERS_PER_BODY),
         format!("{possible}/{count}"),
+        format!("{answered}/{count}"),
         difference,
         below,
         gap,
@@ -115,13 +131,13 @@ fn row(python: &Python, folder: &Path, robot: &Case, count: usize, seed: u64) ->
         steps,
         median
     );
-    Ok(difference < TOLERANCE && certified && possible == count)
+    Ok(difference < TOLERANCE && certified && possible == count && 2 * answered > count)
 }
 
 /// Largest difference of a parameter, over the largest of its body or of the extras.
 fn largest_difference(ours: &[f64], theirs: &[f64]) -> f64 {
     let chunk = |(ours, theirs): (&[f64], &[f64])| {
-        let largest = theirs.iter().fold(f64::MIN_POSITIVE, |largest, value| largest.max(value.abs()));
+        let largest = theirs.iter().fold(1e-6_f64, |largest, value| largest.max(value.abs()));
         let apart = ours.iter().zip(theirs).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         apart / largest
     };
@@ -179,11 +195,13 @@ fn request(robot: &Case, random: &mut RandomNumbers) -> anyhow::Result<Request> 
     for row in 0..=columns {
         matrix.extend((0..columns).map(|column| factor.entry(row, column)));
     }
-    Ok(Request {
+    let mut request = Request {
         priors,
         extras,
         weight: 10.0_f64.powf(random.uniform(-1.0, 3.0)),
         matrix,
         target: (0..=columns).map(|row| factor.entry(row, columns)).collect(),
-    })
+    };
+    request.weight = request.weight.max(problem(&request)?.least_weight());
+    Ok(request)
 }
