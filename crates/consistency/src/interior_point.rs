@@ -12,6 +12,7 @@ use crate::newton::{Equations, Frame, coordinates, dot, matrix_of, ridge};
 use crate::problem::Problem;
 use crate::pseudo_inertia::parameters_of;
 use crate::small_matrix::Square;
+use crate::start::{extras_start, scale_start};
 use crate::{ConsistencyError, PARAMETERS_PER_BODY, PseudoInertia};
 use faer::Mat;
 
@@ -63,8 +64,6 @@ const MOST_CENTRING: f64 = 0.9;
 /// Share of the way to the boundary that a step goes at least, and 0.09 more where the first direction goes all the
 /// way (Toh, Todd & Tütüncü, "SDPT3", 1999).
 const STAY_INSIDE: f64 = 0.9;
-/// Bodies start at most these factors away from their priors. Small ones would have far to go back.
-const FURTHEST_START: (f64, f64) = (0.1, 1e3);
 /// A step shorter than this gives way to one back to the central path.
 const JAMMED: f64 = 0.3;
 /// Certificates that are no better than half the last one, after which rounding has the say.
@@ -114,19 +113,18 @@ pub(crate) fn solve(
     weight: f64,
     settings: &Settings,
 ) -> Result<Solution, ConsistencyError> {
-    let mut best: Option<Solution> = None;
-    for care in &CARE {
-        let found = follow(problem, weight, settings, care)?;
-        let is_better = best.as_ref().is_none_or(|best| found.gap < best.gap);
-        let is_certified = found.certified;
-        if is_better {
-            best = Some(found);
-        }
-        if is_certified {
+    let [fast, careful @ ..] = &CARE;
+    let mut best = follow(problem, weight, settings, fast)?;
+    for care in careful {
+        if best.certified {
             break;
         }
+        let found = follow(problem, weight, settings, care)?;
+        if found.gap < best.gap {
+            best = found;
+        }
     }
-    best.ok_or(ConsistencyError::Empty { constraint: 0, why: "the search did not begin" })
+    Ok(best)
 }
 
 /// Follows the central path to the optimum.
@@ -417,44 +415,4 @@ impl Blocks {
             .flat_map(|(scaled, (primal, dual))| [scaled.longest(primal), scaled.longest(dual)])
             .fold(1.0, |shortest: f64, length| shortest.min(inside * length))
     }
-}
-
-/// The factor by which all bodies fit the data best, as far as it is one: robots without a mass have priors that are
-/// far too light.
-fn scale_start(problem: &Problem, x: &[f64]) -> f64 {
-    let product = &problem.matrix * Mat::from_fn(x.len(), 1, |row, _| x[row]);
-    let along: f64 = problem.target.iter().enumerate().map(|(row, target)| product[(row, 0)] * target).sum();
-    let scale = along / product.squared_norm_l2();
-    if scale.is_finite() { scale.clamp(FURTHEST_START.0, FURTHEST_START.1) } else { 1.0 }
-}
-
-/// Extras strictly within their bounds: far enough inside for their own column to matter.
-fn extras_start(problem: &Problem) -> Vec<f64> {
-    let first = problem.unknowns() - problem.extras;
-    let size = dot(&problem.target, &problem.target).sqrt();
-    let of_extra = |extra: usize| {
-        let unknown = first + extra;
-        let norm = problem.gram[(unknown, unknown)].sqrt();
-        let reach = if norm > 0.0 && size > 0.0 { 0.1 * size / norm } else { 1.0 };
-        let (mut lower, mut upper) = (f64::NEG_INFINITY, f64::INFINITY);
-        for bound in problem.constraints.iter().filter(|known| known.is_bound && known.terms[0].0 == unknown)
-        {
-            match (bound.terms[0].1.at(0, 0), bound.offset.at(0, 0)) {
-                (factor, offset) if factor > 0.0 => lower = lower.max(-offset),
-                (_, offset) => upper = upper.min(offset),
-            }
-        }
-        let is_on_diagonal = problem.constraints.iter().filter(|known| !known.is_bound).any(|known| {
-            let matrix = known.terms.iter().find(|(own, _)| *own == unknown).map(|(_, matrix)| matrix);
-            matrix.is_some_and(|matrix| (0..matrix.size).any(|row| matrix.at(row, row) > 0.0))
-        });
-        match (lower.is_finite(), upper.is_finite()) {
-            (true, true) => 0.5 * (lower + upper),
-            (true, false) => lower + reach,
-            (false, true) => upper - reach,
-            (false, false) if is_on_diagonal => reach,
-            (false, false) => 0.0,
-        }
-    };
-    (0..problem.extras).map(of_extra).collect()
 }

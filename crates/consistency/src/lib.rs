@@ -33,6 +33,7 @@ mod prior;
 mod problem;
 mod pseudo_inertia;
 mod small_matrix;
+mod start;
 
 pub use error::ConsistencyError;
 pub use interior_point::{Settings, Solution};

@@ -141,3 +141,27 @@ fn coupled_friction_takes_energy_in_every_motion() {
     assert_near("friction", &[first, second, cross], &[2.0, 2.0, 2.0], 1e-4);
     assert!(first * second >= cross * cross);
 }
+
+#[test]
+#[ignore]
+fn dump() {
+    let mut all = Vec::new();
+    for (seed, bodies, extras, rows, scale, weight, sign) in CASES {
+        let mut random = Random::new(seed);
+        let (priors, mut truth) = robot(&mut random, bodies, extras);
+        truth.iter_mut().for_each(|value| *value *= sign);
+        let (matrix, target) = data(&mut random, &truth, rows, scale);
+        all.push(format!("{{\"priors\":{:?},\"extras\":{extras},\"weight\":{weight:?},\"matrix\":{matrix:?},\"target\":{target:?}}}", priors.as_flattened()));
+    }
+    std::fs::write("/tmp/cons/problems.json", format!("[{}]", all.join(","))).unwrap();
+}
+
+/// Seed, bodies, extras, rows, scale of the data, weight of the prior, sign of the truth.
+const CASES: [(u64, usize, usize, usize, f64, f64, f64); 6] = [
+    (1, 1, 0, 6, 10.0, 1.0, 1.0),
+    (2, 2, 2, 40, 10.0, 1.0, 1.0),
+    (3, 3, 1, 10, 1.0, 0.1, 1.0),
+    (4, 2, 3, 60, 3.0, 10.0, -1.0),
+    (5, 4, 4, 30, 30.0, 100.0, 1.0),
+    (6, 1, 1, 0, 1.0, 5.0, 1.0),
+];

@@ -17,4 +17,4 @@ mod sensing;
 pub use catalogue::Catalogue;
 pub use columns::{Formula, OwnTorque, ParameterKind, smooth_sign};
 pub use fitted::{FittedEffect, sentence};
-pub use kind::{Constants, EffectKind, JointProperty, JointRange, Signal, SignalRanges};
+pub use kind::{Constants, EffectKind, JointRange, Signal, SignalRanges};

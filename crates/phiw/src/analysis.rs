@@ -3,9 +3,9 @@
 use crate::session::Session;
 use crate::traces::Traces;
 use crate::{Error, possible_bodies, warnings};
-use phiw_effects::JointProperty;
 use phiw_identification::{
-    Consistent, ConsistentSettings, Data, EffectSpec, Identified, Model, consistent, merge,
+    Consistent, ConsistentSettings, Data, EffectCatalogue, EffectSpec, Identified, JointProperty, Model,
+    consistent, merge,
 };
 use phiw_regressor::RegressorError;
 

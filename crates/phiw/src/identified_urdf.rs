@@ -3,8 +3,8 @@
 use crate::Error;
 use crate::analysis::Analysis;
 use phiw_dynamics::urdf::{JointFriction, write_identified_urdf};
-use phiw_effects::JointProperty;
-use phiw_identification::EffectSpec;
+
+use phiw_identification::{EffectCatalogue, EffectSpec, JointProperty};
 
 /// Properties of a joint that URDF's `<dynamics>` has: damping and friction.
 const EXPRESSED: [JointProperty; 2] = [JointProperty::Damping, JointProperty::Friction];
