@@ -142,26 +142,30 @@ fn coupled_friction_takes_energy_in_every_motion() {
     assert!(first * second >= cross * cross);
 }
 
-#[test]
-#[ignore]
-fn dump() {
-    let mut all = Vec::new();
-    for (seed, bodies, extras, rows, scale, weight, sign) in CASES {
-        let mut random = Random::new(seed);
-        let (priors, mut truth) = robot(&mut random, bodies, extras);
-        truth.iter_mut().for_each(|value| *value *= sign);
-        let (matrix, target) = data(&mut random, &truth, rows, scale);
-        all.push(format!("{{\"priors\":{:?},\"extras\":{extras},\"weight\":{weight:?},\"matrix\":{matrix:?},\"target\":{target:?}}}", priors.as_flattened()));
-    }
-    std::fs::write("/tmp/cons/problems.json", format!("[{}]", all.join(","))).unwrap();
-}
-
-/// Seed, bodies, extras, rows, scale of the data, weight of the prior, sign of the truth.
-const CASES: [(u64, usize, usize, usize, f64, f64, f64); 6] = [
-    (1, 1, 0, 6, 10.0, 1.0, 1.0),
-    (2, 2, 2, 40, 10.0, 1.0, 1.0),
-    (3, 3, 1, 10, 1.0, 0.1, 1.0),
-    (4, 2, 3, 60, 3.0, 10.0, -1.0),
-    (5, 4, 4, 30, 30.0, 100.0, 1.0),
-    (6, 1, 1, 0, 1.0, 5.0, 1.0),
+/// What `crates/experiments/src/oracle/cvxpy_oracle.py` (CVXPY 1.9.3, Clarabel 0.11.1) finds on the same
+/// problems: seed, bodies, extras, rows, scale of the data, weight of the prior, sign of the truth; the optimum
+/// and the first body's mass there.
+const FOUND_BY_CVXPY: [([f64; 7], f64, f64); 6] = [
+    ([1.0, 1.0, 0.0, 6.0, 10.0, 1.0, 1.0], 5.522586569766255, 9.749800324287815),
+    ([2.0, 2.0, 2.0, 40.0, 10.0, 1.0, 1.0], 18.059053063933952, 17.303265257558323),
+    ([3.0, 3.0, 1.0, 10.0, 1.0, 0.1, 1.0], 0.6913093276863043, 13.765314640953818),
+    ([4.0, 2.0, 3.0, 60.0, 3.0, 10.0, -1.0], 27293.09849726616, 0.0040510380650955885),
+    ([5.0, 4.0, 4.0, 30.0, 30.0, 100.0, 1.0], 2611.920891341872, 3.795018383100314),
+    ([6.0, 1.0, 1.0, 0.0, 1.0, 5.0, 1.0], 0.0, 8.814621639363358),
 ];
+
+#[test]
+fn another_solver_finds_the_same_optimum() {
+    for ([seed, bodies, extras, rows, scale, weight, sign], optimum, mass) in FOUND_BY_CVXPY {
+        let mut random = Random::new(seed as u64);
+        let extras = extras as usize;
+        let (priors, mut truth) = robot(&mut random, bodies as usize, extras);
+        truth.iter_mut().for_each(|value| *value *= sign);
+        let data = data(&mut random, &truth, rows as usize, scale);
+        let solution = problem(&priors, extras, &data).solve(weight, &Settings::default()).unwrap();
+        assert!(solution.certified, "{seed}: {solution:?}");
+        let apart = (solution.objective - optimum).abs();
+        assert!(apart < 1e-8 * (1.0 + optimum), "{seed}: {} or {optimum}", solution.objective);
+        assert_near(&format!("mass of problem {seed}"), &solution.standard[..1], &[mass], 1e-5);
+    }
+}

@@ -79,7 +79,7 @@ def solve(problem):
     for scale in [1.0 / max(1.0, weight), whole**-0.5, 1.0 / whole, 1e-2 / weight, 1e-4 / weight]:
         program = cp.Problem(cp.Minimize(scale * (misfit + weight * divergence)), constraints)
         for tolerance in [1e-11, 1e-9, 1e-8]:
-            options = dict(tol_gap_abs=tolerance, tol_gap_rel=tolerance, tol_feas=tolerance, max_iter=500)
+            options = dict(tol_gap_abs=1e-18, tol_gap_rel=tolerance, tol_feas=tolerance, max_iter=500)
             try:
                 program.solve(solver=cp.CLARABEL, **options)
             except cp.error.SolverError:
