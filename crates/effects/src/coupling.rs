@@ -259,3 +259,34 @@ impl Evaluator for CouplingColumns {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Coupling, Motion, TERMS};
+    use phiw_identification::{Effect, EffectSpec};
+
+    /// The power of a term's columns is what its entries of the matrix say: twice the entry times both speeds.
+    #[test]
+    fn the_quadratic_form_of_a_coupling_is_the_power_of_its_columns() {
+        let speeds = [0.7, -1.3];
+        let motion = Motion { velocity: speeds, acceleration: speeds, width: 0.1 };
+        let mut counted = 0;
+        for term in TERMS {
+            let effect = Coupling {
+                site: [3, 5],
+                terms: vec![term],
+                parameters: Vec::new(),
+                spec: EffectSpec::new("transmission_coupling", &[]),
+            };
+            let columns = speeds.iter().zip(term.columns);
+            let power: f64 = columns.filter_map(|(speed, column)| Some(speed * column?(&motion))).sum();
+            for found in effect.quadratic_terms() {
+                assert_eq!(found.coordinates, [3, 5]);
+                let expected = 2.0 * found.factor * speeds[0] * speeds[1];
+                assert!((power - expected).abs() < 1e-12, "{}: {power}, not {expected}", term.name);
+                counted += 1;
+            }
+        }
+        assert_eq!(counted, 4);
+    }
+}
