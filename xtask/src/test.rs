@@ -17,28 +17,16 @@ pub struct Arguments {
     quick: bool,
 }
 
-/// A check that is one call of cargo.
-struct Check {
-    arguments: &'static [&'static str],
-    environment: &'static [(&'static str, &'static str)],
-}
-
-const CHECKS: [Check; 3] = [
-    Check { arguments: &["fmt", "--all", "--check"], environment: &[] },
-    Check {
-        arguments: &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"],
-        environment: &[],
-    },
-    Check {
-        arguments: &["doc", "--workspace", "--no-deps"],
-        environment: &[("RUSTDOCFLAGS", "-D warnings")],
-    },
+/// Checks that are one call of cargo each.
+const CHECKS: [&[&str]; 3] = [
+    &["fmt", "--all", "--check"],
+    &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"],
+    &["doc", "--workspace", "--no-deps"],
 ];
 
 /// Licences, duplicates and sources of what is linked, by `deny.toml`. Advisories are left out: they need a
 /// network.
-const DEPENDENCIES: Check =
-    Check { arguments: &["deny", "check", "licenses", "bans", "sources"], environment: &[] };
+const DEPENDENCIES: &[&str] = &["deny", "check", "licenses", "bans", "sources"];
 
 /// `--show-output` prints what passing tests said, so that a test that skipped itself is seen and counted.
 const TESTS: &[&str] = &["test", "--workspace", "--no-fail-fast", "--", "--show-output"];
@@ -51,17 +39,14 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     mujoco::fetch_or_go_on_without();
     let mut failed = Vec::new();
     let mut checks = Vec::new();
-    let mut unchecked_dependencies = false;
+    let unchecked_dependencies = !arguments.quick && !has_deny()?;
     if !arguments.quick {
-        match has_deny()? {
-            true => checks.push(&DEPENDENCIES),
-            false => unchecked_dependencies = true,
-        }
-        checks.extend(&CHECKS);
+        checks.extend((!unchecked_dependencies).then_some(DEPENDENCIES));
+        checks.extend(CHECKS);
     }
     for check in checks {
         if !passes(check)? {
-            failed.push(named(check.arguments));
+            failed.push(named(check));
         }
     }
     let mut tally = Tally::default();
@@ -97,11 +82,11 @@ fn has_deny() -> anyhow::Result<bool> {
     Ok(version.status.success())
 }
 
-fn passes(check: &Check) -> anyhow::Result<bool> {
-    announce(check.arguments);
+fn passes(check: &[&str]) -> anyhow::Result<bool> {
+    announce(check);
     let status = environment::cargo()?
-        .args(check.arguments)
-        .envs(check.environment.iter().copied())
+        .args(check)
+        .env("RUSTDOCFLAGS", "-D warnings")
         .status()
         .context("cargo cannot be started")?;
     Ok(status.success())

@@ -4,7 +4,8 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use phiw_bspline_retarget::c3d::read_c3d;
 use phiw_bspline_retarget::embedded::{EmbeddedMotion, embedded_motions};
 use phiw_bspline_retarget::human::MarkerMap;
-use phiw_bspline_retarget::{MarkerRecording, RetargetOptions, Retargeter};
+use phiw_bspline_retarget::markers::MarkerRecording;
+use phiw_bspline_retarget::{RetargetOptions, Retargeter};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
 use std::hint::black_box;
 

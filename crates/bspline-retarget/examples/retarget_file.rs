@@ -2,7 +2,8 @@
 //! `cargo run --release --example retarget_file -- ROBOT.urdf STATIC.c3d MOTION.c3d…`
 
 use phiw_bspline_retarget::human::MarkerMap;
-use phiw_bspline_retarget::{RetargetOptions, Retargeter, read_recording};
+use phiw_bspline_retarget::markers::read_recording;
+use phiw_bspline_retarget::{RetargetOptions, Retargeter};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
 use std::path::Path;
 use std::time::Instant;

@@ -1,4 +1,4 @@
-//! What cameras and files do to markers: samples that are no measurements, found and taken out.
+//! Artefacts of cameras and files: samples of markers that are no measurements are found and removed.
 
 use crate::marker_settings::MarkerSettings;
 use crate::recording::MarkerRecording;
@@ -103,11 +103,12 @@ impl MarkerRecording {
 
     /// Frames that show a marker, and show it so.
     fn frames_where(&self, marker: usize, so: impl Fn([f64; 3]) -> bool) -> Vec<usize> {
-        let shown = |&frame: &usize| {
-            let position = self.position_m(frame, marker);
-            position[0].is_finite() && so(position)
-        };
-        (0..self.frames()).filter(shown).collect()
+        (0..self.frames())
+            .filter(|&frame| {
+                let position = self.position_m(frame, marker);
+                position[0].is_finite() && so(position)
+            })
+            .collect()
     }
 
     /// Frames in which a coordinate of a marker is far off.

@@ -1,9 +1,9 @@
-//! What a static trial tells of a person.
+//! A person as measured in a static trial.
 
 use crate::human::Placed;
 use std::collections::BTreeMap;
 
-/// What a static trial tells of a person.
+/// A person as measured in a static trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
     /// Where markers sit on their segments.

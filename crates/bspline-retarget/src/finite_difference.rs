@@ -17,9 +17,9 @@ pub fn backward_differences(
     accelerations: &mut [f64],
 ) -> Result<(), phiw_dynamics::DimensionError> {
     let whole = positions.len() - positions.len() % dimension.max(1);
-    phiw_dynamics::check_size("the positions", positions.len(), whole)?;
-    phiw_dynamics::check_size("the velocities", velocities.len(), positions.len())?;
-    phiw_dynamics::check_size("the accelerations", accelerations.len(), positions.len())?;
+    phiw_dynamics::check::check_size("the positions", positions.len(), whole)?;
+    phiw_dynamics::check::check_size("the velocities", velocities.len(), positions.len())?;
+    phiw_dynamics::check::check_size("the accelerations", accelerations.len(), positions.len())?;
     differences(positions, dimension, time_step_s, velocities);
     differences(velocities, dimension, time_step_s, accelerations);
     Ok(())

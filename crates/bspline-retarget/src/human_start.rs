@@ -1,10 +1,10 @@
 //! Where the human starts: the markers followed pose by pose, one control point after the other.
 //!
-//! Lengths and markers' places are held at what is known of them, which is rough: a shoulder may be
-//! centimetres off. How a segment is turned its markers tell all the same, from where they are to each other.
-//! So that counts fully here, and where they are as a whole counts little. Joints stay inside anatomical
-//! ranges, since a wrist that is turned once around fits a hand's markers, too. Thus the solver starts in the
-//! right valley; it mends the rest.
+//! Lengths and markers' places are held at rough values: a shoulder may be centimetres off. The orientation
+//! of a segment follows from its markers' positions relative to each other, which do not depend on that
+//! error, so they have full weight and the markers' common position has little. Joints stay inside anatomical
+//! ranges, since a wrist that is turned once around fits a hand's markers, too. The solver thus starts near
+//! the right minimum.
 
 use crate::human::HumanScratch;
 use crate::pose_search::PoseSearch;
@@ -163,7 +163,7 @@ impl<'a> Follow<'a> {
             let less = 1.0 - WHOLE;
             cost -= less * count * mean.dot(mean);
             if slopes {
-                // As if a load and a force were taken off where the markers are in the middle.
+                // Most of the weight of the centroid's residual is removed from J'J and J'r.
                 human.masses[*node].add_point(center, -less * count);
                 for &point in points.iter().filter(|&&point| self.seen[point] != 0.0) {
                     let position = kinematics.position(point, human);

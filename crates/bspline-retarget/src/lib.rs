@@ -19,22 +19,25 @@ mod reading;
 mod recording;
 mod retarget;
 mod retarget_error;
-mod robot;
+pub mod robot;
 mod robot_start;
 pub mod solver;
 mod start;
 mod weights;
 
-pub use artefacts::{Artefact, ArtefactKind};
 pub use calibration::Calibration;
 pub use finite_difference::backward_differences;
-pub use marker_settings::MarkerSettings;
-pub use point_csv::read_point_csv;
 pub use problem::Problem;
 pub use quality::Quality;
-pub use reading::read_recording;
-pub use recording::{MarkerRecording, RecordingError};
 pub use retarget::{Person, RetargetOptions, Retargeted, Retargeter};
 pub use retarget_error::RetargetError;
-pub use robot::{Arm, ArmMap, BodyPoint, RobotError, RobotMap, RobotModel};
 pub use weights::{Cost, Weights};
+
+/// Recordings of markers: reading them, and what in them is no measurement of a person.
+pub mod markers {
+    pub use crate::artefacts::{Artefact, ArtefactKind};
+    pub use crate::marker_settings::MarkerSettings;
+    pub use crate::point_csv::read_point_csv;
+    pub use crate::reading::read_recording;
+    pub use crate::recording::{MarkerRecording, RecordingError};
+}

@@ -1,9 +1,9 @@
-//! What markers on a person are like.
+//! Which samples of markers are no measurements of a person's motion.
 
 use phiw_spikes::SpikeSettings;
 use std::ops::RangeInclusive;
 
-/// What tells samples that are no measurements from a person's motion.
+/// Which samples of markers are taken for no measurements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MarkerSettings {
     /// What is far off for a coordinate of a marker \[m\]. Where markers rest, cameras' glitches of a few
@@ -14,8 +14,9 @@ pub struct MarkerSettings {
     /// frames that show it (0.5 to 1). The rest may be spikes. No marker of 148 real recordings is at one
     /// place in half of its frames.
     pub frozen_share: f64,
-    /// Where this share of the markers or more is frozen (0 to 1), nothing tells a recording that hangs from
-    /// a person who stands still: they are left in, and such a recording is no motion.
+    /// Where this share of the markers or more is frozen (0 to 1), a recording that hangs cannot be
+    /// distinguished from a person who stands still: the markers are kept, and the recording is refused as no
+    /// motion.
     pub still_share: f64,
     /// How large the box around a person's markers is, from corner to corner \[m\]: those of one arm alone,
     /// and those of the tallest with arms stretched.

@@ -70,7 +70,7 @@ fn rate_hz(times: &[f64]) -> Result<f64, String> {
         return Err(format!("`t` goes from {first} to {last} s; it must be finite and grow"));
     }
     let even = |row: usize| (times[row] - times[row - 1] - step).abs() <= STEP_TOLERANCE * step;
-    // A time that is not a number is not even.
+    // A NaN in the times fails this comparison, too.
     let uneven = (1..times.len()).find(|&row| !even(row));
     match uneven {
         // The header is line 1.

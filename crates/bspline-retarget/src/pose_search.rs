@@ -1,7 +1,7 @@
 //! Inverse kinematics of one pose: damped Gauss-Newton inside bounds.
 
 use crate::solver::{Arrow, Pattern};
-use phiw_dynamics::Lanes;
+use phiw_dynamics::scalar::Lanes;
 
 /// Damping at first, and what it is multiplied with after a step that was good or bad.
 const DAMPING: f64 = 1e-3;

@@ -1,4 +1,4 @@
-//! What a retargeted motion is worth.
+//! Quality measures of a retargeted motion.
 
 use crate::bspline::Curve;
 use crate::problem::Problem;

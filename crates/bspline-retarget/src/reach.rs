@@ -1,8 +1,8 @@
 //! Torso and head for recordings that hold neither: gaze-and-reach coordination.
 //!
 //! The trunk turns and leans towards what the hand reaches for, the more the further it is from the shoulder,
-//! and the head looks at the hand that works. Which hand does, its speed tells. The constants below are
-//! plausible, not measured: what they make is named as theirs in the output.
+//! and the head looks at the hand that works. The hand that moves faster is taken for it. The constants below
+//! are plausible, not measured: the output says which joints come from them.
 
 use crate::problem::Problem;
 use crate::robot::{RobotModel, norm};

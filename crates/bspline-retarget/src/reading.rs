@@ -1,6 +1,6 @@
 //! Reading a marker recording, whatever file it is in.
 
-use crate::{MarkerRecording, RecordingError};
+use crate::recording::{MarkerRecording, RecordingError};
 use phiw_limits::Limits;
 use std::path::Path;
 

@@ -123,6 +123,8 @@ pub enum RecordingError {
 /// The unit in which the numbers would be a person's, in words.
 fn fitting_unit(extent_m: f64, person_m: &RangeInclusive<f64>) -> String {
     let factors = [(1000.0, "m, not mm"), (0.001, "mm, not m"), (100.0, "m, not cm"), (0.01, "cm, not m")];
-    let fits = |(factor, _): &&(f64, &str)| person_m.contains(&(extent_m * factor));
-    factors.iter().find(fits).map_or_else(String::new, |(_, words)| format!(" (as if they were in {words})"))
+    factors
+        .iter()
+        .find(|(factor, _)| person_m.contains(&(extent_m * factor)))
+        .map_or_else(String::new, |(_, words)| format!(" (as if they were in {words})"))
 }

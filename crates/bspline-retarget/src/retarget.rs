@@ -1,4 +1,4 @@
-//! From a recording to a motion of the robot: calibration, start, solution, and what it is worth.
+//! From a recording to a motion of the robot: calibration, start, solution, quality.
 
 use crate::artefacts::Artefact;
 use crate::bspline::{Basis, Curve};
@@ -37,7 +37,7 @@ pub struct RetargetOptions {
     /// The largest RMS distance \[m\] of the markers from the person that is still a fit. The worst of 302
     /// recordings has 0.0098 (`cargo xtask retarget databases`).
     pub largest_marker_rms_m: f64,
-    /// What tells samples that are no measurements.
+    /// Which samples of markers are taken for no measurements.
     pub markers: MarkerSettings,
 }
 
@@ -193,7 +193,7 @@ impl Retargeter {
         Err(RetargetError::Frozen { frozen: recording.frozen(&markers, settings).len(), seen })
     }
 
-    /// What a static trial tells: the lengths and the pose that fit the markers whose place the map gives,
+    /// Calibrates on a static trial: the lengths and the pose that fit the markers whose place the map gives,
     /// and from them the places of all.
     ///
     /// # Errors
@@ -252,8 +252,8 @@ impl Retargeter {
         Ok(Basis::uniform(self.options.degree, spans + self.options.degree, 0.0, duration)?)
     }
 
-    /// The person of a recording, by the markers alone: places of markers that shift are told here, and held
-    /// from then on.
+    /// The person of a recording, by the markers alone: places of markers that shift are estimated here, and
+    /// held from then on.
     ///
     /// # Errors
     /// The map does not fit the recording, or this is too short.
@@ -274,7 +274,7 @@ impl Retargeter {
         let solution = solve(&problem, first, &rough);
         let (control, parameters) =
             solution.variables.split_at(alone.trajectories() * basis.control_points());
-        // Those of the static trial alone stay known by name.
+        // Markers of the static trial alone keep their places, by name.
         let mut markers = markers.clone();
         markers.extend(alone.markers_placed(parameters));
         let map = self.firm_map();
@@ -409,7 +409,7 @@ fn mean_frame(recording: &MarkerRecording) -> MarkerRecording {
                 count += 1.0;
             }
         }
-        // No frame shows it: 0/0 is missing.
+        // A marker that no frame shows gets 0/0 = NaN, which means missing.
         sum.0.map(|coordinate| coordinate / count)
     };
     MarkerRecording {

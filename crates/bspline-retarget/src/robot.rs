@@ -1,7 +1,8 @@
 //! The robot's side of the correspondence: which of its points answer to the human's.
 
 use crate::human::{Segment, Side};
-use phiw_dynamics::{DimensionError, Placement, Scalar, Tree, Vec3};
+use phiw_dynamics::scalar::Scalar;
+use phiw_dynamics::{DimensionError, Placement, Tree, Vec3};
 use serde::Deserialize;
 
 /// A point fixed to a body of the robot.

@@ -72,8 +72,11 @@ impl<'a> Search<'a> {
                 0 => middle.clone(),
                 _ => {
                     let share = |joint: usize| (attempt as f64 * ((joint + 2) as f64).sqrt()).fract();
-                    let place = |(joint, &l)| between(l, 0.2 + 0.6 * share(joint));
-                    bounds.iter().enumerate().map(place).collect()
+                    bounds
+                        .iter()
+                        .enumerate()
+                        .map(|(joint, &l)| between(l, 0.2 + 0.6 * share(joint)))
+                        .collect()
                 }
             };
             let from = pose.clone();

@@ -3,7 +3,8 @@
 use crate::Calibration;
 use crate::problem::Problem;
 use crate::solver::{Arrow, Pattern};
-use phiw_dynamics::{Lanes, Vec3};
+use phiw_dynamics::Vec3;
+use phiw_dynamics::scalar::Lanes;
 
 /// The pose of the static trial over all time, or rest, turned and moved to where the markers are.
 pub(crate) fn start(problem: &Problem<'_>, calibration: Option<&Calibration>) -> Vec<f64> {
@@ -47,7 +48,7 @@ pub(crate) fn through(problem: &Problem<'_>, poses: &[Vec<f64>], variables: &mut
         *fit.diagonal_mut(point) += AT_POSE;
         places.push((at, values));
     }
-    // A basis has a value everywhere and the diagonal is positive: there is a factor.
+    // Basis functions are positive somewhere, so the diagonal is positive and the factor exists.
     if !fit.factor() {
         return;
     }
@@ -84,10 +85,13 @@ pub(crate) fn align(problem: &Problem<'_>, variables: &mut [f64]) {
     let mut last_yaw: Option<f64> = None;
     for point in 0..points {
         let sample = problem.sample_near(point);
-        let measured = |(point, &rest)| problem.measured_at(sample, point).map(|measured| (rest, measured));
-        let seen: Vec<(Vec3<f64>, Vec3<f64>)> = rest.iter().enumerate().filter_map(measured).collect();
+        let seen: Vec<(Vec3<f64>, Vec3<f64>)> = rest
+            .iter()
+            .enumerate()
+            .filter_map(|(point, &rest)| problem.measured_at(sample, point).map(|measured| (rest, measured)))
+            .collect();
         let Some(mut pose) = pose(&seen) else { continue };
-        // Yaw goes on where it was: a turn has no seam.
+        // Yaw is unwrapped: it continues from the last value.
         if let Some(last) = last_yaw {
             let turns = ((last - pose[3]) / std::f64::consts::TAU).round();
             pose[3] += turns * std::f64::consts::TAU;

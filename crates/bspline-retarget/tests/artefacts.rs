@@ -3,10 +3,10 @@
 use phiw_bspline_retarget::c3d::{C3dFormat, write_c3d};
 use phiw_bspline_retarget::embedded::embedded_motions;
 use phiw_bspline_retarget::human::MarkerMap;
-use phiw_bspline_retarget::{
-    Artefact, ArtefactKind, MarkerRecording, MarkerSettings, RetargetError, RetargetOptions, Retargeter,
-    read_recording,
+use phiw_bspline_retarget::markers::{
+    Artefact, ArtefactKind, MarkerRecording, MarkerSettings, read_recording,
 };
+use phiw_bspline_retarget::{RetargetError, RetargetOptions, Retargeter};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! The C3D reader: what is written is read, real files are read, and no bytes make it panic.
 
 use phiw_bspline_retarget::c3d::{C3dError, C3dFormat, Processor, Storage, read_c3d, write_c3d};
-use phiw_bspline_retarget::{MarkerRecording, read_recording};
+use phiw_bspline_retarget::markers::{MarkerRecording, read_recording};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 

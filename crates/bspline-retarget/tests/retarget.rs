@@ -3,10 +3,10 @@
 use phiw_bspline_retarget::c3d::read_c3d;
 use phiw_bspline_retarget::embedded::{EmbeddedMotion, TASKS, embedded_motions};
 use phiw_bspline_retarget::human::{MapError, MarkerMap};
+use phiw_bspline_retarget::markers::read_recording;
+use phiw_bspline_retarget::robot::RobotError;
 use phiw_bspline_retarget::solver::{QuasiNewton, quasi_newton, solve};
-use phiw_bspline_retarget::{
-    Problem, RetargetError, RetargetOptions, Retargeted, Retargeter, RobotError, read_recording,
-};
+use phiw_bspline_retarget::{Problem, RetargetError, RetargetOptions, Retargeted, Retargeter};
 use phiw_dynamics::Tree;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
 use std::path::{Path, PathBuf};
@@ -162,7 +162,7 @@ fn missing_markers_carry_no_weight() {
 fn what_does_not_fit_is_named() {
     let recording = motion("Open", 60).recording;
     let retargeter = retargeter(MarkerMap::embedded().unwrap());
-    let refused = |change: &dyn Fn(&mut phiw_bspline_retarget::MarkerRecording)| {
+    let refused = |change: &dyn Fn(&mut phiw_bspline_retarget::markers::MarkerRecording)| {
         let mut changed = recording.clone();
         change(&mut changed);
         retargeter.retarget(&changed, None).unwrap_err()

@@ -4,10 +4,10 @@
 use crate::dynamics::{over_states, predicted_force};
 use crate::measured::{relative_difference, worse};
 use crate::{Builder, Failure, Measured};
+use phiw_dynamics::body_kinematics::{BodyMotion, MotionSubspace};
+use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
 use phiw_dynamics::random_tree::RandomState;
-use phiw_dynamics::{
-    BodyKinematics, BodyMotion, DynamicsBackend, MotionSubspace, PARAMETERS_PER_BODY, Tree, World,
-};
+use phiw_dynamics::{BodyKinematics, DynamicsBackend, Tree, World};
 use phiw_regressor::JointTorqueRegressor;
 use phiw_zmp::{BalanceRows, ZmpWorkspace, standing_parameters};
 

@@ -1,4 +1,4 @@
-//! What the traits promise apart from numbers: names, sizes, errors, what changes and what does not.
+//! The contract of the traits apart from numbers: names, sizes, errors, and which calls change the state.
 
 use crate::measured::{largest_difference, worse};
 use crate::{Builder, Failure, Measured};
@@ -122,8 +122,8 @@ pub fn wrong_step_is_refused(build: &Builder, tree: &Tree) -> Result<Measured, F
     expect("room for too few positions", backend.state(&mut q[1..].to_vec(), &mut v.clone()), size)?;
     expect("a torque too long", backend.step(&vec![0.0; torque.len() + 1], 1e-3), size)?;
     expect("a NaN torque", backend.step(&with_nan(&torque), 1e-3), finite)?;
-    for dt in [0.0, -1e-3, f64::NAN] {
-        expect("a time step that is not positive", backend.step(&torque, dt), time)?;
+    for dt in [0.0, -1e-3, f64::NAN, f64::INFINITY] {
+        expect("a time step that is not positive and finite", backend.step(&torque, dt), time)?;
     }
     if tree.is_floating() {
         let mut stretched = q.clone();

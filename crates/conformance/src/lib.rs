@@ -1,52 +1,35 @@
 #![doc = include_str!("../README.md")]
 
-mod body_kinematics;
-mod contract;
-mod dynamics;
+pub mod body_kinematics;
+pub mod contract;
+pub mod dynamics;
+pub mod standing;
+pub mod step;
+
+mod builder;
 mod measured;
 mod motion;
 mod random_robots;
 mod robots;
-mod standing;
-mod step;
 
-pub use body_kinematics::{
-    body_joints_are_the_trees, body_motions_are_the_trees, floor_wrench_over_kinematics_is_the_base_wrench,
-    regressor_over_kinematics_predicts_inverse_dynamics,
-};
-pub use contract::{
-    inverse_dynamics_keeps_state, joints_are_the_trees, state_round_trip, wrong_motion_is_refused,
-    wrong_step_is_refused,
-};
-pub use dynamics::{
-    base_wrench_of_inverse_dynamics, forward_dynamics_undoes_inverse_dynamics,
-    inverse_dynamics_is_the_analytic, regressor_predicts_inverse_dynamics, rotor_inertia_is_part_of_the_mass,
-};
+pub use builder::{Builder, analytic};
 pub use measured::{Failure, Measured};
 pub use random_robots::regressor_predicts_random_robots;
 pub use robots::{Robot, robots, robots_in, standing_robot};
-pub use standing::{
-    fast_motion_topples, measured_zmp_is_the_momentums, rests_on_its_feet, slow_motion_stands,
-};
-pub use step::{
-    base_wrench_of_a_step, energy_drift, falls_freely, position_limits_hold, tracking_difference,
-};
 
-use phiw_dynamics::{
-    AnalyticBackend, BackendError, BodyKinematics, DynamicsBackend, SimulationBackend, Tree, World,
+use body_kinematics::{
+    body_joints_are_the_trees, body_motions_are_the_trees, floor_wrench_over_kinematics_is_the_base_wrench,
+    regressor_over_kinematics_predicts_inverse_dynamics,
 };
-
-/// What makes the backend under test: a robot in a world. `B` is the backend, or the trait of it that is
-/// tested.
-pub type Builder<'a, B = dyn SimulationBackend> = dyn Fn(&Tree, &World) -> Result<Box<B>, BackendError> + 'a;
-
-/// The builder of [`AnalyticBackend`], which knows no world with contacts.
-///
-/// # Errors
-/// The world does not fit the robot, or has feet or position limits.
-pub fn analytic(tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
-    Ok(Box::new(AnalyticBackend::in_world(tree.clone(), world)?))
-}
+use contract::{
+    inverse_dynamics_keeps_state, joints_are_the_trees, state_round_trip, wrong_motion_is_refused,
+    wrong_step_is_refused,
+};
+use dynamics::{
+    base_wrench_of_inverse_dynamics, forward_dynamics_undoes_inverse_dynamics,
+    inverse_dynamics_is_the_analytic, regressor_predicts_inverse_dynamics,
+};
+use phiw_dynamics::{BodyKinematics, DynamicsBackend, Tree};
 
 /// Everything about the robot's own equation that holds for any [`DynamicsBackend`]: the contract, then
 /// inverse and forward dynamics at `states` random states.
@@ -68,8 +51,8 @@ pub fn equation_of_motion<B: DynamicsBackend + ?Sized>(
     ])
 }
 
-/// What any [`SimulationBackend`] promises about its state. Steps and floors, whose accuracy is the backend's
-/// own, have checks of their own.
+/// What any [`SimulationBackend`](phiw_dynamics::SimulationBackend) promises about its state. Steps and
+/// floors, whose accuracy is the backend's own, have checks of their own.
 ///
 /// # Errors
 /// The first check that fails.

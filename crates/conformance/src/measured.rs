@@ -1,4 +1,4 @@
-//! What a check found.
+//! The result of a check.
 
 use phiw_dynamics::BackendError;
 use std::fmt;

@@ -1,10 +1,11 @@
 //! Checks over random robots, which shrink to the smallest that fails.
 
-use crate::measured::worse;
-use crate::{
-    Builder, Failure, Measured, floor_wrench_over_kinematics_is_the_base_wrench,
-    regressor_over_kinematics_predicts_inverse_dynamics, regressor_predicts_inverse_dynamics,
+use crate::body_kinematics::{
+    floor_wrench_over_kinematics_is_the_base_wrench, regressor_over_kinematics_predicts_inverse_dynamics,
 };
+use crate::dynamics::regressor_predicts_inverse_dynamics;
+use crate::measured::worse;
+use crate::{Builder, Failure, Measured};
 use phiw_dynamics::random_tree::{RandomTreeOptions, random_tree};
 use phiw_dynamics::{BodyKinematics, DynamicsBackend};
 use proptest::prelude::*;

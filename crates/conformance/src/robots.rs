@@ -1,8 +1,9 @@
 //! The robots that the suite is run on.
 
 use crate::Failure;
+use phiw_dynamics::inertia::Inertia;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
-use phiw_dynamics::{Foot, Inertia, Mat3, Tree, Vec3, World};
+use phiw_dynamics::{Foot, Mat3, Tree, Vec3, World};
 use std::path::{Path, PathBuf};
 
 /// A robot of the suite.

@@ -6,7 +6,8 @@ use crate::motion::{Controller, Target, smooth_step};
 use crate::step::center_of_mass;
 use crate::{Builder, Failure, Measured};
 use phiw_dynamics::dense::dot;
-use phiw_dynamics::{AnalyticBackend, DynamicsBackend, Inertia, Placement, Spatial, Tree, Vec3, World};
+use phiw_dynamics::inertia::Inertia;
+use phiw_dynamics::{AnalyticBackend, DynamicsBackend, Placement, Spatial, Tree, Vec3, World};
 use std::f64::consts::TAU;
 
 /// Step of the simulation and period of the controller \[s\].

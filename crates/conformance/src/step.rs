@@ -131,9 +131,8 @@ pub fn position_limits_hold(build: &Builder, tree: &Tree) -> Result<Measured, Fa
     let mut backend = build(tree, &World { position_limits: true, ..World::default() })?;
     let mut controller = Controller::new(tree);
     let middle = Swing::new(tree).at(0.0).q;
-    let limited = |joint: &usize| tree.joint(*joint).limits.upper.is_finite();
     let mut largest = f64::NAN;
-    for joint in (0..tree.joint_count()).filter(limited) {
+    for joint in (0..tree.joint_count()).filter(|joint| tree.joint(*joint).limits.upper.is_finite()) {
         let upper = tree.joint(joint).limits.upper;
         let mut start = middle.clone();
         start[joint] = start[joint].max(upper - 0.2);

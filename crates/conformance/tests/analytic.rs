@@ -1,10 +1,11 @@
 //! The suite on the analytic backend: what the suite asks for can be done, and the suite can tell when it is
 //! not.
 
+use phiw_conformance::dynamics::inverse_dynamics_is_the_analytic;
+use phiw_conformance::step::{base_wrench_of_a_step, energy_drift, falls_freely, tracking_difference};
 use phiw_conformance::{
-    Failure, analytic, base_wrench_of_a_step, energy_drift, equation_of_motion, falls_freely,
-    inverse_dynamics_is_the_analytic, kinematics_of_bodies, regressor_predicts_random_robots, robots,
-    state_of_a_simulation, tracking_difference,
+    Failure, analytic, equation_of_motion, kinematics_of_bodies, regressor_predicts_random_robots, robots,
+    state_of_a_simulation,
 };
 use phiw_dynamics::random_tree::{RandomTreeOptions, random_tree};
 use phiw_dynamics::{AnalyticBackend, BackendError, DynamicsBackend, Tree, World};

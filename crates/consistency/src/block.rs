@@ -1,8 +1,8 @@
 //! A positive definite matrix X of the problem with its dual Z, and the Nesterov–Todd scaling of both.
 //!
 //! The scaling G makes both the same diagonal matrix: G⁻¹XG⁻ᵀ = GᵀZG = diag(σ) (Nesterov & Todd, "Self-scaled
-//! barriers and interior-point methods for convex programming", 1997). On the central path X·Z = τ·1 and all σ²
-//! are τ.
+//! barriers and interior-point methods for convex programming", 1997). On the central path X·Z = τ·1 and all
+//! σ² are τ.
 
 use crate::small_matrix::Square;
 
@@ -38,8 +38,8 @@ impl Scaled {
         Square::from_fn(sigma.len(), |row, column| if row == column { sigma[row] } else { 0.0 })
     }
 
-    /// The sum of the changes of X and Z, in scaled coordinates, that leads to X·Z = target·1; with the part of
-    /// second order that a first pair of changes foretells.
+    /// The sum of the changes of X and Z, in scaled coordinates, that leads to X·Z = target·1; with the part
+    /// of second order that a first pair of changes foretells.
     pub fn wanted(&self, target: f64, first: Option<(&Square, &Square)>) -> Square {
         let sigma = &self.sigma;
         let bent = first.map(|(primal, dual)| primal.times(dual));
@@ -50,8 +50,8 @@ impl Scaled {
         })
     }
 
-    /// The step along which X (or Z) comes to the boundary of the positive definite matrices; infinite where none
-    /// does. The change is in scaled coordinates.
+    /// The step along which X (or Z) comes to the boundary of the positive definite matrices; infinite where
+    /// none does. The change is in scaled coordinates.
     pub fn longest(&self, change: &Square) -> f64 {
         let sigma = &self.sigma;
         let relative =

@@ -7,10 +7,10 @@ use crate::small_matrix::Square;
 
 /// Objective at the state's point less a lower bound of the optimum; infinite where nothing is proven.
 ///
-/// With Z ⪰ 0 for each constraint X(x) ⪰ 0 and any ν, the Lagrangian L = f − Σ tr(ZX) + νᵀ(Ex − e) is nowhere on
-/// the feasible set above f, so its unconstrained minimum is a lower bound. L is quadratic plus λ times the
-/// self-concordant −log det, so that at a Newton decrement δ < 1 of L/λ it is at most λ(−δ − log(1 − δ)) above that
-/// minimum (Nesterov, "Introductory lectures on convex optimization", theorem 4.1.11).
+/// With Z ⪰ 0 for each constraint X(x) ⪰ 0 and any ν, the Lagrangian L = f − Σ tr(ZX) + νᵀ(Ex − e) is nowhere
+/// on the feasible set above f, so its unconstrained minimum is a lower bound. L is quadratic plus λ times
+/// the self-concordant −log det, so that at a Newton decrement δ < 1 of L/λ it is at most λ(−δ − log(1 − δ))
+/// above that minimum (Nesterov, "Introductory lectures on convex optimization", theorem 4.1.11).
 pub(crate) fn gap(state: &State<'_>) -> f64 {
     let State { problem, weight, .. } = state;
     let Some(lowers) = state.bodies().iter().map(Square::cholesky).collect::<Option<Vec<Square>>>() else {

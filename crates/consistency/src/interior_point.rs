@@ -1,9 +1,9 @@
 //! The search: a primal-dual interior-point method with Mehrotra's predictor and corrector.
 //!
-//! Every matrix X that has to be positive definite has a dual Z. On the central path X·Z = τ·1: of constraints τ goes
-//! to zero, of bodies it stops at the prior's weight λ, where Z = λP⁻¹ makes the path's point the optimum. Steps are
-//! Newton's with the Nesterov–Todd scaling (Todd, Toh & Tütüncü, "On the Nesterov–Todd direction in semidefinite
-//! programming", 1998; Mehrotra 1992 for the two steps).
+//! Every matrix X that has to be positive definite has a dual Z. On the central path X·Z = τ·1: of
+//! constraints τ goes to zero, of bodies it stops at the prior's weight λ, where Z = λP⁻¹ makes the path's
+//! point the optimum. Steps are Newton's with the Nesterov–Todd scaling (Todd, Toh & Tütüncü, "On the
+//! Nesterov–Todd direction in semidefinite programming", 1998; Mehrotra 1992 for the two steps).
 
 use crate::block::Scaled;
 use crate::certificate::gap;
@@ -19,13 +19,14 @@ use faer::Mat;
 /// When the search ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Gap, in units of one plus the optimum, at which the search ends. Parameters are then exact to far below
-    /// their standard deviations, which a gap of one half would move by one.
+    /// Gap, in units of one plus the optimum, at which the search ends. Parameters are then exact to far
+    /// below their standard deviations, which a gap of one half would move by one.
     pub tolerance: f64,
-    /// Gap, in the same units, up to which an optimum is called certified. Above `tolerance`, since rounding can
-    /// end a search early.
+    /// Gap, in the same units, up to which an optimum is called certified. Above `tolerance`, since rounding
+    /// can end a search early.
     pub certified: f64,
-    /// Newton steps at most. Some twenty are needed; a problem of numbers near the limits of a double takes more.
+    /// Newton steps at most. Some twenty are needed; a problem of numbers near the limits of a double takes
+    /// more.
     pub iterations: usize,
 }
 
@@ -50,8 +51,8 @@ pub struct Solution {
     pub misfit: f64,
     /// Σ D, the divergence from the priors.
     pub divergence: f64,
-    /// The objective is at most this far above the least that is possible; proven by a dual point, whatever the
-    /// search did.
+    /// The objective is at most this far above the least that is possible; proven by a dual point, whatever
+    /// the search did.
     pub gap: f64,
     /// Whether the gap is as small as [`Settings::certified`] asks.
     pub certified: bool,
@@ -61,8 +62,8 @@ pub struct Solution {
 
 /// The target of the complementarity is at most this share of its present value.
 const MOST_CENTRING: f64 = 0.9;
-/// Share of the way to the boundary that a step goes at least, and 0.09 more where the first direction goes all the
-/// way (Toh, Todd & Tütüncü, "SDPT3", 1999).
+/// Share of the way to the boundary that a step goes at least, and 0.09 more where the first direction goes
+/// all the way (Toh, Todd & Tütüncü, "SDPT3", 1999).
 const STAY_INSIDE: f64 = 0.9;
 /// A step shorter than this gives way to one back to the central path.
 const JAMMED: f64 = 0.3;
@@ -274,8 +275,8 @@ impl<'a> State<'a> {
         settled && constraints.iter().sum::<f64>() <= WORTH_A_CERTIFICATE * accuracy
     }
 
-    /// One predictor and corrector; none where nothing finite comes out. The constraints' complementarity need not
-    /// be less in all than `accuracy`.
+    /// One predictor and corrector; none where nothing finite comes out. The constraints' complementarity
+    /// need not be less in all than `accuracy`.
     fn iterate(&mut self, accuracy: f64, care: &Care) -> Option<()> {
         let mut pairs: Vec<(Square, &Square)> = self.bodies().into_iter().zip(&self.body_duals).collect();
         pairs.extend(self.problem.constraints.iter().map(|known| known.value(&self.x)).zip(&self.duals));
@@ -337,7 +338,8 @@ impl<'a> State<'a> {
                 blocks.scaled[block].wanted(target, bent)
             })
             .collect();
-        // What the duals will be is taken from the gradient; what they lose by the change of X is in the equations.
+        // What the duals will be is taken from the gradient; what they lose by the change of X is in the
+        // equations.
         let mut gradient = vec![0.0; smooth.len()];
         let constraints = self.problem.constraints.iter();
         for ((constraint, scaled), wanted) in
@@ -405,8 +407,8 @@ impl<'a> State<'a> {
 }
 
 impl Blocks {
-    /// The longest step, at most a full one, that goes no further than the share `inside` of the way to where some X
-    /// or Z is no longer positive definite.
+    /// The longest step, at most a full one, that goes no further than the share `inside` of the way to where
+    /// some X or Z is no longer positive definite.
     fn longest(&self, direction: &Direction, inside: f64) -> f64 {
         let changes = direction.primal.iter().zip(&direction.dual);
         self.scaled

@@ -1,8 +1,8 @@
 //! Newton's equations in coordinates in which every body's barrier is the unit matrix.
 //!
-//! A body's change of pseudo-inertia is G·Y·Gᵀ, and its ten coordinates are those of Y in an orthonormal basis of
-//! the symmetric matrices. Extras are scaled by the diagonal of the equations. AᵀA enters Newton's matrix only;
-//! gradients come from the residual, so what AᵀA loses in digits costs iterations, not accuracy.
+//! A body's change of pseudo-inertia is G·Y·Gᵀ, and its ten coordinates are those of Y in an orthonormal
+//! basis of the symmetric matrices. Extras are scaled by the diagonal of the equations. AᵀA enters Newton's
+//! matrix only; gradients come from the residual, so what AᵀA loses in digits costs iterations, not accuracy.
 
 use crate::constraint::Equality;
 use crate::problem::Problem;
@@ -15,8 +15,8 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 const TEN: usize = crate::PARAMETERS_PER_BODY;
 /// The pairs of axes off the diagonal, in the order of coordinates five to ten.
 const PAIRS: [(usize, usize); 6] = [(0, 1), (0, 2), (1, 2), (0, 3), (1, 3), (2, 3)];
-/// Weight of a penalty on extras in units of their columns' squares: it keeps combinations that the data do not
-/// tell at zero, and is too small to move any that they do.
+/// Weight of a penalty on extras in units of their columns' squares: it keeps combinations that the data do
+/// not tell at zero, and is too small to move any that they do.
 const RIDGE: f64 = 1e-12;
 
 /// Coordinates of a symmetric 4×4 matrix.
@@ -192,7 +192,8 @@ impl Equations {
     }
 }
 
-/// Cholesky's factor of a matrix with unit diagonal, made a little heavier where rounding has left it indefinite.
+/// Cholesky's factor of a matrix with unit diagonal, made a little heavier where rounding has left it
+/// indefinite.
 fn factor_of(matrix: &Mat<f64>) -> Option<Llt<f64>> {
     let mut shift = 0.0;
     for _ in 0..8 {

@@ -6,17 +6,17 @@ use crate::{PARAMETERS_PER_BODY, PseudoInertia};
 /// What is taken for a body of which a robot's description says nothing, or nothing possible.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PriorSettings {
-    /// Mass of a body without mass, over the mean mass of those that have one. A link without inertia in a URDF
-    /// is mostly a bracket or a frame, seldom a casting.
+    /// Mass of a body without mass, over the mean mass of those that have one. A link without inertia in a
+    /// URDF is mostly a bracket or a frame, seldom a casting.
     pub least_mass: f64,
-    /// Where no body has a mass: that of a body, over the cube of the robot's length \[kg/m³\]. Arms of 0.2 to
-    /// 3 m weigh 50 to 200 of these for each link.
+    /// Where no body has a mass: that of a body, over the cube of the robot's length \[kg/m³\]. Arms of 0.2
+    /// to 3 m weigh 50 to 200 of these for each link.
     pub density: f64,
-    /// Radius of gyration, over the robot's length, of a body without extent, and the least along any axis of one
-    /// that is impossible. A point mass in a URDF is some flange or load.
+    /// Radius of gyration, over the robot's length, of a body without extent, and the least along any axis of
+    /// one that is impossible. A point mass in a URDF is some flange or load.
     pub least_radius: f64,
-    /// The least that a possible body's may be: below that it is as good as flat, and any error of the tensor's
-    /// last digits decides whether it is possible.
+    /// The least that a possible body's may be: below that it is as good as flat, and any error of the
+    /// tensor's last digits decides whether it is possible.
     pub flat: f64,
 }
 
@@ -28,7 +28,8 @@ impl Default for PriorSettings {
 
 /// The bodies of a robot's description, each one that is impossible replaced by the nearest thing that is
 /// possible: mass and centre of mass stay where there is a mass, and the second moments about the centre are
-/// lifted to those of a small body. `length` is the robot's own \[m\], such as the mean distance between joints.
+/// lifted to those of a small body. `length` is the robot's own \[m\], such as the mean distance between
+/// joints.
 pub fn possible_priors(
     description: &[[f64; PARAMETERS_PER_BODY]],
     length: f64,

@@ -8,8 +8,8 @@ use faer::Mat;
 
 /// A least-squares problem over possible bodies and extras.
 ///
-/// Unknowns are the standard parameters, ten for each body, and then the extras. Built step by step: priors, data,
-/// constraints.
+/// Unknowns are the standard parameters, ten for each body, and then the extras. Built step by step: priors,
+/// data, constraints.
 #[derive(Clone, Debug)]
 pub struct Problem {
     pub(crate) priors: Vec<PseudoInertia>,
@@ -82,8 +82,8 @@ impl Problem {
         PARAMETERS_PER_BODY * self.priors.len() + self.extras
     }
 
-    /// The same with these data instead of what it had: `matrix` is A row by row, one column for each unknown,
-    /// and `target` is b. Both are divided by the standard deviation of the row's noise.
+    /// The same with these data instead of what it had: `matrix` is A row by row, one column for each
+    /// unknown, and `target` is b. Both are divided by the standard deviation of the row's noise.
     ///
     /// # Errors
     /// `matrix` is not one row for each number of `target`, or a number is not finite.
@@ -103,7 +103,8 @@ impl Problem {
         Ok(self)
     }
 
-    /// The same with an extra between two values, either of which may be infinite: a friction is not negative.
+    /// The same with an extra between two values, either of which may be infinite: a friction is not
+    /// negative.
     ///
     /// # Errors
     /// There is no such extra, or nothing lies strictly between the bounds.
@@ -125,8 +126,8 @@ impl Problem {
         Ok(self)
     }
 
-    /// The same with a symmetric matrix of extras that has to be positive semidefinite: viscous friction that is
-    /// coupled between joints takes energy in every motion.
+    /// The same with a symmetric matrix of extras that has to be positive semidefinite: viscous friction that
+    /// is coupled between joints takes energy in every motion.
     ///
     /// # Errors
     /// A term names an extra that does not exist, or a place outside of the matrix.
@@ -201,8 +202,8 @@ impl Problem {
         Ok(self)
     }
 
-    /// The same with Σ coefficient·unknown = `value`: a known mass is one coefficient, a known total mass one for
-    /// each body, equal limbs one and minus one. Equations must not contradict or repeat one another.
+    /// The same with Σ coefficient·unknown = `value`: a known mass is one coefficient, a known total mass one
+    /// for each body, equal limbs one and minus one. Equations must not contradict or repeat one another.
     ///
     /// # Errors
     /// An unknown does not exist, or a number is not finite.
@@ -222,7 +223,8 @@ impl Problem {
 
     /// The optimum for the prior's weight λ > 0, which is in units of ½‖Ax − b‖².
     ///
-    /// A weight below 1e-10 of ½‖b‖² is raised to that: the prior would be lost in the rounding of the misfit.
+    /// A weight below 1e-10 of ½‖b‖² is raised to that: the prior would be lost in the rounding of the
+    /// misfit.
     ///
     /// # Errors
     /// The weight is not positive, or nothing lies strictly within the constraints.

@@ -5,7 +5,8 @@ use crate::small_matrix::Square;
 /// Standard parameters of a body.
 pub const PARAMETERS_PER_BODY: usize = 10;
 
-/// The 4×4 matrix ∫ \[r; 1\]\[r; 1\]ᵀ dm: \[Σ h; hᵀ m\] with Σ = ½tr(I)·1 − I \[kg·m²\], h \[kg·m\], m \[kg\].
+/// The 4×4 matrix ∫ \[r; 1\]\[r; 1\]ᵀ dm: \[Σ h; hᵀ m\] with Σ = ½tr(I)·1 − I \[kg·m²\], h \[kg·m\], m
+/// \[kg\].
 ///
 /// A distribution of positive mass that is not flat has these moments if and only if the matrix is positive
 /// definite (Wensing, Kim & Slotine 2018, equation 13).

@@ -6,8 +6,8 @@ use faer::Mat;
 
 /// Bodies start at most these factors away from their priors. Small ones would have far to go back.
 const FURTHEST_START: (f64, f64) = (0.1, 1e3);
-/// The factor by which all bodies fit the data best, as far as it is one: robots without a mass have priors that are
-/// far too light.
+/// The factor by which all bodies fit the data best, as far as it is one: robots without a mass have priors
+/// that are far too light.
 pub(crate) fn scale_start(problem: &Problem, x: &[f64]) -> f64 {
     let product = &problem.matrix * Mat::from_fn(x.len(), 1, |row, _| x[row]);
     let along: f64 = problem.target.iter().enumerate().map(|(row, target)| product[(row, 0)] * target).sum();

@@ -143,8 +143,8 @@ fn coupled_friction_takes_energy_in_every_motion() {
 }
 
 /// What `crates/experiments/src/oracle/cvxpy_oracle.py` (CVXPY 1.9.3, Clarabel 0.11.1) finds on the same
-/// problems: seed, bodies, extras, rows, scale of the data, weight of the prior, sign of the truth; the optimum
-/// and the first body's mass there.
+/// problems: seed, bodies, extras, rows, scale of the data, weight of the prior, sign of the truth; the
+/// optimum and the first body's mass there.
 const FOUND_BY_CVXPY: [([f64; 7], f64, f64); 6] = [
     ([1.0, 1.0, 0.0, 6.0, 10.0, 1.0, 1.0], 5.522586569766255, 9.749800324287815),
     ([2.0, 2.0, 2.0, 40.0, 10.0, 1.0, 1.0], 18.059053063933952, 17.303265257558323),

@@ -2,7 +2,8 @@
 
 use phiw_dynamics::DimensionError;
 use phiw_estimation::EstimationError;
-use phiw_identification::{EffectError, IdentificationError};
+use phiw_identification::IdentificationError;
+use phiw_identification::effect::EffectError;
 use phiw_regressor::RegressorError;
 use phiw_telemetry::LogError;
 

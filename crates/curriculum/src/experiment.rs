@@ -18,7 +18,8 @@ pub struct Trial {
 
 /// Tries motions on a robot: line 13 of Algorithm 1.
 pub trait Experiment: Send + Sync {
-    /// Lets the robot follow a motion with what is believed of it. The same random numbers give the same trial.
+    /// Lets the robot follow a motion with what is believed of it. The same random numbers give the same
+    /// trial.
     ///
     /// # Errors
     /// The robot can not be run. A fall is no error.
@@ -44,8 +45,8 @@ const ROUNDED: f64 = 1e-6;
 /// measurements wrongly, and nothing else would show it.
 ///
 /// # Errors
-/// The experiment knows the noise of a torque, and the estimator is assumed another one. Where there is no noise
-/// any will do: it stands for rounding.
+/// The experiment knows the noise of a torque, and the estimator is assumed another one. Where there is no
+/// noise any will do: it stands for rounding.
 pub(crate) fn check_noise(
     robot: &Robot,
     experiment: &dyn Experiment,

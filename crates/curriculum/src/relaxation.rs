@@ -146,8 +146,8 @@ impl Relaxation for ConditionRelaxation {
 /// stays at its second value however well the model predicts. The uncertainty of Φ·w over all motions, floor
 /// wrenches included where the base floats, counts each direction as much as the motions feel it.
 ///
-/// It needs an estimator that knows its covariance ([`phiw_estimation::MotionLikelihood`]); with others α stays at
-/// α_max.
+/// It needs an estimator that knows its covariance ([`phiw_estimation::MotionLikelihood`]); with others α
+/// stays at α_max.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UncertaintyRelaxation {
     /// α_max.

@@ -1,8 +1,9 @@
 //! The dynamics algorithms on a random robot of 18 joints, one sample and four lanes at a time.
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use phiw_dynamics::Workspace;
 use phiw_dynamics::random_tree::{RandomNumbers, RandomTreeOptions, random_state, random_tree};
-use phiw_dynamics::{Lanes, Scalar, Workspace};
+use phiw_dynamics::scalar::{Lanes, Scalar};
 use std::hint::black_box;
 
 fn algorithms<T: Scalar>(criterion: &mut Criterion, scalar: &str, convert: fn(f64) -> T) {

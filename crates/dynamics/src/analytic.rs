@@ -2,15 +2,15 @@
 //! [`BodyKinematics`].
 
 use crate::backend::check_finite;
+use crate::body_kinematics::BodyJoint;
+use crate::check::check_size;
 use crate::configuration::{normalised, quaternion_product};
+use crate::motion::BodyMotion;
 use crate::motion::floating_placement;
 use crate::{
-    BackendError, BodyJoint, BodyKinematics, BodyMotion, DimensionError, DynamicsBackend, SimulationBackend,
-    Tree, Vec3, Workspace, World, check_size,
+    BackendError, BodyKinematics, DimensionError, DynamicsBackend, SimulationBackend, Tree, Vec3, Workspace,
+    World,
 };
-
-/// Largest distance of a quaternion's length from 1.
-const QUATERNION_TOLERANCE: f64 = 1e-6;
 
 /// Weight of each stage, and how far into the step its rate is followed to get to the next.
 const RUNGE_KUTTA: [(f64, f64); 4] = [(1.0 / 6.0, 0.5), (1.0 / 3.0, 0.5), (1.0 / 3.0, 1.0), (1.0 / 6.0, 0.0)];
@@ -170,26 +170,14 @@ impl SimulationBackend for AnalyticBackend {
     }
 
     fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), BackendError> {
-        self.tree.check_state(q, v)?;
-        check_finite("the configuration q", q)?;
-        check_finite("the velocity v", v)?;
-        if self.tree.is_floating() {
-            let length = q[3..7].iter().map(|x| x * x).sum::<f64>().sqrt();
-            if (length - 1.0).abs() > QUATERNION_TOLERANCE {
-                return Err(BackendError::NotUnitQuaternion { length });
-            }
-        }
+        self.check_state(q, v)?;
         self.q.copy_from_slice(q);
         self.v.copy_from_slice(v);
         Ok(())
     }
 
     fn step(&mut self, torque: &[f64], dt: f64) -> Result<(), BackendError> {
-        check_size("the joint torque", torque.len(), self.joint_names.len())?;
-        check_finite("the joint torque", torque)?;
-        if dt.is_nan() || dt <= 0.0 {
-            return Err(BackendError::TimeStep { dt });
-        }
+        self.check_step(torque, dt)?;
         let AnalyticBackend { tree, rotor_inertia, workspace, stages, .. } = self;
         let Stages { force, q, v, q_rate, q_sum, a, a_sum, bias } = stages;
         let first_joint = force.len() - torque.len();

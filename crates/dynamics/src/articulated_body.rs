@@ -1,6 +1,8 @@
-//! What the articulated body algorithm keeps of a body.
+//! The quantities of one body in the articulated body algorithm.
 
-use crate::{Inertia, Mat3, Placement, Scalar, Spatial, Vec3};
+use crate::inertia::Inertia;
+use crate::scalar::Scalar;
+use crate::{Mat3, Placement, Spatial, Vec3};
 
 /// Inertia of a body whose joints behind it are free to move: `force = A·a + B·α`, `moment = Bᵀ·a + C·α`.
 #[derive(Clone, Copy, Debug)]

@@ -2,6 +2,10 @@
 //! them.
 
 use crate::DimensionError;
+use crate::check::check_size;
+
+/// Largest distance of a base's quaternion's length from 1 that [`SimulationBackend::set_state`] accepts.
+const QUATERNION_TOLERANCE: f64 = 1e-6;
 
 /// Why a backend could not do what was asked.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -25,8 +29,8 @@ pub enum BackendError {
         /// Its length.
         length: f64,
     },
-    /// The time step is not positive.
-    #[error("the time step is {dt} s: it must be positive")]
+    /// The time step is not positive or not finite.
+    #[error("the time step is {dt} s: it must be positive and finite")]
     TimeStep {
         /// The step \[s\].
         dt: f64,
@@ -142,6 +146,39 @@ pub trait SimulationBackend: DynamicsBackend {
     fn foot_wrench(&self, foot: usize) -> Option<[f64; 6]> {
         let _ = foot;
         None
+    }
+
+    /// What every backend checks before it takes a state over, for implementations of
+    /// [`set_state`](Self::set_state).
+    ///
+    /// # Errors
+    /// Those of [`set_state`](Self::set_state).
+    fn check_state(&self, q: &[f64], v: &[f64]) -> Result<(), BackendError> {
+        check_size("the configuration q", q.len(), self.configuration_size())?;
+        check_size("the velocity v", v.len(), self.velocity_size())?;
+        check_finite("the configuration q", q)?;
+        check_finite("the velocity v", v)?;
+        let is_floating = self.velocity_size() > self.joint_names().len();
+        if is_floating {
+            let length = q[3..7].iter().map(|x| x * x).sum::<f64>().sqrt();
+            if (length - 1.0).abs() > QUATERNION_TOLERANCE {
+                return Err(BackendError::NotUnitQuaternion { length });
+            }
+        }
+        Ok(())
+    }
+
+    /// What every backend checks before a step, for implementations of [`step`](Self::step).
+    ///
+    /// # Errors
+    /// The slice does not fit the robot, a number is not finite, or `dt` is not positive.
+    fn check_step(&self, torque: &[f64], dt: f64) -> Result<(), BackendError> {
+        check_size("the joint torque", torque.len(), self.joint_names().len())?;
+        check_finite("the joint torque", torque)?;
+        if !(dt.is_finite() && dt > 0.0) {
+            return Err(BackendError::TimeStep { dt });
+        }
+        Ok(())
     }
 }
 

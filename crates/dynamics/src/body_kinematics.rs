@@ -1,6 +1,10 @@
 //! The contract between algorithms that need the motion of a robot's bodies and what provides it.
 
-use crate::{BodyMotion, DimensionError, JointType, Scalar, Spatial, Tree, Vec3, check_size};
+pub use crate::motion::BodyMotion;
+
+use crate::check::check_size;
+use crate::scalar::Scalar;
+use crate::{DimensionError, JointType, Spatial, Tree, Vec3};
 
 /// The joint before a body: what the body hangs on, and which coordinates move it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,9 +73,9 @@ impl MotionSubspace {
 /// by value in [`std::io`]: pass `&tree` or `&mut backend`.
 ///
 /// **Bodies** come parents before children. The frame of a body is fixed to it, and otherwise the provider's
-/// choice: the ten standard parameters that belong to the body ([`crate::PARAMETER_NAMES`]) are those in this
-/// frame. **Coordinates** are those of [`Tree`]: on a floating base, which only the first body can be, the
-/// configuration starts with `[x, y, z, qx, qy, qz, qw]`.
+/// choice: the ten standard parameters that belong to the body ([`crate::inertia::PARAMETER_NAMES`]) are
+/// those in this frame. **Coordinates** are those of [`Tree`]: on a floating base, which only the first body
+/// can be, the configuration starts with `[x, y, z, qx, qy, qz, qw]`.
 pub trait BodyKinematics<T: Scalar = f64> {
     /// What goes wrong where the motion is computed.
     type Error: From<DimensionError>;

@@ -1,6 +1,7 @@
 //! Configurations: the neutral one, and moving along a velocity.
 
-use crate::{DimensionError, Placement, Tree, Vec3, check_size};
+use crate::check::check_size;
+use crate::{DimensionError, Placement, Tree, Vec3};
 
 /// Below this angle \[rad\] the exponential's coefficients come from their series: the neglected terms vanish
 /// in rounding.

@@ -1,10 +1,11 @@
 //! Forward dynamics: the articulated body algorithm (ABA), or the mass matrix where mimic joints close loops.
 
 use crate::articulated_body::{ArticulatedBody, ArticulatedInertia};
+use crate::check::check_size;
 use crate::dense::ldl::solve_in_place;
-use crate::{
-    DimensionError, Inertia, JointType, Placement, Scalar, Spatial, Tree, Vec3, Workspace, check_size,
-};
+use crate::inertia::Inertia;
+use crate::scalar::Scalar;
+use crate::{DimensionError, JointType, Placement, Spatial, Tree, Vec3, Workspace};
 
 impl Tree {
     /// Acceleration under the generalised force: `M(q)⁻¹·(force − h(q, v))`, the inverse of
@@ -144,8 +145,8 @@ impl Tree {
         let upward = Spatial { linear: -Vec3::constant(self.gravity), angular: Vec3::zero() };
         for (index, body) in self.bodies.iter().enumerate() {
             if body.joint_type == JointType::Floating {
-                // What the base feels is its acceleration less gravity; the coordinates want the acceleration
-                // itself.
+                // The recursion computes the base's acceleration minus gravity; the coordinates need the
+                // acceleration itself.
                 let rotation = crate::motion::floating_placement(q).rotation;
                 let gravity = rotation.transpose_mul(Vec3::constant(self.gravity));
                 for axis in 0..3 {

@@ -1,8 +1,12 @@
 //! Spatial inertia of a rigid body at an arbitrary origin: linear in the standard parameters, no division by
 //! the mass.
 
+pub use crate::tree::{InertialParameters, PARAMETER_NAMES, PARAMETERS_PER_BODY};
+
 use crate::dense::Cholesky;
-use crate::{BodyMotion, InertialParameters, Mat3, Placement, Scalar, Spatial, Vec3};
+use crate::motion::BodyMotion;
+use crate::scalar::Scalar;
+use crate::{Mat3, Placement, Spatial, Vec3};
 
 /// Inertia of a body (or of several welded together) in one frame, at its origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +26,7 @@ impl<T: Scalar> Inertia<T> {
         Inertia { mass: T::zero(), moment: Vec3::zero(), tensor: Mat3::constant([[0.0; 3]; 3]) }
     }
 
-    /// From the standard parameters, in the order of [`crate::PARAMETER_NAMES`].
+    /// From the standard parameters, in the order of [`crate::inertia::PARAMETER_NAMES`].
     #[inline(always)]
     pub fn from_parameters(parameters: &InertialParameters) -> Self {
         let [mass, x, y, z, xx, xy, yy, xz, yz, zz] = *parameters;
@@ -115,7 +119,7 @@ impl Inertia<f64> {
         Cholesky::of(4, entry).is_some()
     }
 
-    /// The standard parameters, in the order of [`crate::PARAMETER_NAMES`].
+    /// The standard parameters, in the order of [`crate::inertia::PARAMETER_NAMES`].
     pub fn parameters(self) -> InertialParameters {
         let ([x, y, z], i) = (self.moment.0, self.tensor.0);
         [self.mass, x, y, z, i[0][0], i[0][1], i[1][1], i[0][2], i[1][2], i[2][2]]

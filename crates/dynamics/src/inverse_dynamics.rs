@@ -1,6 +1,10 @@
 //! Inverse dynamics: the recursive Newton-Euler algorithm (RNEA).
 
-use crate::{BodyMotion, DimensionError, Inertia, JointType, Scalar, Spatial, Tree, Workspace, check_size};
+use crate::check::check_size;
+use crate::inertia::Inertia;
+use crate::motion::BodyMotion;
+use crate::scalar::Scalar;
+use crate::{DimensionError, JointType, Spatial, Tree, Workspace};
 
 impl Tree {
     /// Generalised force that the motion `(q, v, a)` needs: `M(q)·a + h(q, v)`.

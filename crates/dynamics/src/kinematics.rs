@@ -1,8 +1,9 @@
 //! Where bodies and the centre of mass are, and how they move with the coordinates.
 
-use crate::{
-    DimensionError, Inertia, JointType, Mat3, Placement, Scalar, Spatial, Tree, Vec3, check_index, check_size,
-};
+use crate::check::{check_index, check_size};
+use crate::inertia::Inertia;
+use crate::scalar::Scalar;
+use crate::{DimensionError, JointType, Mat3, Placement, Spatial, Tree, Vec3};
 
 impl Tree {
     /// Placement of every body's frame in the world, one for each body.

@@ -1,72 +1,32 @@
 #![doc = include_str!("../README.md")]
 
+pub mod body_kinematics;
+pub mod check;
+pub mod dense;
+pub mod inertia;
+pub mod random_tree;
+pub mod scalar;
+pub mod urdf;
+
 mod analytic;
 mod articulated_body;
 mod backend;
-mod body_kinematics;
 mod configuration;
-pub mod dense;
 mod forward_dynamics;
-mod inertia;
 mod inverse_dynamics;
 mod kinematics;
 mod mass_matrix;
 mod motion;
-pub mod random_tree;
-mod scalar;
 mod spatial;
 mod tree;
-pub mod urdf;
 mod workspace;
 mod world;
 
 pub use analytic::AnalyticBackend;
 pub use backend::{BackendError, DynamicsBackend, SimulationBackend};
-pub use body_kinematics::{BodyJoint, BodyKinematics, MotionSubspace};
-pub use inertia::Inertia;
-pub use motion::BodyMotion;
-pub use scalar::{Dual, Lanes, Scalar};
+pub use body_kinematics::BodyKinematics;
+pub use check::DimensionError;
 pub use spatial::{Mat3, Placement, Spatial, Vec3};
-pub use tree::{Body, InertialParameters, JointType, Limits, PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree};
+pub use tree::{Body, JointLimits, JointType, Tree};
 pub use workspace::Workspace;
 pub use world::{Foot, World, WorldError};
-
-/// An argument that does not match the robot.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum DimensionError {
-    /// A slice of another length.
-    #[error("{what} has {found} elements, but this robot needs {expected}")]
-    Length {
-        /// Which argument.
-        what: &'static str,
-        /// Its length.
-        found: usize,
-        /// The length that it must have.
-        expected: usize,
-    },
-    /// An index of something that the robot has not.
-    #[error(transparent)]
-    Index(#[from] IndexError),
-}
-
-/// An index that lies beyond what it indexes.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{what} {index} does not exist: there are {count}, counted from 0")]
-pub struct IndexError {
-    /// What is indexed, in the singular.
-    pub what: &'static str,
-    /// The index.
-    pub index: usize,
-    /// How many of them there are.
-    pub count: usize,
-}
-
-/// `Ok` if `index` is below `count`, else an error that names `what` it should index.
-pub fn check_index(what: &'static str, index: usize, count: usize) -> Result<(), IndexError> {
-    if index < count { Ok(()) } else { Err(IndexError { what, index, count }) }
-}
-
-/// `Ok` if `found` is `expected`, else an error that names `what`.
-pub fn check_size(what: &'static str, found: usize, expected: usize) -> Result<(), DimensionError> {
-    if found == expected { Ok(()) } else { Err(DimensionError::Length { what, found, expected }) }
-}

@@ -1,6 +1,9 @@
 //! The mass matrix: the composite rigid body algorithm (CRBA).
 
-use crate::{DimensionError, Inertia, JointType, Scalar, Spatial, Tree, Vec3, Workspace, check_size};
+use crate::check::check_size;
+use crate::inertia::Inertia;
+use crate::scalar::Scalar;
+use crate::{DimensionError, JointType, Spatial, Tree, Vec3, Workspace};
 
 impl Tree {
     /// The mass matrix `M(q)`: dense, symmetric, row by row, `velocity_size` × `velocity_size`.
@@ -64,7 +67,8 @@ impl Tree {
                         matrix[column * size + row] += component;
                     }
                 } else {
-                    // A mimic may be its leader's descendant: then both land on the diagonal, as they should.
+                    // A mimic joint may be its leader's descendant: both contributions are then on the
+                    // diagonal, correctly.
                     let column = ancestor.velocity_index;
                     let coupling = ancestor.motion_axis().dot(force);
                     matrix[row * size + column] += coupling;

@@ -1,6 +1,7 @@
 //! The outward pass that inverse dynamics and the regressor share: how each body moves.
 
-use crate::{Body, JointType, Mat3, Placement, Scalar, Spatial, Tree, Vec3};
+use crate::scalar::Scalar;
+use crate::{Body, JointType, Mat3, Placement, Spatial, Tree, Vec3};
 
 /// Motion of one body, in its own frame.
 #[derive(Clone, Copy, Debug)]

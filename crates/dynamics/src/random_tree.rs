@@ -1,7 +1,8 @@
 //! Random robots and states for tests and benchmarks, the same on every machine for the same seed.
 
+use crate::inertia::Inertia;
 use crate::urdf::{UrdfError, UrdfOptions, read_urdf};
-use crate::{Inertia, JointType, Mat3, Tree, Vec3};
+use crate::{JointType, Mat3, Tree, Vec3};
 use std::fmt::Write;
 
 /// What a random robot is like.
@@ -130,7 +131,7 @@ pub fn random_state(tree: &Tree, random: &mut RandomNumbers) -> RandomState {
         let quaternion: [f64; 4] = loop {
             let candidate = [0; 4].map(|_| random.uniform(-1.0, 1.0));
             let norm = candidate.iter().map(|x| x * x).sum::<f64>().sqrt();
-            // Outside the ball the directions crowd in the cube's corners; near the centre they lose digits.
+            // Points outside the ball would favour the cube's diagonals; those near the centre lose digits.
             if (0.1..=1.0).contains(&norm) {
                 break candidate.map(|x| x / norm);
             }
@@ -155,7 +156,7 @@ fn recent<'a>(links: &'a [String], random: &mut RandomNumbers) -> &'a str {
 }
 
 fn write_link(xml: &mut String, name: &str, random: &mut RandomNumbers) {
-    // A cloud of point masses is a real body, whatever the numbers.
+    // The inertia of a cloud of point masses is always that of a real body.
     let points = [0; 5].map(|_| (random.uniform(0.1, 1.0), Vec3(random.vector(0.2))));
     let cloud = points.iter().fold(Inertia::zero(), |sum, &(mass, point)| {
         sum + Inertia::from_center_of_mass(mass, point, Mat3::constant([[0.0; 3]; 3]))

@@ -2,7 +2,7 @@
 //!
 //! Spatial vectors keep their linear and angular halves apart, linear first (Pinocchio's order).
 
-use crate::Scalar;
+use crate::scalar::Scalar;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
 /// A vector in 3-D space.

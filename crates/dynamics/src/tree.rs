@@ -1,6 +1,7 @@
 //! The kinematic tree: bodies in depth-first order, each behind one joint.
 
-use crate::{Mat3, Placement, Scalar, Spatial, Vec3};
+use crate::scalar::Scalar;
+use crate::{Mat3, Placement, Spatial, Vec3};
 
 /// Number of standard inertial parameters of a body.
 pub const PARAMETERS_PER_BODY: usize = 10;
@@ -28,7 +29,7 @@ pub enum JointType {
 
 /// Limits of a joint; an absent one is infinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
+pub struct JointLimits {
     /// Lowest position \[rad, m\].
     pub lower: f64,
     /// Highest position \[rad, m\].
@@ -55,7 +56,7 @@ pub struct Body {
     /// Unit axis in the joint frame (unused for a floating base).
     pub axis: Vec3<f64>,
     /// Limits of the joint.
-    pub limits: Limits,
+    pub limits: JointLimits,
     /// Index of the body's first velocity coordinate. Mimic joints share that of their leader.
     pub velocity_index: usize,
     /// Position = `ratio` · coordinate + `offset`; 1 and 0 but for `<mimic>` joints.
@@ -187,7 +188,11 @@ impl Tree {
     /// # Errors
     /// [`crate::DimensionError`] if there are not ten for each body.
     pub fn set_inertial_parameters(&mut self, parameters: &[f64]) -> Result<(), crate::DimensionError> {
-        crate::check_size("inertial parameters", parameters.len(), PARAMETERS_PER_BODY * self.bodies.len())?;
+        crate::check::check_size(
+            "inertial parameters",
+            parameters.len(),
+            PARAMETERS_PER_BODY * self.bodies.len(),
+        )?;
         for (body, values) in self.bodies.iter_mut().zip(parameters.chunks_exact(PARAMETERS_PER_BODY)) {
             body.inertial.copy_from_slice(values);
         }

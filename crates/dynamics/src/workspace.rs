@@ -1,7 +1,11 @@
 //! Preallocated scratch of the dynamics algorithms.
 
 use crate::articulated_body::ArticulatedBody;
-use crate::{BodyMotion, DimensionError, Inertia, Placement, Scalar, Spatial, Tree, check_size};
+use crate::check::check_size;
+use crate::inertia::Inertia;
+use crate::motion::BodyMotion;
+use crate::scalar::Scalar;
+use crate::{DimensionError, Placement, Spatial, Tree};
 
 /// Scratch memory for the algorithms of a [`Tree`]: make it once per thread, reuse it for every sample.
 ///

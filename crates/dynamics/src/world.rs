@@ -1,6 +1,7 @@
 //! What surrounds a simulated robot: a floor under its feet, rotors behind its joints.
 
-use crate::{DimensionError, Tree, check_size};
+use crate::check::check_size;
+use crate::{DimensionError, Tree};
 
 /// The world of a simulated robot, the same for every physics engine.
 ///

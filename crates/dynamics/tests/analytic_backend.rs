@@ -149,7 +149,8 @@ fn base_wrench_is_newtons() {
 
 /// Linear momentum, and angular momentum about the world's origin.
 fn momentum_about_origin(tree: &Tree, q: &[f64], v: &[f64]) -> Vec<f64> {
-    use phiw_dynamics::{Inertia, Spatial, Vec3};
+    use phiw_dynamics::inertia::Inertia;
+    use phiw_dynamics::{Spatial, Vec3};
     let mut placements = vec![Placement::identity(); tree.bodies().len()];
     tree.forward_kinematics(q, &mut placements).unwrap();
     let mut jacobian = vec![0.0; 6 * tree.velocity_size()];

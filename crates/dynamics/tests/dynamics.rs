@@ -4,8 +4,10 @@
 mod arbitrary;
 
 use arbitrary::{assert_close, dot, inverse_dynamics, mass_matrix, robot, times};
+use phiw_dynamics::inertia::Inertia;
 use phiw_dynamics::random_tree::RandomState;
-use phiw_dynamics::{Dual, Inertia, Placement, Spatial, Tree, Vec3, Workspace};
+use phiw_dynamics::scalar::Dual;
+use phiw_dynamics::{Placement, Spatial, Tree, Vec3, Workspace};
 use proptest::prelude::*;
 
 /// ½·Σ of each body's mass and inertia with its velocity, from Jacobians: no mass matrix involved.

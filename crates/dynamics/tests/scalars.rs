@@ -4,7 +4,8 @@ mod arbitrary;
 
 use arbitrary::{assert_close, inverse_dynamics, robot};
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, random_state};
-use phiw_dynamics::{Dual, Lanes, Scalar, Tree, Workspace};
+use phiw_dynamics::scalar::{Dual, Lanes, Scalar};
+use phiw_dynamics::{Tree, Workspace};
 use proptest::prelude::*;
 
 fn pack(samples: &[Vec<f64>; 4]) -> Vec<Lanes<4>> {

@@ -1,12 +1,11 @@
 //! The catalogue finds kinds of effects by name, declares them for a robot, and builds them from a model's
 //! file.
 
-use crate::{Constants, EffectKind, FittedEffect, SignalRanges};
+use crate::{EffectKind, FittedEffect, SignalRanges};
 use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};
 use phiw_dynamics::Tree;
-use phiw_identification::{
-    Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, JointProperty, Variants,
-};
+use phiw_identification::effect::{EffectError, EffectParameter, JointProperty};
+use phiw_identification::{Effect, EffectCatalogue, EffectSpec, Variants};
 
 /// Kinds of effects by name, in the order of simplicity: of two that explain alike, the earlier is preferred.
 pub struct Catalogue {
@@ -91,11 +90,10 @@ impl Catalogue {
         let Some(declared) = kind.declared_constants() else {
             return Err(EffectError::NotDeclarable { kind: name.to_owned() });
         };
-        let agrees = |constants: &Constants| {
-            declared.iter().all(|(name, value)| constants.get(name).is_none_or(|other| other == value))
-        };
         let variants = |site: Vec<usize>| -> Variants {
-            let scanned = kind.scan(&site, ranges).into_iter().filter(agrees);
+            let scanned = kind.scan(&site, ranges).into_iter().filter(|constants| {
+                declared.iter().all(|(name, value)| constants.get(name).is_none_or(|other| other == value))
+            });
             scanned.map(|constants| kind.build(tree, &site, &constants)).collect()
         };
         Ok(kind.sites(tree).into_iter().map(variants).collect())
@@ -105,11 +103,14 @@ impl Catalogue {
 impl EffectCatalogue for Catalogue {
     fn build(&self, spec: &EffectSpec, tree: &Tree) -> Result<Box<dyn Effect>, EffectError> {
         let kind = self.kind(&spec.kind)?;
-        let index = |joint: &String| {
-            let unknown = EffectError::UnknownJoint { kind: spec.kind.clone(), joint: joint.clone() };
-            tree.joint_index(joint).ok_or(unknown)
-        };
-        let site: Result<Vec<usize>, EffectError> = spec.joints.iter().map(index).collect();
+        let site: Result<Vec<usize>, EffectError> = spec
+            .joints
+            .iter()
+            .map(|joint| {
+                let unknown = EffectError::UnknownJoint { kind: spec.kind.clone(), joint: joint.clone() };
+                tree.joint_index(joint).ok_or(unknown)
+            })
+            .collect();
         let site = site?;
         if !kind.accepts(tree, &site) {
             return Err(EffectError::WrongJoints {
@@ -124,4 +125,10 @@ impl EffectCatalogue for Catalogue {
     fn joint_property(&self, spec: &EffectSpec) -> Option<JointProperty> {
         self.kind(&spec.kind).ok()?.joint_property()
     }
+}
+
+/// What an effect of [`Catalogue::default`] means, with its fitted values; kinds that it does not know get
+/// their name and numbers.
+pub fn sentence(spec: &EffectSpec, parameters: &[EffectParameter], fitted: &[f64]) -> String {
+    Catalogue::default().sentence(spec, parameters, fitted)
 }

@@ -1,10 +1,11 @@
-//! What most effects are built of: a formula for some columns in one joint's own torque.
+//! Most effects are a formula for some columns in one joint's own torque.
 
 use crate::Constants;
 use phiw_dynamics::{JointType, Tree};
-use phiw_identification::{
-    Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, QuadraticForm, QuadraticTerm, Sample,
+use phiw_identification::effect::{
+    EffectParameter, Entry, Evaluator, Needs, QuadraticForm, QuadraticTerm, Sample,
 };
+use phiw_identification::{Effect, EffectSpec};
 
 /// sign(v), smoothed over the speed `width`; the plain sign where `width` is zero.
 #[inline]

@@ -1,13 +1,13 @@
-//! Two joints behind one transmission: each feels the other's motion, or their sum (differential wrists).
+//! Two joints behind one transmission: the torque of each depends on the other's motion, or on their sum
+//! (differential wrists).
 
 use crate::columns::{ParameterKind, smooth_sign};
 use crate::fitted::FittedEffect;
 use crate::friction::WIDTH;
 use crate::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
 use phiw_dynamics::Tree;
-use phiw_identification::{
-    Effect, EffectParameter, EffectSpec, Entry, Evaluator, QuadraticForm, QuadraticTerm, Sample,
-};
+use phiw_identification::effect::{EffectParameter, Entry, Evaluator, QuadraticForm, QuadraticTerm, Sample};
+use phiw_identification::{Effect, EffectSpec};
 
 /// Torque at one joint from the motion of another, both ways or one way.
 ///
@@ -189,7 +189,7 @@ fn distance(tree: &Tree, first: usize, second: usize) -> usize {
     };
     let (first, second) = (path(first), path(second));
     let shared = first.iter().rev().zip(second.iter().rev()).take_while(|(a, b)| a == b).count();
-    // Siblings hang on the world or on one body: count the way over it.
+    // Siblings have the world or one body as their parent: the distance between them goes over it.
     first.len() + second.len() - 2 * shared
 }
 
@@ -265,7 +265,8 @@ mod tests {
     use super::{Coupling, Motion, TERMS};
     use phiw_identification::{Effect, EffectSpec};
 
-    /// The power of a term's columns is what its entries of the matrix say: twice the entry times both speeds.
+    /// The power of a term's columns is what its entries of the matrix say: twice the entry times both
+    /// speeds.
     #[test]
     fn the_quadratic_form_of_a_coupling_is_the_power_of_its_columns() {
         let speeds = [0.7, -1.3];

@@ -5,14 +5,15 @@ use crate::fitted::FittedEffect;
 use crate::friction::WIDTH;
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, values};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, Sample};
+use phiw_identification::Effect;
+use phiw_identification::effect::Sample;
 
 /// Viscous and Coulomb friction times a factor that falls from one to zero: exp(−t / `time_constant`), or
 /// with the temperature where the log has one (`time_constant` zero).
 pub struct ThermalDrift;
 
 const TIME_CONSTANT: &str = "time_constant";
-/// Temperatures enter over this span \[K\], so that the parameters are torques at a change worth speaking of.
+/// Temperatures enter over this span \[K\], so that the parameters are torques at a change that is usual.
 const TEMPERATURE_SPAN: f64 = 10.0;
 const ROOM_TEMPERATURE: f64 = 20.0;
 

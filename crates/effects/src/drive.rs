@@ -1,10 +1,11 @@
-//! What the motor and its measurement add: rotor inertia, offset, gain.
+//! Effects of the motor and its torque measurement: rotor inertia, offset, gain.
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, JointProperty, Needs, QuadraticForm, Sample};
+use phiw_identification::Effect;
+use phiw_identification::effect::{JointProperty, Needs, QuadraticForm, Sample};
 
 /// Ia·q̈.
 pub struct RotorInertia;

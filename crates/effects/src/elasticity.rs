@@ -3,7 +3,8 @@
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal, constant};
 use phiw_dynamics::{JointType, Tree};
-use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
+use phiw_identification::effect::{EffectParameter, Entry, Evaluator, Needs, Sample};
+use phiw_identification::{Effect, EffectSpec};
 
 /// The encoder sits on the motor: the link lags behind it by τ/k. Linear in the compliance 1/k, about the
 /// value that is in force already: the link's position, velocity and acceleration differ by −τ/k, −τ̇/k,

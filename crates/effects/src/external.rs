@@ -1,9 +1,11 @@
-//! What acts from outside or has been added: a payload, a force, gravity from another direction.
+//! External effects: a payload, a force, gravity from another direction.
 
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal};
-use phiw_dynamics::{PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree};
-use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
+use phiw_dynamics::Tree;
+use phiw_dynamics::inertia::{PARAMETER_NAMES, PARAMETERS_PER_BODY};
+use phiw_identification::effect::{EffectParameter, Entry, Evaluator, Needs, Sample};
+use phiw_identification::{Effect, EffectSpec};
 use phiw_regressor::JointTorqueRegressor;
 
 /// A rigid body held at a link: mass, first moment and inertia.
@@ -244,11 +246,12 @@ fn body_of(tree: &Tree, joint: usize) -> usize {
 
 /// Rows that a body acts on, and the place of its ten numbers in the regressor's pairs.
 fn pairs_of(regressor: &JointTorqueRegressor, body: usize) -> Vec<(usize, usize)> {
-    let place = |row: usize| {
-        let position = regressor.row_bodies(row).iter().position(|&other| other == body)?;
-        Some((row, regressor.row_range(row).start + PARAMETERS_PER_BODY * position))
-    };
-    (0..regressor.rows()).filter_map(place).collect()
+    (0..regressor.rows())
+        .filter_map(|row| {
+            let position = regressor.row_bodies(row).iter().position(|&other| other == body)?;
+            Some((row, regressor.row_range(row).start + PARAMETERS_PER_BODY * position))
+        })
+        .collect()
 }
 
 fn standard_unit(name: &str) -> &'static str {

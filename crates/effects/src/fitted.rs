@@ -1,7 +1,7 @@
-//! An effect with its fitted values, and how it is said to a user.
+//! An effect with its fitted values, and its description for a user.
 
-use crate::Catalogue;
-use phiw_identification::{EffectParameter, EffectSpec};
+use phiw_identification::EffectSpec;
+use phiw_identification::effect::EffectParameter;
 
 /// An effect and the values of its parameters, as its kind's sentence needs them
 /// ([`crate::EffectKind::sentence`]).
@@ -67,12 +67,6 @@ impl<'a> FittedEffect<'a> {
             self.quantities().map(|(name, value)| format!("{name} = {value}")).collect();
         format!("{} on {}: {}.", self.spec.kind.replace('_', " "), self.joints(), values.join(", "))
     }
-}
-
-/// What an effect of [`Catalogue::default`] means, with its fitted values; kinds that it does not know get
-/// their name and numbers.
-pub fn sentence(spec: &EffectSpec, parameters: &[EffectParameter], fitted: &[f64]) -> String {
-    Catalogue::default().sentence(spec, parameters, fitted)
 }
 
 /// Three significant digits and the unit.

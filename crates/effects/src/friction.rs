@@ -4,7 +4,8 @@ use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, product, values};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, JointProperty, Needs, QuadraticForm, Sample};
+use phiw_identification::Effect;
+use phiw_identification::effect::{JointProperty, Needs, QuadraticForm, Sample};
 
 /// The constant of every smoothed sign: the speed over which it turns \[rad/s, m/s\].
 pub(crate) const WIDTH: &str = "sign_width";
@@ -233,7 +234,7 @@ impl EffectKind for Stribeck {
             } else {
                 relative.powf(exponent)
             };
-            // Far above the Stribeck velocity nothing is left.
+            // Far above the Stribeck velocity the exponential is below the last digit of one.
             out[0] = if power > 40.0 { 0.0 } else { (-power).exp() * smooth_sign(velocity, width) };
         };
         let parameters = [("fs", ParameterKind::Torque, 0.0)];

@@ -4,7 +4,8 @@ use crate::columns::{Formula, OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, SignalRanges, around, constant, values};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, Sample};
+use phiw_identification::Effect;
+use phiw_identification::effect::Sample;
 
 /// A torque that depends on the way since the last reversal (Dahl 1968): dz = (1 − sign(q̇)·z)·dq /
 /// `presliding`.
@@ -58,7 +59,7 @@ impl Formula for Dahl {
 
     fn columns(&self, memory: &mut Self::Memory, sample: &Sample<'_>, columns: &mut [f64]) {
         let position = sample.q()[self.joint];
-        // Before the first move nothing is known of the past: start relaxed.
+        // The motion before the log is unknown: the hysteresis starts relaxed.
         let (state, before) = memory.unwrap_or((0.0, position));
         let way = position - before;
         // The exact solution over a monotonic step.

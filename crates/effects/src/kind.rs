@@ -1,8 +1,9 @@
-//! What the catalogue knows of a kind of effect.
+//! The description of a kind of effect in the catalogue.
 
 use crate::FittedEffect;
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, JointProperty};
+use phiw_identification::Effect;
+use phiw_identification::effect::JointProperty;
 use phiw_telemetry::Survey;
 use std::collections::BTreeMap;
 
@@ -76,7 +77,7 @@ pub trait EffectKind: Send + Sync {
         false
     }
 
-    /// The motion, or the signal, that would tell it from its rivals.
+    /// The motion, or the signal, that would distinguish it from its rivals.
     fn telling_motion(&self) -> &'static str;
 
     /// What it means when it was found, with its fitted values, in one sentence to a user: its name and

@@ -14,7 +14,7 @@ mod kind;
 mod position;
 mod sensing;
 
-pub use catalogue::Catalogue;
+pub use catalogue::{Catalogue, sentence};
 pub use columns::{Formula, OwnTorque, ParameterKind, smooth_sign};
-pub use fitted::{FittedEffect, sentence};
+pub use fitted::FittedEffect;
 pub use kind::{Constants, EffectKind, JointRange, Signal, SignalRanges};

@@ -4,7 +4,8 @@ use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant, product, values};
 use phiw_dynamics::{JointType, Tree};
-use phiw_identification::{Effect, Sample};
+use phiw_identification::Effect;
+use phiw_identification::effect::Sample;
 
 /// k·(q − q0).
 pub struct JointSpring;
@@ -42,8 +43,10 @@ impl EffectKind for GravityBalancer {
         "gravity_balancer"
     }
     fn sites(&self, tree: &Tree) -> Vec<Vec<usize>> {
-        let turns = |&joint: &usize| tree.joint(joint).joint_type != JointType::Prismatic;
-        (0..tree.joint_count()).filter(turns).map(|joint| vec![joint]).collect()
+        (0..tree.joint_count())
+            .filter(|&joint| tree.joint(joint).joint_type != JointType::Prismatic)
+            .map(|joint| vec![joint])
+            .collect()
     }
     fn acts_on(&self) -> &'static str {
         "one joint that turns"

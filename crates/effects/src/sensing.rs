@@ -1,10 +1,11 @@
-//! What stands between the torque that acts and the numbers in the log: delay, encoder offset, saturation.
+//! Effects of measurement on the logged torque and position: delay, encoder offset, saturation.
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant, values};
 use phiw_dynamics::{JointType, Tree};
-use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Needs, Sample};
+use phiw_identification::effect::{EffectParameter, Entry, Evaluator, Needs, Sample};
+use phiw_identification::{Effect, EffectSpec};
 use phiw_telemetry::Block;
 
 /// The torque is stamped later (positive) or earlier than the position: on one joint, or on all alike.
@@ -233,8 +234,8 @@ impl EffectKind for ActuatorSaturation {
         "actuator_saturation"
     }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
-        // A drive that clips most of the time would be no drive: and below the torque's own level the column
-        // is the torque itself.
+        // A level that most samples exceed is implausible for a drive, and its column would be the torque
+        // itself.
         let range = ranges.joints[site[0]];
         let (lowest, highest) = (1.2 * range.torque_rms, 0.97 * range.torque_peak);
         if lowest >= highest {

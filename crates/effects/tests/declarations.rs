@@ -3,7 +3,8 @@
 use phiw_dynamics::Tree;
 use phiw_dynamics::random_tree::{RandomNumbers, RandomTreeOptions, random_state, random_tree};
 use phiw_effects::{Catalogue, JointRange, SignalRanges};
-use phiw_identification::{Design, Effect, EffectCatalogue, EffectParameter, EffectSpec, ReferenceModel};
+use phiw_identification::effect::{EffectParameter, ReferenceModel};
+use phiw_identification::{Design, Effect, EffectCatalogue, EffectSpec};
 use phiw_regressor::BaseParameters;
 use phiw_telemetry::Block;
 use proptest::prelude::*;
@@ -178,7 +179,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
     /// The estimators rely on it: noise of a period is accounted for exactly in what is linear, and in what
-    /// looks ahead it is not to be told from the motion.
+    /// looks ahead the motion alone does not determine it.
     #[test]
     fn what_effects_declare_is_true_of_their_columns(seed in 0u64..100_000, joints in 1usize..5) {
         let zoo = Zoo::new(seed, joints);

@@ -3,7 +3,8 @@
 use phiw_dynamics::Tree;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_effects::{Catalogue, EffectKind, JointRange, SignalRanges};
-use phiw_identification::{EffectParameter, EffectSpec};
+use phiw_identification::EffectSpec;
+use phiw_identification::effect::EffectParameter;
 
 const ARM: &str = r#"<robot name="arm">
   <link name="base"/>

@@ -1,7 +1,8 @@
 //! What can go wrong in an estimation.
 
 use phiw_dynamics::DimensionError;
-use phiw_identification::{EffectError, IdentificationError};
+use phiw_identification::IdentificationError;
+use phiw_identification::effect::EffectError;
 use phiw_regressor::RegressorError;
 
 /// Why parameters can not be estimated.

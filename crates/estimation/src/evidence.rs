@@ -3,7 +3,8 @@
 use super::foresight;
 use super::stored::StoredFactor;
 use crate::{EstimationError, MotionLog};
-use phiw_identification::{Design, Fold, IdentificationError, accumulate};
+use phiw_identification::fitting::accumulate;
+use phiw_identification::{Design, Fold, IdentificationError};
 use phiw_regressor::factor::Factor;
 use phiw_regressor::least_squares::{Group, GroupedFactor};
 use phiw_telemetry::Block;
@@ -106,7 +107,7 @@ impl Evidence {
     /// None that a design can cause.
     pub fn none(design: &Design, settings: impl Into<EvidenceSettings>) -> Result<Self, EstimationError> {
         let settings = settings.into();
-        let group = |row: &phiw_identification::RowLayout| Group {
+        let group = |row: &phiw_identification::design::RowLayout| Group {
             parameters: row.parameters.clone(),
             factor: Factor::empty(row.parameters.len() + 1),
         };

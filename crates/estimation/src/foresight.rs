@@ -88,7 +88,7 @@ pub(super) fn factor(
         }
         Ok(())
     })?;
-    let group = |(builder, layout): (&mut FactorBuilder, &phiw_identification::RowLayout)| Group {
+    let group = |(builder, layout): (&mut FactorBuilder, &phiw_identification::design::RowLayout)| Group {
         parameters: layout.parameters.clone(),
         factor: builder.factor(),
     };

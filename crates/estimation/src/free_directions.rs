@@ -1,7 +1,8 @@
 //! The directions in which a robot can move while some of its bodies stand still.
 
 use faer::Mat;
-use phiw_dynamics::{DimensionError, Placement, Tree, Vec3, check_index};
+use phiw_dynamics::check::check_index;
+use phiw_dynamics::{DimensionError, Placement, Tree, Vec3};
 
 /// An orthonormal basis of the velocities at `q` that do not move `bodies`, as columns: the null space of
 /// their Jacobians, from a QR decomposition.

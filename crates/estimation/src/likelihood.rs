@@ -9,7 +9,7 @@ use crate::robot::spheres;
 use crate::{EstimationError, RobotModel};
 use faer::prelude::Solve;
 use faer::{Mat, Side};
-use phiw_dynamics::check_size;
+use phiw_dynamics::check::check_size;
 use phiw_identification::Design;
 use phiw_regressor::least_squares::GroupedFactor;
 
@@ -17,8 +17,8 @@ use phiw_regressor::least_squares::GroupedFactor;
 ///
 /// The paper's plant adds noise δ to the commanded torque f on its way to the robot, and logs the command:
 /// Φ(q, q̇, q̈)·w = f + δ, and δ is in q̈. What is random is the motion, not the right-hand side. Its density
-/// is that of δ times the Jacobian
-/// |∂δ/∂q̈| = det J(q; w), J the mass matrix (and what friction does within a period, in closed form), so with σ_j the noise of torque j
+/// is that of δ times the Jacobian |∂δ/∂q̈| = det J(q; w), J the mass matrix (and what friction does within a
+/// period, in closed form), so with σ_j the noise of torque j
 ///
 /// −log L(w) = Σ_t ½‖Φ_t w − f_t‖²_σ − Σ_t log det J_t(w).
 ///

@@ -1,7 +1,7 @@
 //! What was believed before anything was measured, as rows beside those that were measured.
 
 use crate::{EstimationError, RobotModel};
-use phiw_dynamics::check_size;
+use phiw_dynamics::check::check_size;
 use phiw_identification::Design;
 use phiw_regressor::factor::FactorBuilder;
 use phiw_regressor::least_squares::{Group, GroupedFactor};

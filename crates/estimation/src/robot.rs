@@ -1,8 +1,11 @@
 //! The robot as it is declared, and what is believed of it.
 
 use crate::{EstimationError, NewtonSettings};
-use phiw_dynamics::{InertialParameters, PARAMETERS_PER_BODY, Tree, check_size};
-use phiw_identification::{Design, EffectCatalogue, EffectSpec, ReferenceModel};
+use phiw_dynamics::Tree;
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::inertia::{InertialParameters, PARAMETERS_PER_BODY};
+use phiw_identification::effect::ReferenceModel;
+use phiw_identification::{Design, EffectCatalogue, EffectSpec};
 use phiw_regressor::BaseParameters;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
@@ -262,7 +265,7 @@ pub(crate) fn spheres(standard: &[f64], settings: &NewtonSettings) -> Vec<f64> {
         let centre = phiw_dynamics::Vec3([body[1], body[2], body[3]].map(|moment| moment / mass));
         let moment = mass * settings.sphere_radius * settings.sphere_radius;
         let tensor = phiw_dynamics::Mat3([[moment, 0.0, 0.0], [0.0, moment, 0.0], [0.0, 0.0, moment]]);
-        phiw_dynamics::Inertia::from_center_of_mass(mass, centre, tensor).parameters()
+        phiw_dynamics::inertia::Inertia::from_center_of_mass(mass, centre, tensor).parameters()
     };
     standard.chunks_exact(PARAMETERS_PER_BODY).flat_map(sphere).collect()
 }

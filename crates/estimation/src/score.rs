@@ -15,7 +15,8 @@ use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, Mat, Par, Side};
 use phiw_dynamics::dense::{Cholesky, dot};
-use phiw_identification::{Design, EffectSpec, RowLayout};
+use phiw_identification::design::RowLayout;
+use phiw_identification::{Design, EffectSpec};
 use std::ops::Range;
 
 /// What an effect beside the model would save.

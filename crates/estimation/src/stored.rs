@@ -1,6 +1,7 @@
 //! Grouped factors as numbers that a run is saved with, and back, to the last bit.
 
-use phiw_identification::{FactorRows, IdentificationError};
+use phiw_identification::IdentificationError;
+use phiw_identification::fitting::FactorRows;
 use phiw_regressor::least_squares::{Group, GroupedFactor};
 use serde::{Deserialize, Serialize};
 

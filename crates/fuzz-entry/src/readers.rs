@@ -3,7 +3,7 @@
 use crate::structured;
 use phiw_bspline_retarget::c3d::read_c3d;
 use phiw_bspline_retarget::human::MarkerMap;
-use phiw_bspline_retarget::{MarkerRecording, MarkerSettings, read_recording};
+use phiw_bspline_retarget::markers::{MarkerRecording, MarkerSettings, read_recording};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Tree, Workspace};
 use phiw_effects::Catalogue;

@@ -6,7 +6,8 @@ use crate::{BlockSource, Design, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, FactorBuilder};
 use phiw_regressor::least_squares::{Group, GroupedFactor};
-use phiw_telemetry::{Block, FilterScratch};
+use phiw_telemetry::Block;
+use phiw_telemetry::filter::FilterScratch;
 use rayon::prelude::*;
 
 /// A stretch of time of one log whose rows are kept apart: to be left out, or held out.
@@ -49,18 +50,24 @@ pub fn accumulate(
     });
     let mut merged: Vec<Vec<Option<Factor>>> = vec![vec![None; design.rows().len()]; folds.len()];
     try_for_each_batch(sources, |batch| reduce(design, &folds, batch, &mut merged))?;
-    let group = |(factor, layout): (Option<Factor>, &crate::RowLayout)| Group {
-        factor: factor.unwrap_or_else(|| Factor::empty(layout.range.len())),
-        parameters: layout.parameters.clone(),
-    };
     let grouped = |rows: Vec<Option<Factor>>| {
-        let groups = rows.into_iter().zip(design.rows()).map(group).collect();
+        let groups = rows
+            .into_iter()
+            .zip(design.rows())
+            .map(|(factor, layout)| Group {
+                factor: factor.unwrap_or_else(|| Factor::empty(layout.range.len())),
+                parameters: layout.parameters.clone(),
+            })
+            .collect();
         Ok(GroupedFactor::new(design.parameter_count(), groups)?)
     };
     let read: Vec<GroupedFactor> =
         merged.into_iter().map(grouped).collect::<Result<_, IdentificationError>>()?;
-    let of_fold = |fold: &Fold| folds.iter().position(|other| other == fold);
-    Ok(named.iter().filter_map(of_fold).map(|place| read[place].clone()).collect())
+    Ok(named
+        .iter()
+        .filter_map(|fold| folds.iter().position(|other| other == fold))
+        .map(|place| read[place].clone())
+        .collect())
 }
 
 fn reduce(
@@ -94,7 +101,7 @@ struct Piece {
 
 struct Worker<'a> {
     design: &'a Design,
-    scratch: crate::DesignScratch<'a>,
+    scratch: crate::design::DesignScratch<'a>,
     filter: FilterScratch,
     builders: Vec<FactorBuilder>,
 }

@@ -2,7 +2,7 @@
 //! paper's section 5.
 //!
 //! They need the true parameters, or motion without noise, which no robot gives. For a real one
-//! [`torque_error`](crate::torque_error) on folds held out is what can be had.
+//! [`torque_error`](crate::fitting::torque_error) on folds held out is the measure instead.
 
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::Factor;
@@ -98,7 +98,7 @@ mod tests {
         for (estimates, truth, well, with_bias) in [
             (&[1.0, 1.05, 0.95][..], 1.0, true, true),
             (&[1.0, 2.0, 0.5], 1.0, false, false),
-            // Sharp, but wrong.
+            // A small standard deviation, but a large error.
             (&[1.5, 1.51, 1.49], 1.0, true, false),
             (&[0.01, -0.02, 0.03], 0.005, true, true),
         ] {

@@ -27,7 +27,7 @@ pub trait BlockSource: Sync {
 /// Blocks in memory, such as those of a [`Recording`](phiw_telemetry::Recording::blocks).
 impl BlockSource for Vec<Block> {
     fn stream(&self, sink: &mut dyn FnMut(Block) -> ControlFlow<()>) -> Result<(), LogError> {
-        // A sink that has seen enough is no failure.
+        // A sink that stops early is not an error.
         let _ = self.iter().cloned().try_for_each(sink);
         Ok(())
     }
@@ -81,10 +81,11 @@ mod tests {
     use crate::IdentificationError;
 
     fn blocks(count: usize) -> Vec<Block> {
-        let block = |index: usize| {
-            Block::unfiltered(1, vec![index as f64], [vec![0.0], vec![0.0], vec![0.0]], vec![0.0])
-        };
-        (0..count).map(block).collect()
+        (0..count)
+            .map(|index| {
+                Block::unfiltered(1, vec![index as f64], [vec![0.0], vec![0.0], vec![0.0]], vec![0.0])
+            })
+            .collect()
     }
 
     /// Each pass kept an error aside and read the log to its end.

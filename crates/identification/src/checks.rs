@@ -1,5 +1,7 @@
 //! Whether logs and a robot fit each other, before anything is computed.
 
+pub use crate::robot_findings::robot_findings;
+
 use crate::{Design, Effect};
 use phiw_dynamics::{JointType, Tree};
 use phiw_limits::Limits;
@@ -293,7 +295,7 @@ fn check_size(
     if bytes > most { Err(InputError::TooLarge { joints, parameters, bytes, most }) } else { Ok(()) }
 }
 
-/// Checks that every joint moves in some log: what stands still tells nothing of itself.
+/// Checks that every joint moves in some log: the parameters of what stands still are unidentifiable.
 ///
 /// # Errors
 /// The first joint that does not.

@@ -1,14 +1,17 @@
 //! A fitted design with bodies that can exist: the same factors, over possible bodies and dissipative effects
 //! alone.
 //!
-//! What the logs do not tell comes from the URDF. How much it weighs is chosen by the error on training folds that
-//! are left out; held-out folds fit nothing here either.
+//! What the logs do not tell comes from the URDF. How much it weighs is chosen by the error on training folds
+//! that are left out; held-out folds fit nothing here either.
 
-use crate::{Design, Fit, IdentificationError, QuadraticForm, TorqueError, torque_error};
+use crate::effect::QuadraticForm;
+use crate::fit::{Fit, TorqueError, merge, torque_error};
+use crate::{Design, IdentificationError};
 use phiw_consistency::{
     MatrixTerm, PriorSettings, Problem, PseudoInertia, Settings, Solution, possible_priors,
 };
-use phiw_dynamics::{PARAMETERS_PER_BODY, Tree};
+use phiw_dynamics::Tree;
+use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, leave_one_out};
 use phiw_regressor::least_squares::GroupedFactor;
@@ -17,14 +20,14 @@ use rayon::prelude::*;
 /// How bodies are made possible.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConsistentSettings {
-    /// Weights of the prior that are tried, ascending. One is worth one nat of the likelihood for each unit of
-    /// divergence if the samples were independent; they are not, so that the best is mostly above one. On the six
-    /// robots of docs/results/consistent.md it is between the ends of these.
+    /// Weights of the prior that are tried, ascending. One is worth one nat of the likelihood for each unit
+    /// of divergence if the samples were independent; they are not, so that the best is mostly above one. On
+    /// the six robots of docs/results/consistent.md it is between the ends of these.
     pub weights: Vec<f64>,
     /// The weight where there are too few training folds to leave one out.
     pub default_weight: f64,
-    /// Training folds are merged into at most this many before one after the other is left out: more cost time
-    /// and have not changed a choice by more than its neighbour.
+    /// Training folds are merged into at most this many before one after the other is left out: more cost
+    /// time and have not changed a choice by more than its neighbour.
     pub folds: usize,
     /// The least standard deviation of a torque's residual, over the torque's RMS: a log without noise would
     /// leave no digits for the bodies.
@@ -65,8 +68,8 @@ pub enum Known {
 pub struct Consistent {
     /// Standard parameters, ten for each body of the tree: every body possible.
     pub standard: Vec<f64>,
-    /// Parameters of the design: base parameters of these bodies, then those of the effects; zero where the fit
-    /// did not determine an effect's.
+    /// Parameters of the design: base parameters of these bodies, then those of the effects; zero where the
+    /// fit did not determine an effect's.
     pub parameters: Vec<f64>,
     /// Weight of the prior that was chosen.
     pub weight: f64,
@@ -128,7 +131,7 @@ fn row_weights(
     folds: &[GroupedFactor],
     settings: &ConsistentSettings,
 ) -> Result<Vec<f64>, RegressorError> {
-    let all = crate::merge(folds)?;
+    let all = merge(folds)?;
     let weight = |(std, group): (&f64, &phiw_regressor::least_squares::Group)| {
         let square = group.factor.right_hand_side_sum_of_squares() / group.factor.rows().max(1) as f64;
         let std = std.max(settings.least_residual * square.sqrt());
@@ -137,13 +140,13 @@ fn row_weights(
     Ok(fit.residual_std.iter().zip(all.groups()).map(weight).collect())
 }
 
-/// The folds as at most `count` weighted factors. Neighbours are kept apart: logs of one kind of motion follow one
-/// another, and what is left out should not be the only one of its kind.
+/// The folds as at most `count` weighted factors. Neighbours are kept apart: logs of one kind of motion
+/// follow one another, and what is left out should not be the only one of its kind.
 fn merged(folds: &[GroupedFactor], count: usize, weights: &[f64]) -> Result<Vec<Factor>, RegressorError> {
     let count = count.clamp(1, folds.len().max(1));
     let block = |first: usize| {
         let own: Vec<GroupedFactor> = folds.iter().skip(first).step_by(count).cloned().collect();
-        crate::merge(&own)?.combine(weights)
+        merge(&own)?.combine(weights)
     };
     (0..count).map(block).collect()
 }
@@ -178,8 +181,8 @@ fn choose_weight(
     Ok(best.map_or(settings.default_weight, |best| settings.weights[best]))
 }
 
-/// From the factors' columns to the problem's: base parameters become standard ones, and effects that the fit did
-/// not determine stay zero.
+/// From the factors' columns to the problem's: base parameters become standard ones, and effects that the fit
+/// did not determine stay zero.
 struct Columns<'a> {
     design: &'a Design,
     /// Parameters of the design that are extras of the problem.
@@ -237,8 +240,8 @@ impl<'a> Columns<'a> {
         Ok(problem)
     }
 
-    /// The matrix of a form over the joints that are coupled in it. A coupling to a joint without an entry of its
-    /// own is left out: what the rigid body or another effect gives to that entry is not known here.
+    /// The matrix of a form over the joints that are coupled in it. A coupling to a joint without an entry of
+    /// its own is left out: what the rigid body or another effect gives to that entry is not known here.
     fn coupled(&self, form: QuadraticForm) -> Vec<MatrixTerm> {
         let mut terms: Vec<(usize, [usize; 2], f64)> = Vec::new();
         for (effect, known) in self.design.effects().iter().enumerate() {
@@ -299,8 +302,9 @@ impl<'a> Columns<'a> {
     }
 }
 
-/// The robot's length \[m\]: the mean distance from a joint to the one before it, of those that are apart; the mean
-/// distance of the centres of mass from their joints where no joints are apart, and zero where those are not either.
+/// The robot's length \[m\]: the mean distance from a joint to the one before it, of those that are apart;
+/// the mean distance of the centres of mass from their joints where no joints are apart, and zero where those
+/// are not either.
 fn length(tree: &Tree) -> f64 {
     let mean = |lengths: Vec<f64>| {
         let apart: Vec<f64> =

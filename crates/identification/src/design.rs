@@ -1,8 +1,10 @@
 //! The columns of a model: which parameter acts on which torque, and the numbers of one sample.
 
 use crate::effect::{Effect, EffectParameter, Evaluator};
-use crate::{BlockReference, Needs, ReferenceModel, Sample};
-use phiw_dynamics::{DimensionError, PARAMETERS_PER_BODY, Tree};
+use crate::reference::ReferenceModel;
+use crate::sample::{BlockReference, Needs, Sample};
+use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
+use phiw_dynamics::{DimensionError, Tree};
 use phiw_regressor::{BaseParameters, JointTorqueRegressor, RegressorScratch};
 use phiw_telemetry::Block;
 use std::ops::Range;

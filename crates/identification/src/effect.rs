@@ -1,8 +1,10 @@
-//! What an effect is to a fit: some columns beside the inertial ones.
+//! An effect as a fit sees it: columns beside those of the rigid body.
 //!
 //! This crate knows no effect by name. A catalogue (`phiw-effects` is one) or a user brings them.
 
-use crate::{Needs, Sample};
+pub use crate::reference::ReferenceModel;
+pub use crate::sample::{BlockReference, Needs, Sample};
+
 use phiw_dynamics::Tree;
 use phiw_telemetry::Block;
 use serde::{Deserialize, Serialize};

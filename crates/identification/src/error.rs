@@ -1,6 +1,6 @@
 //! What can go wrong between a log and a model.
 
-use crate::EffectError;
+use crate::effect::EffectError;
 use phiw_dynamics::DimensionError;
 use phiw_regressor::RegressorError;
 use phiw_telemetry::LogError;
@@ -19,7 +19,7 @@ pub enum IdentificationError {
     Effect(#[from] EffectError),
     /// The log and the robot do not fit each other.
     #[error(transparent)]
-    Input(#[from] crate::InputError),
+    Input(#[from] crate::checks::InputError),
     /// What was said to be known of the bodies contradicts itself.
     #[error(transparent)]
     Consistency(#[from] phiw_consistency::ConsistencyError),

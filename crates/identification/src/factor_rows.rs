@@ -1,4 +1,4 @@
-//! A triangular factor as it is written down: in a model, and in a run that is to be gone on with.
+//! A triangular factor as it is written to files: to a model, and to a run that can be resumed.
 
 use crate::IdentificationError;
 use phiw_regressor::factor::Factor;

@@ -1,6 +1,7 @@
 //! The fit of a design to its training folds, and its error on those held out.
 
-use crate::{Design, IdentificationError, InputError};
+use crate::checks::InputError;
+use crate::{Design, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::Factor;
 use phiw_regressor::least_squares::{GroupedFactor, weighted_least_squares};
@@ -48,7 +49,8 @@ pub struct TorqueError {
 pub fn fit(design: &Design, folds: &[GroupedFactor]) -> Result<Fit, IdentificationError> {
     let all = merge(folds)?;
     check_length(design, &all)?;
-    // Equal columns need not be exactly equal in the logs' digits: what is left of them decides nothing.
+    // Columns that are equal in theory differ by the logs' rounding; the difference must not determine
+    // parameters.
     let undetermined = undetermined(&all)?;
     let determined: Vec<usize> =
         (0..design.parameter_count()).filter(|parameter| !undetermined.contains(parameter)).collect();
@@ -107,7 +109,7 @@ const LEAST_ROWS: u64 = 8;
 ///
 /// # Errors
 /// The folds are of different designs.
-pub fn tells_of_torques(folds: &[GroupedFactor]) -> Result<Vec<bool>, RegressorError> {
+pub fn torques_with_enough_rows(folds: &[GroupedFactor]) -> Result<Vec<bool>, RegressorError> {
     let all = merge(folds)?;
     Ok(all.groups().iter().map(|group| group.factor.rows() >= LEAST_ROWS).collect())
 }
@@ -124,11 +126,14 @@ fn check_length(design: &Design, all: &GroupedFactor) -> Result<(), Identificati
 }
 
 pub(crate) fn undetermined(all: &GroupedFactor) -> Result<Vec<usize>, RegressorError> {
-    let scale = |group: &phiw_regressor::least_squares::Group| {
-        let square = group.factor.right_hand_side_sum_of_squares() / group.factor.rows().max(1) as f64;
-        if square > 0.0 { 1.0 / square.sqrt() } else { 1.0 }
-    };
-    let weights: Vec<f64> = all.groups().iter().map(scale).collect();
+    let weights: Vec<f64> = all
+        .groups()
+        .iter()
+        .map(|group| {
+            let square = group.factor.right_hand_side_sum_of_squares() / group.factor.rows().max(1) as f64;
+            if square > 0.0 { 1.0 / square.sqrt() } else { 1.0 }
+        })
+        .collect();
     Ok(all.combine(&weights)?.undetermined_columns())
 }
 
@@ -149,17 +154,18 @@ fn jackknife(
     for factor in phiw_regressor::factor::leave_one_out(&weighted?)? {
         match factor.solve() {
             Ok(solution) => solutions.push(solution.parameters),
-            // Without this fold some parameter is not determined: all its weight lies there, and nothing can
-            // be said of its spread.
+            // Without this fold some parameter is not determined, so the folds say nothing about its standard
+            // deviation.
             Err(RegressorError::RankDeficient { .. }) => return Ok(absent),
             Err(error) => return Err(error),
         }
     }
     let count = solutions.len() as f64;
-    let deviation = |parameter: usize| {
-        let mean = solutions.iter().map(|solution| solution[parameter]).sum::<f64>() / count;
-        let square: f64 = solutions.iter().map(|solution| (solution[parameter] - mean).powi(2)).sum();
-        (square * (count - 1.0) / count).sqrt()
-    };
-    Ok((0..determined.len()).map(deviation).collect())
+    Ok((0..determined.len())
+        .map(|parameter| {
+            let mean = solutions.iter().map(|solution| solution[parameter]).sum::<f64>() / count;
+            let square: f64 = solutions.iter().map(|solution| (solution[parameter] - mean).powi(2)).sum();
+            (square * (count - 1.0) / count).sqrt()
+        })
+        .collect())
 }

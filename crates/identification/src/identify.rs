@@ -1,9 +1,9 @@
 //! The declared model, identified: constants chosen, parameters fitted, error held out.
 
-use crate::{
-    BlockSource, Design, Effect, Fit, Fold, IdentificationError, ReferenceModel, TorqueError, accumulate,
-    fit, merge, torque_error,
-};
+use crate::accumulate::accumulate;
+use crate::fit::{Fit, TorqueError, fit, merge, torque_error};
+use crate::reference::ReferenceModel;
+use crate::{BlockSource, Design, Effect, Fold, IdentificationError};
 use phiw_dynamics::Tree;
 use phiw_limits::Limits;
 use phiw_regressor::factor::FactorBuilder;
@@ -58,7 +58,7 @@ pub fn identify(
     let Data { train, held_out, sources, rest_speeds } = data;
     let folds = train.len() + held_out.len();
     let of_variants = effects.iter().flatten().map(|effect| effect.as_ref());
-    crate::check_size_of_robot(tree, of_variants, folds, &Limits::default())?;
+    crate::checks::check_size_of_robot(tree, of_variants, folds, &Limits::default())?;
     let base = BaseParameters::of_tree(tree, BaseParametersOptions::default())?;
     let mut slots = Vec::with_capacity(effects.len());
     let mut all = Vec::new();
@@ -68,10 +68,11 @@ pub fn identify(
     }
     let mut design = Design::new(tree.clone(), base.clone(), all).with_rest_speeds(rest_speeds.clone());
     let all_folds = [train.as_slice(), held_out].concat();
-    crate::check_size_of_factors(&design, all_folds.len(), &Limits::default())?;
+    crate::checks::check_size_of_factors(&design, all_folds.len(), &Limits::default())?;
     let mut folds = accumulate(&design, &all_folds, sources)?;
     if design.needs().of_reference() {
-        // Columns made of the model's torque are zero, or the URDF's, before there is a model.
+        // Columns that need the model's torque take the URDF's model in the first pass (zero without
+        // inertials).
         for _ in 0..REFERENCE_PASSES {
             let reference = ReferenceModel::new(fitted_tree(&design, &slots, &folds[..train.len()])?);
             design = design.with_reference(reference);
@@ -120,7 +121,7 @@ fn fitted_tree(
     let inertial = determined.iter().zip(&solution.parameters).filter(|(column, _)| **column < base.count());
     inertial.for_each(|(&column, value)| parameters[column] = *value);
     let mut tree = design.tree().clone();
-    tree.set_inertial_parameters(&base.to_standard(&parameters, &crate::with_masses(design.tree()))?)?;
+    tree.set_inertial_parameters(&base.to_standard(&parameters, &crate::model::with_masses(design.tree()))?)?;
     Ok(tree)
 }
 
@@ -142,16 +143,16 @@ fn choose(
         return Ok(chosen);
     }
     let undetermined = undetermined_with(design, &chosen, factors)?;
-    // The columns of the slot that is being chosen all stay, so that its variants have equally many: which of
-    // them are determined differs.
+    // The columns of the slot that is being chosen are kept even where undetermined, so that all its variants
+    // have equally many columns.
     let columns = |chosen: &[usize], open: Option<usize>| -> Vec<usize> {
-        let of_effect = |(slot, &effect): (usize, &usize)| {
+        let base = (0..design.base().count()).filter(|parameter| !undetermined.contains(parameter));
+        base.chain(chosen.iter().enumerate().flat_map(|(slot, &effect)| {
             let stays = open == Some(slot);
             let parameters = design.effect_parameters(effect);
             parameters.filter(|parameter| stays || !undetermined.contains(parameter)).collect::<Vec<_>>()
-        };
-        let base = (0..design.base().count()).filter(|parameter| !undetermined.contains(parameter));
-        base.chain(chosen.iter().enumerate().flat_map(of_effect)).collect()
+        }))
+        .collect()
     };
     for _ in 0..SWEEPS {
         let before = chosen.clone();

@@ -1,4 +1,4 @@
-//! Short logs kept in memory between passes, long ones read again: bounded either way.
+//! Short logs are kept in memory between passes, long ones are read again, so memory is bounded.
 
 use crate::{BlockSource, IdentificationError};
 use phiw_telemetry::{Block, LogError};

@@ -1,13 +1,12 @@
 //! The logs of a session: which train, which are held out, and how they are conditioned.
 
-use crate::{BlockSource, Fold, IdentificationError, check_excitation, check_logs};
+use crate::checks::{check_excitation, check_logs};
+use crate::{BlockSource, Fold, IdentificationError};
 use phiw_dynamics::Tree;
 use phiw_telemetry::{Block, Conditioning, ConditioningOptions, LogError, Survey, TorqueColumns};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-/// Share of each training log that is held out when no log is given for validation.
-pub const HELD_OUT_SHARE: f64 = 0.3;
 /// Stretches of time that the training logs are cut into: long against the residual's correlation, enough for
 /// a standard deviation.
 const TRAINING_FOLDS: usize = 10;
@@ -15,7 +14,7 @@ const HELD_OUT_FOLDS: usize = 8;
 /// Speed of a joint at rest over its RMS speed.
 const REST_SHARE: f64 = 0.01;
 
-/// Tells how far a pass over the logs is: what is being done, bytes done, bytes in total.
+/// Reports how far a pass over the logs is: what is being done, bytes done, bytes in total.
 pub type Progress<'a> = &'a (dyn Fn(&str, u64, u64) + Sync);
 
 /// Logs, surveyed and with their conditioning chosen.
@@ -26,6 +25,9 @@ pub struct LogSet {
 }
 
 impl LogSet {
+    /// Share of each training log that is held out when no log is given for validation.
+    pub const HELD_OUT_SHARE: f64 = 0.3;
+
     /// Surveys the logs, checks them against the robot, and chooses how to condition them.
     ///
     /// # Errors
@@ -54,12 +56,14 @@ impl LogSet {
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
         let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
-        let survey = |path: &PathBuf| {
-            let mut report = |done: u64, total: u64| progress(&reading("surveying", path), done, total);
-            phiw_telemetry::survey(path, &joints, TorqueColumns::Required, &mut report)
-        };
-        let mut surveys =
-            train.iter().chain(validate).map(survey).collect::<Result<Vec<Survey>, LogError>>()?;
+        let mut surveys = train
+            .iter()
+            .chain(validate)
+            .map(|path| {
+                let mut report = |done: u64, total: u64| progress(&reading("surveying", path), done, total);
+                phiw_telemetry::survey(path, &joints, TorqueColumns::Required, &mut report)
+            })
+            .collect::<Result<Vec<Survey>, LogError>>()?;
         phiw_telemetry::arrange_session(&mut surveys);
         let (training, held_out) = surveys.split_at(train.len());
         check_logs(tree, training, held_out)?;
@@ -105,7 +109,7 @@ impl LogSet {
 
     /// Stretches of time to fit.
     pub fn training_folds(&self) -> Vec<Fold> {
-        let share = if self.splits_training_logs() { 1.0 - HELD_OUT_SHARE } else { 1.0 };
+        let share = if self.splits_training_logs() { 1.0 - Self::HELD_OUT_SHARE } else { 1.0 };
         cut(self.training().iter().enumerate().map(|(log, survey)| (log, survey, 0.0, share)), TRAINING_FOLDS)
     }
 
@@ -116,7 +120,7 @@ impl LogSet {
                 .training()
                 .iter()
                 .enumerate()
-                .map(|(log, survey)| (log, survey, 1.0 - HELD_OUT_SHARE, 1.0));
+                .map(|(log, survey)| (log, survey, 1.0 - Self::HELD_OUT_SHARE, 1.0));
             cut(ends, HELD_OUT_FOLDS)
         } else {
             let logs = self.surveys.iter().enumerate().skip(self.train);
@@ -131,7 +135,7 @@ impl LogSet {
         };
         match self.splits_training_logs() {
             true => {
-                format!("the last {:.0} % of {}", 1e2 * HELD_OUT_SHARE, names(self.training()))
+                format!("the last {:.0} % of {}", 1e2 * Self::HELD_OUT_SHARE, names(self.training()))
             }
             false => names(&self.surveys[self.train..]),
         }
@@ -155,7 +159,7 @@ fn cut<'a>(parts: impl Iterator<Item = (usize, &'a Survey, f64, f64)>, count: us
     let spans: Vec<(usize, f64, f64)> = parts
         .map(|(log, survey, from, to)| {
             let (first, last) = survey.time_range();
-            // A fold does not hold its end, and the last moment of a log belongs to its last fold.
+            // A fold excludes its end, so the last fold of a log ends just after the last sample.
             let last_moment =
                 if to >= 1.0 { last + 0.5 * survey.period } else { first + to * (last - first) };
             (log, first + from * (last - first), last_moment)

@@ -1,11 +1,15 @@
-//! An identified model as one thing: rigid body, effects, what it was fitted to; written to `model.json` and
-//! read back.
+//! An identified model: rigid body, effects, and the data of the fit; written to `model.json` and read back.
 
-use crate::{
-    Consistent, Design, Effect, EffectCatalogue, EffectError, EffectSpec, FactorRows, Fit,
-    IdentificationError, ReferenceModel, check_size_of_robot,
-};
-use phiw_dynamics::{PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree, check_size};
+use crate::checks::check_size_of_robot;
+use crate::consistent::Consistent;
+use crate::effect::EffectError;
+use crate::factor_rows::FactorRows;
+use crate::fit::Fit;
+use crate::reference::ReferenceModel;
+use crate::{Design, Effect, EffectCatalogue, EffectSpec, IdentificationError};
+use phiw_dynamics::Tree;
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::inertia::{PARAMETER_NAMES, PARAMETERS_PER_BODY};
 use phiw_limits::Limits;
 use phiw_regressor::BaseParameters;
 use serde::{Deserialize, Serialize};
@@ -304,11 +308,14 @@ impl Model {
         tree: &Tree,
         catalogue: &dyn EffectCatalogue,
     ) -> Result<ReferenceModel, IdentificationError> {
-        let with_values = |effect: &EffectParameters| {
-            let values = effect.parameters.iter().map(|parameter| parameter.value).collect();
-            Ok((catalogue.build(&effect.spec, tree)?, values))
-        };
-        let effects: Result<Vec<_>, EffectError> = self.effects.iter().map(with_values).collect();
+        let effects: Result<Vec<_>, EffectError> = self
+            .effects
+            .iter()
+            .map(|effect| {
+                let values = effect.parameters.iter().map(|parameter| parameter.value).collect();
+                Ok((catalogue.build(&effect.spec, tree)?, values))
+            })
+            .collect();
         Ok(ReferenceModel::new(self.identified_tree(tree)?).with_effects(effects?))
     }
 
@@ -324,8 +331,8 @@ impl Model {
         Ok(possible)
     }
 
-    /// Value of the k-th parameter of an effect that belongs to the possible bodies; the least-squares one where
-    /// the model has no others.
+    /// Value of the k-th parameter of an effect that belongs to the possible bodies; the least-squares one
+    /// where the model has no others.
     pub fn consistent_effect(&self, effect: usize, parameter: usize) -> Option<f64> {
         match &self.consistent {
             Some(consistent) => consistent.effects.get(effect)?.get(parameter).copied(),

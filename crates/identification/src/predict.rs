@@ -1,9 +1,12 @@
 //! What a fitted design predicts over logs, sample by sample, in constant memory.
 
 use crate::block_source::try_for_each_batch;
-use crate::{BlockSource, Design, DesignScratch, IdentificationError};
-use phiw_dynamics::{DimensionError, check_size};
-use phiw_telemetry::{Block, FilterScratch};
+use crate::design::DesignScratch;
+use crate::{BlockSource, Design, IdentificationError};
+use phiw_dynamics::DimensionError;
+use phiw_dynamics::check::check_size;
+use phiw_telemetry::Block;
+use phiw_telemetry::filter::FilterScratch;
 use rayon::prelude::*;
 
 /// Measured and predicted torque at one moment, both after the parallel filter. Slices are over the torques.

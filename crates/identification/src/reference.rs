@@ -1,9 +1,11 @@
 //! A rigid-body model with numbers, for effects whose columns need torques (load-dependent friction, delays,
 //! offsets, …).
 
+use crate::Effect;
 use crate::rates::{LocalRates, interpolate};
-use crate::{BlockReference, Effect, Needs, Sample};
-use phiw_dynamics::{DimensionError, Dual, Tree, Workspace};
+use crate::sample::{BlockReference, Needs, Sample};
+use phiw_dynamics::scalar::Dual;
+use phiw_dynamics::{DimensionError, Tree, Workspace};
 use phiw_telemetry::Block;
 
 /// The robot with the parameters that a fit has found so far.

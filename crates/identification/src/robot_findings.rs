@@ -1,8 +1,9 @@
-//! What logs and robot together show, beyond what ends an identification: torques in another unit, joints
+//! Findings about logs and robot together that do not end an identification: torques in another unit, joints
 //! that no log moves.
 
 use phiw_dynamics::{JointType, Tree};
-use phiw_telemetry::{CheckSettings, Finding, FindingKind, Survey, findings};
+use phiw_telemetry::Survey;
+use phiw_telemetry::findings::{CheckSettings, Finding, FindingKind, findings};
 
 /// Torque over the joint's effort limit from where on it is in another unit: drives exceed their rating
 /// threefold for a moment, mA and per mille by more.
@@ -48,7 +49,7 @@ fn torque_unit(largest: f64, effort: f64, unit: &str) -> Option<String> {
         return None;
     }
     let ratio = largest / effort;
-    // A torque far below the limit says nothing: limits of 1000 are written where nobody knew one.
+    // A torque far below the limit is not reported: many URDFs have a limit of 1000 where it is unknown.
     (ratio > BEYOND_EFFORT).then(|| {
         format!("reaches {largest:.4}, {ratio:.2e} times the URDF's effort limit of {effort} {unit}")
     })
@@ -59,7 +60,7 @@ mod tests {
     use super::torque_unit;
 
     #[test]
-    fn torques_in_another_unit_are_told_by_the_effort_limit() {
+    fn torques_beyond_the_effort_limit_are_in_another_unit() {
         for (largest, effort, odd) in [
             (80.0, 100.0, false),
             (350.0, 100.0, false),

@@ -1,4 +1,4 @@
-//! What an effect sees of one sample.
+//! The data of one sample that an effect's columns are computed from.
 
 use phiw_telemetry::Block;
 
@@ -8,7 +8,7 @@ pub struct Needs {
     /// The torques of the reference model, and their first and second rate of change.
     pub torque: bool,
     /// The torque of the reference model with its effects in it. A column made of it can stand for any of
-    /// those effects, and tells nothing in a contest with one.
+    /// those effects, so it must not be compared with one of them.
     pub total_torque: bool,
     /// The derivatives of the reference model's torques by position, velocity and acceleration of each joint.
     pub derivatives: bool,

@@ -2,7 +2,8 @@
 
 mod synthetic;
 
-use phiw_identification::{BlockSource, LogSet, accumulate, merge, predict};
+use phiw_identification::fitting::{accumulate, merge};
+use phiw_identification::{BlockSource, LogSet, predict};
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_telemetry::ConditioningOptions;
 use proptest::prelude::*;

@@ -14,7 +14,7 @@ fn exact_bytes(design: &phiw_identification::Design) -> u64 {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
 
-    /// What the search for base parameters finds is never less than what is told from the joints alone: no
+    /// What the search for base parameters finds is never less than what the joints alone say: no
     /// robot whose factors fit is refused early.
     #[test]
     fn no_robot_is_refused_early_whose_factors_fit(seed in 0u64..100_000, joints in 1usize..9) {
@@ -25,7 +25,7 @@ proptest! {
         let mut limits = phiw_limits::Limits::default();
         limits.factor_bytes = exact_bytes(&design);
         let effects = design.effects().iter().map(|effect| effect.as_ref());
-        prop_assert!(phiw_identification::check_size_of_robot(&tree, effects, 18, &limits).is_ok());
+        prop_assert!(phiw_identification::checks::check_size_of_robot(&tree, effects, 18, &limits).is_ok());
     }
 }
 
@@ -89,9 +89,10 @@ fn factors_that_do_not_fit_into_memory_are_refused_before_the_work() {
     let tree = synthetic::robot(4, 5);
     let design = synthetic::design(&tree);
     let mut limits = phiw_limits::Limits::default();
-    assert!(phiw_identification::check_size_of_factors(&design, 18, &limits).is_ok());
+    assert!(phiw_identification::checks::check_size_of_factors(&design, 18, &limits).is_ok());
     limits.factor_bytes = 1000;
-    let error = phiw_identification::check_size_of_factors(&design, 18, &limits).unwrap_err().to_string();
+    let error =
+        phiw_identification::checks::check_size_of_factors(&design, 18, &limits).unwrap_err().to_string();
     assert!(error.contains("5 joints") && error.contains("--hold"), "{error}");
 }
 
@@ -113,7 +114,8 @@ fn a_robot_of_200_joints_is_refused_before_its_base_parameters_are_searched_for(
         phiw_dynamics::urdf::read_urdf(&xml, &Default::default()).unwrap().tree
     };
     let limits = phiw_limits::Limits::default();
-    let check = |joints: usize| phiw_identification::check_size_of_robot(&chain(joints), [], 18, &limits);
+    let check =
+        |joints: usize| phiw_identification::checks::check_size_of_robot(&chain(joints), [], 18, &limits);
     let error = check(200).unwrap_err().to_string();
     // The first body has one, each after it seven.
     assert!(error.contains("200 joints with 1394 parameters or more") && error.contains("--hold"), "{error}");

@@ -3,8 +3,9 @@
 mod synthetic;
 
 use phiw_dynamics::Tree;
+use phiw_identification::checks::InputError;
 use phiw_identification::{
-    BlockSource, Data, Fold, IdentificationError, Identified, InputError, Variants, identify, predict,
+    BlockSource, Data, Fold, IdentificationError, Identified, Variants, identify, predict,
 };
 use phiw_telemetry::{Block, Recording};
 

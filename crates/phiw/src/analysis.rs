@@ -3,10 +3,10 @@
 use crate::session::Session;
 use crate::traces::Traces;
 use crate::{Error, possible_bodies, warnings};
-use phiw_identification::{
-    Consistent, ConsistentSettings, Data, EffectCatalogue, EffectSpec, Identified, JointProperty, Model,
-    consistent, merge,
-};
+use phiw_identification::consistent::{Consistent, ConsistentSettings, consistent};
+use phiw_identification::effect::JointProperty;
+use phiw_identification::fitting::merge;
+use phiw_identification::{Data, EffectCatalogue, EffectSpec, Identified, Model};
 use phiw_regressor::RegressorError;
 
 /// A residual up to this many times the noise floor is noise.

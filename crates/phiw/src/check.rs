@@ -6,9 +6,10 @@ use crate::output::check_folder;
 use crate::warnings::{file_name, of_log};
 use crate::{Error, session};
 use phiw_dynamics::Tree;
-use phiw_identification::{InputError, check_excitation, check_logs, robot_findings};
+use phiw_identification::checks::{InputError, check_excitation, check_logs, robot_findings};
 use phiw_result_folder::{Disk, Lock, ResultFile, check_inputs, replace_files};
-use phiw_telemetry::{CheckSettings, Finding, FindingKind, Survey, TorqueColumns};
+use phiw_telemetry::findings::{CheckSettings, Finding, FindingKind};
+use phiw_telemetry::{Survey, TorqueColumns};
 use serde_json::{Value, json};
 use std::fmt::Write;
 

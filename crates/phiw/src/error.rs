@@ -3,7 +3,9 @@
 use phiw_curriculum::CurriculumError;
 use phiw_dynamics::urdf::UrdfError;
 use phiw_estimation::EstimationError;
-use phiw_identification::{EffectError, IdentificationError, InputError};
+use phiw_identification::IdentificationError;
+use phiw_identification::checks::InputError;
+use phiw_identification::effect::EffectError;
 use phiw_result_folder::ResultError;
 use phiw_telemetry::LogError;
 use std::io;
@@ -120,11 +122,11 @@ pub enum Error {
         /// The URDF.
         path: PathBuf,
         /// What is wrong with it.
-        source: phiw_bspline_retarget::RobotError,
+        source: phiw_bspline_retarget::robot::RobotError,
     },
     /// A marker recording that cannot be read.
     #[error(transparent)]
-    Recording(phiw_bspline_retarget::RecordingError),
+    Recording(phiw_bspline_retarget::markers::RecordingError),
     /// A marker recording that cannot be retargeted.
     #[error("{}: {source}", path.display())]
     Retarget {

@@ -12,7 +12,8 @@ use crate::report_json::{by_joint, report_json};
 use crate::session::Session;
 use crate::{Error, summary};
 use phiw_effects::SignalRanges;
-use phiw_identification::{Data, Identified, Model, TorqueError, identify};
+use phiw_identification::fitting::TorqueError;
+use phiw_identification::{Data, Identified, Model, identify};
 use phiw_report::ReportJson;
 use phiw_report::json::{
     DrawsJson, EffectJson, EvidenceJson, JointMap, NamedInDrawsJson, ParameterJson, ProgramJson,
@@ -172,7 +173,7 @@ fn verdict(verdict: trace::Verdict) -> Verdict {
 
 fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
     let joints = analysis.joints();
-    let error = |error: &TorqueError| phiw_report::json::TorqueError {
+    let error = |error: &TorqueError| phiw_report::json::TorqueErrorJson {
         rmse: by_joint(&joints, &error.rmse),
         relative: Some(error.relative),
     };
@@ -226,7 +227,7 @@ fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
     };
     let program = base.phiw.clone().map(|program| ProgramJson {
         evidence: tracing.effects.iter().map(evidence).collect(),
-        cannot_be_told: explain_page::cannot_be_told(analysis, tracing),
+        unidentifiable: explain_page::unidentifiable(analysis, tracing),
         ..program
     });
     ReportJson {

@@ -5,10 +5,10 @@ use crate::{Error, page as identified_page, possible_bodies};
 use phiw_effects::Signal;
 use phiw_identification::{Data, Design, predict};
 use phiw_report::IdentificationPage;
-use phiw_report::json::{CannotBeToldJson, Verdict};
+use phiw_report::json::{UnidentifiableJson, Verdict};
 use phiw_report::number::percent;
 use phiw_report::page::{
-    CandidateRow, CannotBeTold, EffectParameter, EffectSection, Picture, Remaining, Rival,
+    CandidateRow, EffectParameterRow, EffectSection, Picture, Remaining, Rival, UnidentifiableEffect,
 };
 use phiw_report::plot::{Line, ResidualAgainstSignal, residual_against_signal};
 use phiw_residual::trace::{self, FoundEffect, Ranked, Tracing};
@@ -175,16 +175,18 @@ fn section(
     let place = place(tracing, index);
     let info = analysis.identified.design.effects()[place].parameters();
     let named = &analysis.model.effects[place].parameters;
-    let parameter =
-        |(named, info): (&phiw_identification::NamedParameter, phiw_identification::EffectParameter)| {
-            EffectParameter {
-                joint: info.joint,
-                name: named.name.clone(),
-                value: found.spec.constants.get(&named.name).copied().unwrap_or_default() + named.value,
-                std: named.std.unwrap_or(f64::NAN),
-                unit: named.unit.clone(),
-            }
-        };
+    let parameter = |(named, info): (
+        &phiw_identification::model::NamedParameter,
+        phiw_identification::effect::EffectParameter,
+    )| {
+        EffectParameterRow {
+            joint: info.joint,
+            name: named.name.clone(),
+            value: found.spec.constants.get(&named.name).copied().unwrap_or_default() + named.value,
+            std: named.std.unwrap_or(f64::NAN),
+            unit: named.unit.clone(),
+        }
+    };
     EffectSection {
         kind: found.spec.kind.clone(),
         joints: found.spec.joints.clone(),
@@ -238,9 +240,9 @@ fn remaining(analysis: &Analysis<'_>, tracing: &Tracing) -> Remaining {
         description: if structured { vec![describe(tracing)] } else { Vec::new() },
         candidates: candidates(&tracing.remaining.ranking),
         pictures: Vec::new(),
-        cannot_be_told: cannot_be_told(analysis, tracing)
+        unidentifiable: unidentifiable(analysis, tracing)
             .into_iter()
-            .map(|effect| CannotBeTold {
+            .map(|effect| UnidentifiableEffect {
                 kind: effect.kind,
                 joints: effect.joints.iter().map(|joints| joints.join(" and ")).collect(),
                 telling_motion: effect.telling_motion,
@@ -250,12 +252,12 @@ fn remaining(analysis: &Analysis<'_>, tracing: &Tracing) -> Remaining {
 }
 
 /// What the logs leave no trace of, kind by kind.
-pub fn cannot_be_told(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<CannotBeToldJson> {
-    let mut kinds: Vec<CannotBeToldJson> = Vec::new();
+pub fn unidentifiable(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<UnidentifiableJson> {
+    let mut kinds: Vec<UnidentifiableJson> = Vec::new();
     for spec in &tracing.remaining.unidentifiable {
         match kinds.iter_mut().find(|other| other.kind == spec.kind) {
             Some(kind) => kind.joints.push(spec.joints.clone()),
-            None => kinds.push(CannotBeToldJson {
+            None => kinds.push(UnidentifiableJson {
                 kind: spec.kind.clone(),
                 joints: vec![spec.joints.clone()],
                 telling_motion: telling_motion(analysis, &spec.kind),

@@ -4,7 +4,8 @@ use crate::Error;
 use crate::analysis::Analysis;
 use phiw_dynamics::urdf::{JointFriction, write_identified_urdf};
 
-use phiw_identification::{EffectCatalogue, EffectSpec, JointProperty};
+use phiw_identification::effect::JointProperty;
+use phiw_identification::{EffectCatalogue, EffectSpec};
 
 /// Properties of a joint that URDF's `<dynamics>` has: damping and friction.
 const EXPRESSED: [JointProperty; 2] = [JointProperty::Damping, JointProperty::Friction];

@@ -2,7 +2,7 @@
 
 use crate::analysis::Analysis;
 use crate::parameters;
-use phiw_dynamics::{PARAMETER_NAMES, PARAMETERS_PER_BODY};
+use phiw_dynamics::inertia::{PARAMETER_NAMES, PARAMETERS_PER_BODY};
 
 /// A parameter that takes this share of another's effect is named with it.
 const ACTS_LIKE: f64 = 0.05;

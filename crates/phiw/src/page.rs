@@ -4,11 +4,13 @@ use crate::analysis::Analysis;
 use crate::traces::Role;
 use crate::warnings::file_name;
 use crate::{date, not_identified, parameters, possible_bodies};
-use phiw_identification::HELD_OUT_SHARE;
+use phiw_identification::LogSet;
 use phiw_report::IdentificationPage;
 use phiw_report::number::{percent, significant};
-use phiw_report::page::{Conditioning, ErrorRow, ErrorTable, InputFile, JointSection, Picture, PooledError};
-use phiw_report::plot::{Line, Spectrum, SpectrumLine, spectrum};
+use phiw_report::page::{
+    ConditioningSection, ErrorRow, ErrorTable, InputFile, JointSection, Picture, PooledError,
+};
+use phiw_report::plot::{Line, SpectrumLine, SpectrumPlot, spectrum};
 use phiw_telemetry::{LogPlan, Survey};
 
 /// Lines that a picture of spectra tells apart.
@@ -27,7 +29,10 @@ pub fn page(analysis: &Analysis<'_>, command_line: String) -> IdentificationPage
         joints: (0..analysis.session.tree.joint_count())
             .map(|joint| joint_section(analysis, joint))
             .collect(),
-        conditioning: Conditioning { entries: conditioning_entries(analysis), pictures: spectra(analysis) },
+        conditioning: ConditioningSection {
+            entries: conditioning_entries(analysis),
+            pictures: spectra(analysis),
+        },
         parameters: parameters::parameters(analysis),
         base_parameters: parameters::base_parameters(analysis),
         not_identified: not_identified::lines(analysis),
@@ -131,7 +136,7 @@ pub fn errors_note(analysis: &Analysis<'_>) -> String {
     let held_out = if analysis.session.logs.splits_training_logs() {
         format!(
             "Held out: the last {} % of each training log, since no log was given to validate on.",
-            100.0 * HELD_OUT_SHARE
+            100.0 * LogSet::HELD_OUT_SHARE
         )
     } else {
         "Held out: the logs given to validate on.".to_owned()
@@ -243,7 +248,7 @@ fn spectra(analysis: &Analysis<'_>) -> Vec<Picture> {
     let units: Vec<&str> = (0..lines.len()).map(|joint| analysis.session.torque_unit(joint)).collect();
     let unit = if units.iter().all(|unit| *unit == units[0]) { units[0] } else { "N·m or N" };
     let y_label = &format!("torque [{unit}/√Hz]");
-    let svg = spectrum(&Spectrum { lines: &lines, y_label, cut_off });
+    let svg = spectrum(&SpectrumPlot { lines: &lines, y_label, cut_off });
     let caption = format!(
         "Torque in {} before the filter, whose cut-off is the upright line.",
         file_name(&survey.path)

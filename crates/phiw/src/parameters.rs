@@ -1,14 +1,14 @@
 //! The parameters as the report lists them.
 
 use crate::analysis::Analysis;
-use phiw_dynamics::Inertia;
-use phiw_identification::{BodyParameters, NamedParameter, parameter_name};
+use phiw_dynamics::inertia::Inertia;
+use phiw_identification::model::{BodyParameters, NamedParameter, parameter_name};
 use phiw_report::number::significant;
-use phiw_report::page::{BaseParameter, ParameterRow, Parameters};
+use phiw_report::page::{BaseParameter, ParameterRow, ParametersSection};
 
 /// All parameters with what is to be said about them.
-pub fn parameters(analysis: &Analysis<'_>) -> Parameters {
-    Parameters { rows: rows(analysis), note: note(analysis) }
+pub fn parameters(analysis: &Analysis<'_>) -> ParametersSection {
+    ParametersSection { rows: rows(analysis), note: note(analysis) }
 }
 
 /// Name of a parameter of the fit: `joint_1.Izz` of the rigid body, `joint_1.fv` of an effect.

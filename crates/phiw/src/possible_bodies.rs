@@ -3,7 +3,9 @@
 use crate::analysis::Analysis;
 use crate::page::counted;
 use crate::report_json::by_joint;
-use phiw_identification::{Consistent, Fit, Model, impossible_bodies};
+use phiw_identification::Model;
+use phiw_identification::consistent::{Consistent, impossible_bodies};
+use phiw_identification::fitting::Fit;
 use phiw_report::json::{ConsistencyJson, OfBothFits};
 use phiw_report::number::percent;
 

@@ -4,7 +4,7 @@ use crate::analysis::Analysis;
 use crate::page::conditioning_entries;
 use crate::possible_bodies;
 use crate::traces::Role;
-use phiw_identification::TorqueError;
+use phiw_identification::fitting::TorqueError;
 use phiw_report::ReportJson;
 use phiw_report::json::{
     JointMap, ProgramJson, RelativeErrors, RemainingJson, SCHEMA, TorqueErrors, Verdict,
@@ -37,7 +37,7 @@ pub fn report_json(analysis: &Analysis<'_>) -> ReportJson {
 /// The errors of an analysis' model.
 pub fn errors(analysis: &Analysis<'_>) -> TorqueErrors {
     let joints = analysis.joints();
-    let error = |error: &TorqueError| phiw_report::json::TorqueError {
+    let error = |error: &TorqueError| phiw_report::json::TorqueErrorJson {
         rmse: by_joint(&joints, &error.rmse),
         relative: Some(error.relative),
     };
@@ -56,7 +56,7 @@ pub fn program(analysis: &Analysis<'_>) -> ProgramJson {
             validate: analysis.traces.relative_with_rests(Role::HeldOut),
         }),
         evidence: Vec::new(),
-        cannot_be_told: Vec::new(),
+        unidentifiable: Vec::new(),
         draws: None,
         consistency: Some(possible_bodies::json(analysis)),
     }

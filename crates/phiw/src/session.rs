@@ -6,10 +6,10 @@ use crate::input::read_text;
 use phiw_dynamics::urdf::{Finding, UrdfOptions, read_urdf};
 use phiw_dynamics::{JointType, Tree};
 use phiw_effects::{Catalogue, SignalRanges};
-use phiw_identification::{
-    BlockSource, Data, EffectError, IdentificationError, InputError, LogFile, LogSet, Progress, Variants,
-    check_excitation, tells_of_torques,
-};
+use phiw_identification::checks::{InputError, check_excitation};
+use phiw_identification::effect::EffectError;
+use phiw_identification::fitting::torques_with_enough_rows;
+use phiw_identification::{BlockSource, Data, IdentificationError, LogFile, LogSet, Progress, Variants};
 use phiw_limits::Limits;
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_telemetry::ConditioningOptions;
@@ -92,11 +92,11 @@ impl Session {
     /// # Errors
     /// No joint moves in what is held out: then there is no error to report, and no verdict.
     pub fn joints_without_held_out_motion(&self, held_out: &[GroupedFactor]) -> Result<Vec<usize>, Error> {
-        let tells = tells_of_torques(held_out).map_err(IdentificationError::from)?;
-        if !tells.contains(&true) {
+        let enough = torques_with_enough_rows(held_out).map_err(IdentificationError::from)?;
+        if !enough.contains(&true) {
             return Err(InputError::NothingHeldOut { held_out: self.logs.held_out_in_words() }.into());
         }
-        Ok((0..tells.len()).filter(|&joint| !tells[joint]).collect())
+        Ok((0..enough.len()).filter(|&joint| !enough[joint]).collect())
     }
 
     /// Unit of a joint's torque.

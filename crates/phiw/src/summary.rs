@@ -5,7 +5,7 @@ use crate::identified_urdf::not_expressed;
 use crate::page::{counted, declared_in_words};
 use crate::possible_bodies;
 use crate::traces::Role;
-use phiw_identification::HELD_OUT_SHARE;
+use phiw_identification::LogSet;
 use phiw_report::number::{percent, significant};
 use phiw_result_folder::ResultFile;
 use std::fmt::Write;
@@ -47,7 +47,7 @@ fn errors(analysis: &Analysis<'_>, text: &mut String) -> std::fmt::Result {
     )?;
     writeln!(text, "{}", possible_bodies::sentence(analysis))?;
     if analysis.session.logs.splits_training_logs() {
-        let share = 100.0 * HELD_OUT_SHARE;
+        let share = 100.0 * LogSet::HELD_OUT_SHARE;
         writeln!(text, "held out is the last {share} % of each training log, since no --validate was given")?;
     }
     Ok(())

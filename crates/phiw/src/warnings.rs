@@ -2,7 +2,8 @@
 
 use crate::session::Session;
 use phiw_identification::Identified;
-use phiw_telemetry::{GapReason, Survey};
+use phiw_telemetry::Survey;
+use phiw_telemetry::segments::GapReason;
 use std::path::Path;
 
 /// All warnings: about the logs, then about the fit.
@@ -69,7 +70,7 @@ const COLUMNS_NAMED: usize = 10;
 /// Skipped rows, jumps, short stretches, unknown columns.
 pub fn of_log(survey: &Survey) -> Vec<String> {
     let name = file_name(&survey.path);
-    let gap = |gap: &phiw_telemetry::GapCount| {
+    let gap = |gap: &phiw_telemetry::segments::GapCount| {
         let (count, line) = (gap.count, gap.first_line);
         let rows = if count == 1 { "row" } else { "rows" };
         match gap.reason {
@@ -103,17 +104,18 @@ pub fn of_log(survey: &Survey) -> Vec<String> {
             .push(format!("{name}: {} stretches between gaps are too short to use", survey.short_segments));
     }
     for joint in &survey.joints {
-        let contradicts = |column: &str, derivative: &Option<phiw_telemetry::DerivativeSurvey>| {
-            let derivative = derivative.filter(|derivative| !derivative.is_derivative())?;
-            let how = match derivative.agreement.is_finite() && derivative.min < derivative.max {
-                true => format!("their derivative is {:.3} times as large", derivative.agreement),
-                false => "it is constant".to_owned(),
+        let contradicts =
+            |column: &str, derivative: &Option<phiw_telemetry::joint_survey::DerivativeSurvey>| {
+                let derivative = derivative.filter(|derivative| !derivative.is_derivative())?;
+                let how = match derivative.agreement.is_finite() && derivative.min < derivative.max {
+                    true => format!("their derivative is {:.3} times as large", derivative.agreement),
+                    false => "it is constant".to_owned(),
+                };
+                Some(format!(
+                    "{name}: {column}.{} contradicts the positions ({how}): it is not used, positions are differentiated",
+                    joint.name
+                ))
             };
-            Some(format!(
-                "{name}: {column}.{} contradicts the positions ({how}): it is not used, positions are differentiated",
-                joint.name
-            ))
-        };
         warnings.extend(contradicts("qd", &joint.velocity));
         warnings.extend(contradicts("qdd", &joint.acceleration));
     }

@@ -20,7 +20,9 @@ use phiw_estimation::{
     BayesianLeastSquares, Estimator, Evidence, LeastSquares, LogNoise, ParameterPrior, Robot, RobotModel,
     RowsAt,
 };
-use phiw_identification::{BlockSource, Data, LogSet, fit, identify, merge, with_masses};
+use phiw_identification::fitting::{fit, merge};
+use phiw_identification::model::with_masses;
+use phiw_identification::{BlockSource, Data, LogSet, identify};
 use phiw_telemetry::{ConditioningOptions, Recording, TorqueColumns};
 use phiw_zmp::{Stance, SupportPolygon};
 use serde_json::Value;

@@ -8,7 +8,8 @@ use phiw::identify::{Outcome, identify};
 use phiw_dynamics::random_tree::{RandomNumbers, random_state};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
 use phiw_dynamics::{Tree, Workspace, dense::Cholesky};
-use phiw_identification::{Model, impossible_bodies};
+use phiw_identification::Model;
+use phiw_identification::consistent::impossible_bodies;
 use std::path::{Path, PathBuf};
 
 const POSES: usize = 10_000;

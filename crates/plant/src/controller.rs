@@ -3,7 +3,8 @@
 use crate::PlantError;
 use crate::error::check_value;
 use crate::step_solver::inverse;
-use phiw_dynamics::{DimensionError, Tree, Workspace, check_size};
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::{DimensionError, Tree, Workspace};
 
 /// What a controller believes that a motion needs.
 pub trait TorqueModel {

@@ -174,8 +174,8 @@ impl Plant {
     /// Puts the robot at rest into the reference's first posture, lets it settle, and follows the reference.
     ///
     /// The first row of the log is that of the motion's start. The reference should start at rest: what it
-    /// asks for at time 0 sets in at once. The same random numbers give the same run; what sensors draw does not
-    /// change the motion, unless the controller sees it. On a fall the run ends, which is no error.
+    /// asks for at time 0 sets in at once. The same random numbers give the same run; what sensors draw does
+    /// not change the motion, unless the controller sees it. On a fall the run ends, which is no error.
     ///
     /// # Errors
     /// The duration is not finite and > 0, the reference is not finite, or the backend fails.

@@ -2,7 +2,8 @@
 //! rotors.
 
 use crate::{PlantEffect, PlantError};
-use phiw_dynamics::{Inertia, Mat3, PARAMETERS_PER_BODY, Tree, Vec3, World};
+use phiw_dynamics::inertia::{Inertia, PARAMETERS_PER_BODY};
+use phiw_dynamics::{Mat3, Tree, Vec3, World};
 
 /// The tree and the world with all effects that change them. Rotors behind springs are taken out of the world
 /// and returned, joint by joint, 0 where there is none.

@@ -2,7 +2,8 @@
 
 use crate::error::check_value;
 use crate::{History, PlantEffect, PlantError};
-use phiw_dynamics::{Tree, check_size};
+use phiw_dynamics::Tree;
+use phiw_dynamics::check::check_size;
 use phiw_telemetry::Recording;
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};

@@ -1,8 +1,8 @@
 //! The joint torque regressor of a random robot of 18 joints, one sample and four lanes at a time.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use phiw_dynamics::Lanes;
 use phiw_dynamics::random_tree::{RandomNumbers, RandomTreeOptions, random_state, random_tree};
+use phiw_dynamics::scalar::Lanes;
 use phiw_regressor::JointTorqueRegressor;
 use std::hint::black_box;
 

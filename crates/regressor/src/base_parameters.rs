@@ -8,7 +8,9 @@ use crate::{JointTorqueRegressor, RegressorError, factor::FactorBuilder};
 use faer::linalg::solvers::ColPivQr;
 use faer::prelude::{Solve, SolveLstsq};
 use faer::{Mat, MatRef};
-use phiw_dynamics::{JointType, PARAMETERS_PER_BODY, Tree, check_size};
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
+use phiw_dynamics::{JointType, Tree};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -190,10 +192,9 @@ impl BaseParameters {
     /// `standard` has the wrong length.
     pub fn from_standard(&self, standard: &[f64]) -> Result<Vec<f64>, RegressorError> {
         check_size("standard parameters", standard.len(), self.standard_size)?;
-        let dot = |row: usize| {
-            (0..self.standard_size).map(|column| self.map[(row, column)] * standard[column]).sum()
-        };
-        Ok((0..self.count()).map(dot).collect())
+        Ok((0..self.count())
+            .map(|row| (0..self.standard_size).map(|column| self.map[(row, column)] * standard[column]).sum())
+            .collect())
     }
 
     /// The standard parameters nearest to `reference` that have the base parameters `base` exactly.

@@ -1,6 +1,7 @@
 //! What can go wrong in this crate.
 
-use phiw_dynamics::{DimensionError, IndexError};
+use phiw_dynamics::DimensionError;
+use phiw_dynamics::check::IndexError;
 
 /// An input that this crate cannot work with.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -27,7 +27,7 @@ pub fn fewest_base_parameters(tree: &Tree) -> Vec<usize> {
             JointType::Revolute | JointType::Continuous => before.and(frame.rotation * body.axis),
             JointType::Prismatic | JointType::Floating => before,
         };
-        // What follows another joint (mimic) may be told together with it.
+        // What follows another joint (mimic) may be identifiable only together with it.
         let by_itself = led.insert(body.velocity_index);
         fewest.push(match (body.joint_type, before, after) {
             _ if !by_itself => 0,

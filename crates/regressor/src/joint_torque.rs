@@ -1,10 +1,11 @@
 //! The joint torque regressor φ(q, q̇, q̈): τ = φ · π with π the standard parameters of all bodies (paper,
 //! equation 2).
 
-use phiw_dynamics::{
-    BodyJoint, BodyKinematics, BodyMotion, DimensionError, Lanes, PARAMETERS_PER_BODY, Scalar, Spatial,
-    check_size,
-};
+use phiw_dynamics::body_kinematics::{BodyJoint, BodyMotion};
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
+use phiw_dynamics::scalar::{Lanes, Scalar};
+use phiw_dynamics::{BodyKinematics, DimensionError, Spatial};
 
 /// Which bodies act on which torque, and the kernel that fills in their numbers.
 ///
@@ -71,11 +72,14 @@ impl JointTorqueRegressor {
             .iter()
             .enumerate()
             .map(|(body, chain)| {
-                let axis = |(position, &row): (usize, &usize)| ChainAxis {
-                    pair: row_offsets[row] + row_bodies[row].partition_point(|&other| other < body),
-                    accumulate: chain[..position].contains(&row),
-                };
-                chain.iter().enumerate().map(axis).collect()
+                chain
+                    .iter()
+                    .enumerate()
+                    .map(|(position, &row)| ChainAxis {
+                        pair: row_offsets[row] + row_bodies[row].partition_point(|&other| other < body),
+                        accumulate: chain[..position].contains(&row),
+                    })
+                    .collect()
             })
             .collect();
         JointTorqueRegressor { joints, velocity_size, row_bodies, row_offsets, chains }

@@ -1,8 +1,9 @@
 //! Φw = τ over random robots and states, and the base parameters of robots whose counts are published.
 
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, RandomTreeOptions, random_state, random_tree};
+use phiw_dynamics::scalar::Lanes;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
-use phiw_dynamics::{Lanes, Tree, Workspace};
+use phiw_dynamics::{Tree, Workspace};
 use phiw_regressor::factor::FactorBuilder;
 use phiw_regressor::{BaseParameters, BaseParametersOptions, JointTorqueRegressor, parameter_scales};
 use proptest::prelude::*;

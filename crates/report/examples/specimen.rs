@@ -66,7 +66,7 @@ fn specimen(joints: usize, explain: bool) -> IdentificationPage {
             ],
             candidates: candidates(4),
             pictures: vec![scatter("joint_1", 0.4, None)],
-            cannot_be_told: Vec::new(),
+            unidentifiable: Vec::new(),
         });
     }
     page
@@ -182,14 +182,14 @@ fn effects() -> Vec<EffectSection> {
         joints: vec!["joint_5".into(), "joint_6".into()],
         sentence: "joint_5 and joint_6 share a motor: friction acts on the sum of their speeds.".into(),
         parameters: vec![
-            EffectParameter {
+            EffectParameterRow {
                 joint: "joint_5".into(),
                 name: "fv_coupled".into(),
                 value: 0.612,
                 std: 0.011,
                 unit: "N·m·s/rad".into(),
             },
-            EffectParameter {
+            EffectParameterRow {
                 joint: "joint_6".into(),
                 name: "fc_coupled".into(),
                 value: 0.3381,
@@ -211,14 +211,14 @@ fn effects() -> Vec<EffectSection> {
         joints: vec!["joint_1".into()],
         sentence: "joint_1 sticks: its friction is 4.1 N·m higher at rest than above 0.06 rad/s.".into(),
         parameters: vec![
-            EffectParameter {
+            EffectParameterRow {
                 joint: "joint_1".into(),
                 name: "fs".into(),
                 value: 4.12,
                 std: 0.21,
                 unit: "N·m".into(),
             },
-            EffectParameter {
+            EffectParameterRow {
                 joint: "joint_1".into(),
                 name: "vs".into(),
                 value: 0.0613,
@@ -243,7 +243,7 @@ fn effects() -> Vec<EffectSection> {
     vec![coupling, stribeck]
 }
 
-fn conditioning() -> Conditioning {
+fn conditioning() -> ConditioningSection {
     let frequency: Vec<f64> = (1..4000).map(|i| i as f64 * 0.025).collect();
     let amplitude = |floor: f64, seed: f64| -> Vec<f64> {
         frequency
@@ -254,8 +254,8 @@ fn conditioning() -> Conditioning {
     let spectra = [amplitude(0.004, 3.1), amplitude(0.02, 7.7)];
     let lines = [("joint_1", &spectra[0]), ("joint_5", &spectra[1])]
         .map(|(name, y)| SpectrumLine { name, line: Line { x: &frequency, y } });
-    let svg = spectrum(&Spectrum { lines: &lines, y_label: "torque [N·m/√Hz]", cut_off: Some(5.2) });
-    Conditioning {
+    let svg = spectrum(&SpectrumPlot { lines: &lines, y_label: "torque [N·m/√Hz]", cut_off: Some(5.2) });
+    ConditioningSection {
         entries: [
             ("Low-pass", "zero-phase Butterworth, 4th order, cut-off 5.2 Hz (from the torque's spectrum)"),
             ("Sampling", "200 Hz, jitter 0.3 %; decimated by 8 after filtering"),
@@ -268,7 +268,7 @@ fn conditioning() -> Conditioning {
     }
 }
 
-fn parameters(names: &[String]) -> Parameters {
+fn parameters(names: &[String]) -> ParametersSection {
     let kinds = [
         ("Izz", "kg·m²", 1.4),
         ("m·cx", "kg·m", 0.9),
@@ -288,7 +288,7 @@ fn parameters(names: &[String]) -> Parameters {
             }
         })
     });
-    Parameters {
+    ParametersSection {
         rows: rows.collect(),
         note: "Weighted least squares; standard deviations from the residual of each joint, corrected for its autocorrelation. cond of the weighted regressor 71.".into(),
     }

@@ -61,14 +61,14 @@ pub enum Verdict {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct TorqueErrors {
     /// On the motion that the model was fitted to.
-    pub train: TorqueError,
+    pub train: TorqueErrorJson,
     /// On held-out motion; empty where there is none.
-    pub validate: TorqueError,
+    pub validate: TorqueErrorJson,
 }
 
 /// Torque errors over one set of logs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct TorqueError {
+pub struct TorqueErrorJson {
     /// RMS error of each joint (N·m or N).
     #[serde(default, deserialize_with = "numbers_or_nan", skip_serializing_if = "IndexMap::is_empty")]
     pub rmse: JointMap<f64>,
@@ -154,9 +154,9 @@ pub struct ProgramJson {
     /// How sure the effects are, in their order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub evidence: Vec<EvidenceJson>,
-    /// What cannot be told from these logs, and which motion would tell.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub cannot_be_told: Vec<CannotBeToldJson>,
+    /// What these logs do not identify, and which motion would. The key is that of reports already written.
+    #[serde(rename = "cannot_be_told", default, skip_serializing_if = "Vec::is_empty")]
+    pub unidentifiable: Vec<UnidentifiableJson>,
     /// What bootstrap draws of the training motion named, if they were asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub draws: Option<DrawsJson>,
@@ -168,7 +168,8 @@ pub struct ProgramJson {
 /// The fit over bodies that can exist beside least squares.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ConsistencyJson {
-    /// Weight of the URDF's bodies, in nats of independent samples; chosen by training motion that was left out.
+    /// Weight of the URDF's bodies, in nats of independent samples; chosen by training motion that was left
+    /// out.
     #[serde(deserialize_with = "number_or_nan")]
     pub prior_weight: f64,
     /// How far the objective can be above its optimum, in the same unit.
@@ -230,10 +231,10 @@ pub struct EvidenceJson {
 
 /// An effect of which the motion leaves nothing beside the model's own columns.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct CannotBeToldJson {
+pub struct UnidentifiableJson {
     /// Its name in the catalogue.
     pub kind: String,
-    /// The joints, or groups of joints, on which it cannot be told.
+    /// The joints, or groups of joints, on which it is unidentifiable.
     pub joints: Vec<Vec<String>>,
     /// The motion, or the signal, that would tell.
     pub telling_motion: String,

@@ -11,12 +11,12 @@ mod joints;
 mod parameters;
 mod parts;
 
-pub use conditioning::Conditioning;
-pub use effects::{CandidateRow, CannotBeTold, EffectParameter, EffectSection, Remaining, Rival};
+pub use conditioning::ConditioningSection;
+pub use effects::{CandidateRow, EffectParameterRow, EffectSection, Remaining, Rival, UnidentifiableEffect};
 pub use errors::{ErrorRow, ErrorTable, PooledError};
 pub use experiment::{ExperimentPage, Section, Table};
 pub use joints::{JointSection, TorqueTrace};
-pub use parameters::{BaseParameter, ParameterRow, Parameters};
+pub use parameters::{BaseParameter, ParameterRow, ParametersSection};
 pub use parts::Picture;
 
 use crate::json::Verdict;
@@ -47,9 +47,9 @@ pub struct IdentificationPage {
     /// Measured against predicted torque, joint by joint.
     pub joints: Vec<JointSection>,
     /// What was done to the logs before the fit.
-    pub conditioning: Conditioning,
+    pub conditioning: ConditioningSection,
     /// The identified parameters.
-    pub parameters: Parameters,
+    pub parameters: ParametersSection,
     /// Which standard parameters each base parameter regroups.
     pub base_parameters: Vec<BaseParameter>,
     /// What these logs cannot tell, a line each.

@@ -26,7 +26,7 @@ pub use iterations::{IterationLine, Iterations, iterations};
 pub use joint_bars::{BarGroup, JointBars, joint_bars};
 pub use motion_map::{MapRow, MotionMap, motion_map};
 pub use residual_against_signal::{ResidualAgainstSignal, residual_against_signal};
-pub use spectrum::{Spectrum, SpectrumLine, spectrum};
+pub use spectrum::{SpectrumLine, SpectrumPlot, spectrum};
 pub use support_map::{SupportMap, support_map};
 pub use time_series::{ResidualPanel, TorquePanel, residual_panel, torque_panel};
 

@@ -7,31 +7,39 @@ use phiw_report::plot::*;
 
 const HOSTILE: &str = "torso/joint_1<script>alert(\"1\")</script>&'";
 
-/// A page with every section, whose every word is hostile and every number as given.
-fn page(number: f64, joints: usize, samples: usize) -> IdentificationPage {
-    let word = || HOSTILE.to_string();
-    let words = || vec![word(), word()];
-    let line = || Polyline {
+fn word() -> String {
+    HOSTILE.to_owned()
+}
+
+fn words() -> Vec<String> {
+    vec![word(), word()]
+}
+
+fn line(number: f64, samples: usize) -> Polyline {
+    Polyline {
         x: (0..samples).map(|i| 0.01 * i as f64).collect(),
         y: (0..samples).map(|i| number + (0.37 * i as f64).sin()).collect(),
+    }
+}
+
+fn picture(before: Polyline) -> Picture {
+    let plot = ResidualAgainstSignal {
+        signal: HOSTILE,
+        residual: HOSTILE,
+        before: Line::from(&before),
+        after: Line::default(),
     };
-    let trace = || TorqueTrace { log: word(), measured: line(), predicted: line(), residual: line() };
-    let svg = || {
-        residual_against_signal(&ResidualAgainstSignal {
-            signal: HOSTILE,
-            residual: HOSTILE,
-            before: Line::from(&line()),
-            after: Line::default(),
-        })
-    };
-    let picture = || Picture { caption: word(), svg: svg() };
-    let candidates =
-        vec![
-            CandidateRow { kind: word(), joints: words(), held_out: number, parameters: 2, note: word() };
-            9
-        ];
-    let parameter = EffectParameter { joint: word(), name: word(), value: number, std: number, unit: word() };
-    let effect = EffectSection {
+    Picture { caption: word(), svg: residual_against_signal(&plot) }
+}
+
+fn candidates(number: f64) -> Vec<CandidateRow> {
+    vec![CandidateRow { kind: word(), joints: words(), held_out: number, parameters: 2, note: word() }; 9]
+}
+
+fn effect(number: f64, samples: usize) -> EffectSection {
+    let parameter =
+        EffectParameterRow { joint: word(), name: word(), value: number, std: number, unit: word() };
+    EffectSection {
         kind: word(),
         joints: words(),
         sentence: word(),
@@ -42,9 +50,17 @@ fn page(number: f64, joints: usize, samples: usize) -> IdentificationPage {
         confidence: number,
         stability: number,
         rivals: vec![Rival { kind: word(), joints: words(), confidence: number, separated_by: word() }],
-        candidates: candidates.clone(),
-        pictures: vec![picture()],
-    };
+        candidates: candidates(number),
+        pictures: vec![picture(line(number, samples))],
+    }
+}
+
+/// A page with every section, whose every word is hostile and every number as given.
+fn page(number: f64, joints: usize, samples: usize) -> IdentificationPage {
+    let line = || line(number, samples);
+    let trace = || TorqueTrace { log: word(), measured: line(), predicted: line(), residual: line() };
+    let picture = || picture(line());
+    let candidates = candidates(number);
     let row = ErrorRow {
         joint: word(),
         unit: word(),
@@ -74,7 +90,7 @@ fn page(number: f64, joints: usize, samples: usize) -> IdentificationPage {
             pooled: PooledError { train: Some(number), held_out: Some(number), before: Some(number) },
             note: word(),
         },
-        effects: vec![effect; 2],
+        effects: vec![effect(number, samples); 2],
         remaining: Some(Remaining {
             structured: true,
             joints: words(),
@@ -82,11 +98,15 @@ fn page(number: f64, joints: usize, samples: usize) -> IdentificationPage {
             description: words(),
             candidates,
             pictures: vec![picture()],
-            cannot_be_told: vec![CannotBeTold { kind: word(), joints: words(), telling_motion: word() }],
+            unidentifiable: vec![UnidentifiableEffect {
+                kind: word(),
+                joints: words(),
+                telling_motion: word(),
+            }],
         }),
         joints: vec![joint; joints],
-        conditioning: Conditioning { entries: vec![(word(), word())], pictures: vec![picture()] },
-        parameters: Parameters {
+        conditioning: ConditioningSection { entries: vec![(word(), word())], pictures: vec![picture()] },
+        parameters: ParametersSection {
             rows: vec![ParameterRow { name: word(), value: number, std: number, unit: word() }; 14 * joints],
             note: word(),
         },
@@ -145,7 +165,6 @@ fn experiment() -> ExperimentPage {
             Iterations { lines: &lines, x_label: HOSTILE, y_label: HOSTILE, first: 0, logarithmic: true };
         Picture { caption: HOSTILE.to_owned(), svg: iterations(&plot) }
     };
-    let word = || HOSTILE.to_owned();
     let table = Table { head: vec![word(), word()], rows: vec![vec![word(), "1.5 %".to_owned()]] };
     let section = Section {
         title: word(),
@@ -229,7 +248,7 @@ fn long_logs_and_many_of_them_make_small_pages() {
 #[test]
 fn parameters_are_sorted_and_the_poor_ones_marked() {
     let row = |name: &str, std: f64| ParameterRow { name: name.into(), value: 2.0, std, unit: "kg".into() };
-    let parameters = Parameters {
+    let parameters = ParametersSection {
         rows: vec![row("unknown", f64::NAN), row("poor", 1.0), row("good", 0.02), row("fair", 0.4)],
         note: String::new(),
     };

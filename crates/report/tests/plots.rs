@@ -44,7 +44,7 @@ fn pictures(x: &[f64], y: &[f64]) -> Vec<(&'static str, Svg)> {
             residual_panel(&ResidualPanel { residual: line, torque: line, noise_floor: floor, unit: name }),
         ),
         ("bars", joint_bars(&JointBars { groups: &groups, label: name })),
-        ("spectrum", spectrum(&Spectrum { lines: &spectra, y_label: name, cut_off: floor })),
+        ("spectrum", spectrum(&SpectrumPlot { lines: &spectra, y_label: name, cut_off: floor })),
     ];
     for after in [line, Line::default()] {
         let input = ResidualAgainstSignal { signal: name, residual: name, before: line, after };

@@ -92,7 +92,7 @@ fn additions_of_the_program_come_last() {
             significance: 21.5,
             stability: 1.0,
         }],
-        cannot_be_told: vec![CannotBeToldJson {
+        unidentifiable: vec![UnidentifiableJson {
             kind: "transmission_coupling".into(),
             joints: vec![vec!["joint_1".into(), "joint_2".into()]],
             telling_motion: "one joint alone".into(),

@@ -5,8 +5,9 @@ use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Tree, Workspace};
 use phiw_effects::{Catalogue, SignalRanges};
+use phiw_identification::fitting::accumulate;
 use phiw_identification::{
-    BlockSource, Data, Design, EffectCatalogue, EffectSpec, Fold, Model, Variants, accumulate, identify,
+    BlockSource, Data, Design, EffectCatalogue, EffectSpec, Fold, Model, Variants, identify,
 };
 use phiw_regressor::BaseParameters;
 use phiw_residual::trace::{HeldModel, TraceInput, TraceOptions, Tracing, Verdict, noise_floor, trace};

@@ -7,20 +7,21 @@ use crate::inertial::PrincipalInertia;
 use crate::mjcf::{feet_of_corners, mjcf};
 use crate::simulation::{Simulation, Sizes};
 use crate::{Integrator, MujocoError};
-use phiw_dynamics::{BackendError, BodyJoint, DynamicsBackend, SimulationBackend, Tree, World, check_size};
+use phiw_dynamics::body_kinematics::BodyJoint;
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::{BackendError, DynamicsBackend, SimulationBackend, Tree, World};
 use std::cell::RefCell;
 
-/// Largest distance of a quaternion's length from 1.
-const QUATERNION_TOLERANCE: f64 = 1e-6;
 /// A coordinate, speed or acceleration beyond this has diverged (MuJoCo's `mjMAXVAL`).
 const DIVERGED: f64 = 1e10;
 
 /// A robot in MuJoCo.
 ///
 /// Two models are made of it. The robot by itself, in empty space, answers [`inverse_dynamics`] and
-/// [`forward_dynamics`]; the robot in its world, with floor and limits, is moved by [`step`]. In both, **the rotor
-/// inertia of the world is part of the mass matrix**: it is the robot's own, and force = (M + rotor)·a + h. Friction
-/// and damping that the URDF declares are left out, as in [`phiw_dynamics::AnalyticBackend`].
+/// [`forward_dynamics`]; the robot in its world, with floor and limits, is moved by [`step`]. In both, **the
+/// rotor inertia of the world is part of the mass matrix**: it is the robot's own, and
+/// force = (M + rotor)·a + h. Friction and damping that the URDF declares are left out, as in
+/// [`phiw_dynamics::AnalyticBackend`].
 ///
 /// The robot is at rest in its neutral configuration in the beginning. Nothing is allocated per call.
 ///
@@ -184,8 +185,7 @@ impl MujocoBackend {
         start.acceleration.copy_from_slice(world.acceleration());
         self.foot_wrenches.fill([0.0; 6]);
         world.add_contact_wrenches(&self.feet_of_shapes, &mut self.foot_wrenches);
-        let sum = |axis: usize| self.foot_wrenches.iter().map(|wrench| wrench[axis]).sum();
-        let ground = std::array::from_fn(sum);
+        let ground = std::array::from_fn(|axis| self.foot_wrenches.iter().map(|wrench| wrench[axis]).sum());
         if !(solved && world.integrate(self.integrator)) {
             return Err(self.singular());
         }
@@ -302,15 +302,7 @@ impl SimulationBackend for MujocoBackend {
     }
 
     fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), BackendError> {
-        self.check_motion(q, v)?;
-        check_finite("the configuration q", q)?;
-        check_finite("the velocity v", v)?;
-        if self.floating {
-            let length = q[3..7].iter().map(|x| x * x).sum::<f64>().sqrt();
-            if (length - 1.0).abs() > QUATERNION_TOLERANCE {
-                return Err(BackendError::NotUnitQuaternion { length });
-            }
-        }
+        self.check_state(q, v)?;
         self.q.copy_from_slice(q);
         self.v.copy_from_slice(v);
         self.put_state();
@@ -318,11 +310,7 @@ impl SimulationBackend for MujocoBackend {
     }
 
     fn step(&mut self, torque: &[f64], dt: f64) -> Result<(), BackendError> {
-        check_size("the joint torque", torque.len(), self.joint_names.len())?;
-        check_finite("the joint torque", torque)?;
-        if !(dt.is_finite() && dt > 0.0) {
-            return Err(BackendError::TimeStep { dt });
-        }
+        self.check_step(torque, dt)?;
         self.start.position.copy_from_slice(self.world.position());
         self.start.velocity.copy_from_slice(self.world.velocity());
         if let Err(error) = self.advance(torque, dt) {
@@ -345,10 +333,6 @@ impl SimulationBackend for MujocoBackend {
     fn foot_wrench(&self, foot: usize) -> Option<[f64; 6]> {
         self.foot_wrenches.get(foot).copied().filter(|_| self.stepped)
     }
-}
-
-fn check_finite(what: &'static str, values: &[f64]) -> Result<(), BackendError> {
-    if values.iter().all(|value| value.is_finite()) { Ok(()) } else { Err(BackendError::NotFinite { what }) }
 }
 
 impl std::fmt::Debug for MujocoBackend {

@@ -2,9 +2,9 @@
 
 use crate::MujocoBackend;
 use crate::simulation::Simulation;
-use phiw_dynamics::{
-    BackendError, BodyJoint, BodyKinematics, BodyMotion, MotionSubspace, Spatial, Tree, check_size,
-};
+use phiw_dynamics::body_kinematics::{BodyJoint, BodyMotion, MotionSubspace};
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::{BackendError, BodyKinematics, Spatial, Tree};
 
 /// The joints before the bodies, their axes as MuJoCo's Jacobians have them.
 pub(crate) fn body_joints(tree: &Tree, simulation: &mut Simulation) -> Vec<BodyJoint> {

@@ -2,7 +2,8 @@
 
 use crate::MujocoError;
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion};
-use phiw_dynamics::{Body, Inertia, Mat3, Vec3};
+use phiw_dynamics::inertia::Inertia;
+use phiw_dynamics::{Body, Mat3, Vec3};
 
 /// A body's inertia about its centre of mass, along its principal axes.
 #[derive(Clone, Copy, Debug, PartialEq)]

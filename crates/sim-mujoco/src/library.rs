@@ -132,8 +132,8 @@ pub(crate) fn functions() -> Result<&'static Functions, MujocoError> {
 }
 
 /// Keeps MuJoCo from writing warnings to the terminal and a log into the present folder: this crate looks at
-/// the counts of warnings and reports errors of its own. An error ends the process, so that its message is
-/// the last that is heard.
+/// the counts of warnings and reports errors of its own. An error ends the process, so its message is
+/// printed first.
 unsafe extern "C" fn log(message: *const LogMessage) {
     const ERROR: c_int = 3;
     // SAFETY: MuJoCo calls this with a message that lives as long as the call; its subject ends with a zero.

@@ -45,8 +45,8 @@ pub(crate) fn mjcf(tree: &Tree, world: &World) -> String {
 
 /// The foot of each sole's corner, in the order in which the text has them: that of the bodies.
 pub(crate) fn feet_of_corners(tree: &Tree, world: &World) -> Vec<usize> {
-    let of_body = |body: usize| world.feet.iter().enumerate().filter(move |(_, foot)| foot.body == body);
-    let feet = (0..tree.bodies().len()).flat_map(of_body);
+    let feet = (0..tree.bodies().len())
+        .flat_map(|body| world.feet.iter().enumerate().filter(move |(_, foot)| foot.body == body));
     feet.flat_map(|(index, foot)| vec![index; foot.sole.len()]).collect()
 }
 

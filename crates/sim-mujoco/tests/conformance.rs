@@ -61,8 +61,8 @@ fn equation_of_motion_of_all_robots() {
                 Err(failure) => panic!("{}: {failure}", robot.name),
             }
         }
-        check("  rotors", suite::rotor_inertia_is_part_of_the_mass(&runge_kutta, &robot.tree, 50));
-        check("  step", suite::base_wrench_of_a_step(&runge_kutta, &robot.tree));
+        check("  rotors", suite::dynamics::rotor_inertia_is_part_of_the_mass(&runge_kutta, &robot.tree, 50));
+        check("  step", suite::step::base_wrench_of_a_step(&runge_kutta, &robot.tree));
     }
 }
 
@@ -95,8 +95,9 @@ fn closed_loop_tracking() {
     }
     for name in ARMS {
         let tree = robot(name);
-        check(name, suite::tracking_difference(&runge_kutta, &suite::analytic, &tree, 1e-3, 1e-9));
-        check(name, suite::tracking_difference(&implicit, &suite::analytic, &tree, 1e-3, 3e-3)); // order one
+        check(name, suite::step::tracking_difference(&runge_kutta, &suite::analytic, &tree, 1e-3, 1e-9));
+        // This integrator is of order one.
+        check(name, suite::step::tracking_difference(&implicit, &suite::analytic, &tree, 1e-3, 3e-3));
     }
 }
 
@@ -106,10 +107,10 @@ fn free_motion() {
         return;
     }
     let tree = robot("upper_body18, fixed base");
-    check("energy", suite::energy_drift(&runge_kutta, &tree, 1e-3, 1.0, 1e-5));
-    check("energy, implicit", suite::energy_drift(&implicit, &tree, 1e-3, 1.0, 0.1));
+    check("energy", suite::step::energy_drift(&runge_kutta, &tree, 1e-3, 1.0, 1e-5));
+    check("energy, implicit", suite::step::energy_drift(&implicit, &tree, 1e-3, 1.0, 0.1));
     for robot in robots().filter(|robot| robot.tree.is_floating()) {
-        check(&robot.name, suite::falls_freely(&runge_kutta, &robot.tree, 1e-3, 1e-6));
+        check(&robot.name, suite::step::falls_freely(&runge_kutta, &robot.tree, 1e-3, 1e-6));
     }
 }
 
@@ -119,8 +120,8 @@ fn position_limits() {
         return;
     }
     for name in ARMS {
-        check(name, suite::position_limits_hold(&runge_kutta, &robot(name)));
-        check(name, suite::position_limits_hold(&implicit, &robot(name)));
+        check(name, suite::step::position_limits_hold(&runge_kutta, &robot(name)));
+        check(name, suite::step::position_limits_hold(&implicit, &robot(name)));
     }
 }
 
@@ -131,9 +132,9 @@ fn standing_on_the_floor() {
     }
     let (tree, world) = suite::standing_robot().unwrap();
     for build in [&runge_kutta as &suite::Builder, &implicit] {
-        check("rest", suite::rests_on_its_feet(build, &tree, &world));
-        check("ZMP", suite::measured_zmp_is_the_momentums(build, &tree, &world));
-        check("fast", suite::fast_motion_topples(build, &tree, &world));
-        check("slow", suite::slow_motion_stands(build, &tree, &world));
+        check("rest", suite::standing::rests_on_its_feet(build, &tree, &world));
+        check("ZMP", suite::standing::measured_zmp_is_the_momentums(build, &tree, &world));
+        check("fast", suite::standing::fast_motion_topples(build, &tree, &world));
+        check("slow", suite::standing::slow_motion_stands(build, &tree, &world));
     }
 }

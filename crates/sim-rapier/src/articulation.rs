@@ -141,8 +141,11 @@ impl Articulation {
     pub(crate) fn couple_followers(&mut self) -> Result<(), BackendError> {
         let multibody = multibody_mut(&mut self.world.multibody_joints, self.index)?;
         for follower in self.joints.iter().filter(|joint| joint.mimic) {
-            let leads = |joint: &&Joint| joint.coordinate == follower.coordinate && !joint.mimic;
-            let leader = self.joints.iter().find(leads).ok_or_else(lost)?;
+            let leader = self
+                .joints
+                .iter()
+                .find(|joint| joint.coordinate == follower.coordinate && !joint.mimic)
+                .ok_or_else(lost)?;
             multibody.add_dof_coupling(MultibodyDofCoupling {
                 link1: leader.link,
                 dof1: 0,

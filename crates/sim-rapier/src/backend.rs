@@ -6,9 +6,10 @@ use crate::body_kinematics::LinkMotions;
 use crate::floor::Soles;
 use crate::probe::Probe;
 use crate::{NAME, error};
+use phiw_dynamics::body_kinematics::{BodyJoint, BodyMotion};
+use phiw_dynamics::check::check_size;
 use phiw_dynamics::{
-    AnalyticBackend, BackendError, BodyJoint, BodyKinematics, BodyMotion, DynamicsBackend, Placement,
-    SimulationBackend, Tree, World, check_size,
+    AnalyticBackend, BackendError, BodyKinematics, DynamicsBackend, Placement, SimulationBackend, Tree, World,
 };
 use rapier3d_f64::prelude::PhysicsWorld;
 
@@ -214,13 +215,7 @@ impl SimulationBackend for RapierBackend {
     }
 
     fn step(&mut self, torque: &[f64], dt: f64) -> Result<(), BackendError> {
-        check_size("the joint torque", torque.len(), self.joint_names().len())?;
-        if !torque.iter().all(|x| x.is_finite()) {
-            return Err(BackendError::NotFinite { what: "the joint torque" });
-        }
-        if dt.is_nan() || dt <= 0.0 {
-            return Err(BackendError::TimeStep { dt });
-        }
+        self.check_step(torque, dt)?;
         self.analytic.state(&mut self.scratch.q, &mut self.scratch.v)?;
         self.articulation.set_torque(torque)?;
         self.articulation.world.integration_parameters.dt = dt;

@@ -6,9 +6,8 @@
 
 use crate::articulation::Articulation;
 use crate::base_frame::{self, engine_acceleration};
-use phiw_dynamics::{
-    BackendError, BodyJoint, BodyMotion, Mat3, MotionSubspace, Placement, Spatial, Tree, Vec3,
-};
+use phiw_dynamics::body_kinematics::{BodyJoint, BodyMotion, MotionSubspace};
+use phiw_dynamics::{BackendError, Mat3, Placement, Spatial, Tree, Vec3};
 
 /// The joints before the bodies, and scratch.
 pub(crate) struct LinkMotions {

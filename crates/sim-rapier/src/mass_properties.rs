@@ -2,7 +2,8 @@
 //! inverses.
 
 use crate::error;
-use phiw_dynamics::{BackendError, Body, Inertia, Vec3};
+use phiw_dynamics::inertia::Inertia;
+use phiw_dynamics::{BackendError, Body, Vec3};
 use rapier3d_f64::math::{Matrix, Rotation, Vector};
 use rapier3d_f64::na::{Matrix3, SymmetricEigen};
 use rapier3d_f64::prelude::MassProperties;

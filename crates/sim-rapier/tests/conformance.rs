@@ -50,8 +50,8 @@ fn equation_of_motion_of_all_robots() {
                 Err(failure) => panic!("{}: {failure}", robot.name),
             }
         }
-        check("  rotors", suite::rotor_inertia_is_part_of_the_mass(&rapier, &robot.tree, 50));
-        check("  step", suite::base_wrench_of_a_step(&rapier, &robot.tree));
+        check("  rotors", suite::dynamics::rotor_inertia_is_part_of_the_mass(&rapier, &robot.tree, 50));
+        check("  step", suite::step::base_wrench_of_a_step(&rapier, &robot.tree));
     }
 }
 
@@ -78,7 +78,10 @@ fn closed_loop_tracking() {
     for name in ["puma560, fixed base", "arm7, fixed base", "scara4, fixed base", "upper_body18, fixed base"]
     {
         let tree = robot(name);
-        check(name, suite::tracking_difference(&build as &Builder, &suite::analytic, &tree, 1e-3, 1e-3));
+        check(
+            name,
+            suite::step::tracking_difference(&build as &Builder, &suite::analytic, &tree, 1e-3, 1e-3),
+        );
     }
 }
 
@@ -87,10 +90,10 @@ fn free_motion() {
     let tree = robot("upper_body18, fixed base");
     for iterations in [1, 4, 8, 16] {
         let build = with_iterations(iterations);
-        check(&format!("{iterations} iterations"), suite::energy_drift(&build, &tree, 1e-3, 1.0, 0.2));
+        check(&format!("{iterations} iterations"), suite::step::energy_drift(&build, &tree, 1e-3, 1.0, 0.2));
     }
     for robot in robots().iter().filter(|robot| robot.tree.is_floating()) {
-        check(&robot.name, suite::falls_freely(&rapier, &robot.tree, 1e-3, 1e-2));
+        check(&robot.name, suite::step::falls_freely(&rapier, &robot.tree, 1e-3, 1e-2));
     }
 }
 
@@ -98,17 +101,17 @@ fn free_motion() {
 fn position_limits() {
     for name in ["puma560, fixed base", "arm7, fixed base", "scara4, fixed base", "upper_body18, fixed base"]
     {
-        check(name, suite::position_limits_hold(&rapier, &robot(name)));
+        check(name, suite::step::position_limits_hold(&rapier, &robot(name)));
     }
 }
 
 #[test]
 fn standing_on_the_floor() {
     let (tree, world) = suite::standing_robot().unwrap();
-    check("rest", suite::rests_on_its_feet(&rapier, &tree, &world));
-    check("ZMP", suite::measured_zmp_is_the_momentums(&rapier, &tree, &world));
-    check("fast", suite::fast_motion_topples(&rapier, &tree, &world));
-    check("slow", suite::slow_motion_stands(&rapier, &tree, &world));
+    check("rest", suite::standing::rests_on_its_feet(&rapier, &tree, &world));
+    check("ZMP", suite::standing::measured_zmp_is_the_momentums(&rapier, &tree, &world));
+    check("fast", suite::standing::fast_motion_topples(&rapier, &tree, &world));
+    check("slow", suite::standing::slow_motion_stands(&rapier, &tree, &world));
 }
 
 /// The engine solves the couplings iteratively: with fewer iterations a leader with many followers strays.
@@ -118,7 +121,7 @@ fn closed_loop_tracking_with_mimic_joints() {
     for seed in 0..4 {
         let options = RandomTreeOptions { joints: 7, mimic: true, ..Default::default() };
         let tree = random_tree(seed, &options).unwrap();
-        let result = suite::tracking_difference(&build, &suite::analytic, &tree, 1e-3, 1e-3);
+        let result = suite::step::tracking_difference(&build, &suite::analytic, &tree, 1e-3, 1e-3);
         check(&format!("{} of {} joints lead", tree.joint_count(), tree.bodies().len()), result);
     }
 }

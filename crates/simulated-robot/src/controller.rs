@@ -3,7 +3,8 @@
 use phiw_curriculum::CurriculumError;
 use phiw_dynamics::DimensionError;
 use phiw_estimation::{Robot, RobotModel};
-use phiw_identification::{Design, JointProperty};
+use phiw_identification::Design;
+use phiw_identification::effect::JointProperty;
 use phiw_plant::{ComputedTorque, Gains, RigidBodyModel, TorqueModel};
 use phiw_telemetry::Block;
 

@@ -5,7 +5,7 @@ use phiw_curriculum::motion::Motion;
 use phiw_curriculum::{CurriculumError, Experiment, Trial};
 use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
 use phiw_estimation::{KnownEffect, MotionLog, Robot, RobotModel};
-use phiw_identification::JointProperty;
+use phiw_identification::effect::JointProperty;
 use phiw_plant::{Friction, History, Plant, PlantEffect, PlantRun, PlantSetup, Sensors, Timing};
 use rand::Rng;
 

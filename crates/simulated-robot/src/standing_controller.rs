@@ -3,9 +3,10 @@
 use crate::Controller;
 use phiw_curriculum::CurriculumError;
 use phiw_curriculum::standing::{Feet, VIRTUAL_JOINTS};
-use phiw_dynamics::{DimensionError, Tree, Workspace, check_size};
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::{DimensionError, Tree, Workspace};
 use phiw_estimation::{Robot, RobotModel};
-use phiw_identification::JointProperty;
+use phiw_identification::effect::JointProperty;
 use phiw_plant::{ComputedTorque, Gains, TorqueModel};
 
 /// The joints of a virtual base come first.

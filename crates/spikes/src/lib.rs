@@ -49,7 +49,7 @@ impl SpikeSettings {
         }
     }
 
-    /// The share of `count` differences that tells what is usual: [`SpikeSettings::usual_share`], and in a
+    /// The share of `count` differences that are taken for usual: [`SpikeSettings::usual_share`], and in a
     /// short signal less, so that four spikes are left out of it.
     pub fn share_of(&self, count: usize) -> f64 {
         let spared = 1.0 - OF_FOUR_SPIKES as f64 / count.max(1) as f64;

@@ -3,9 +3,8 @@
 #![allow(missing_docs)]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use phiw_telemetry::{
-    Conditioning, ConditioningOptions, FilterScratch, Recording, TorqueColumns, stream, survey,
-};
+use phiw_telemetry::filter::FilterScratch;
+use phiw_telemetry::{Conditioning, ConditioningOptions, Recording, TorqueColumns, stream, survey};
 use std::hint::black_box;
 use std::ops::ControlFlow;
 

@@ -1,4 +1,4 @@
-//! A measured velocity held against the positions: how late it is, in which unit, and where it says nothing.
+//! A measured velocity compared with the positions: its delay, its unit, and its dead band.
 
 use std::collections::VecDeque;
 
@@ -115,7 +115,7 @@ impl AlignmentCollector {
         let qd = self.recent[self.lags][0];
         self.square += qd * qd;
         self.count += 1.0;
-        // A column that is late at the middle shows the positions' derivative of earlier.
+        // A delayed column shows an earlier derivative of the positions.
         for (sums, [_, v]) in self.sums.iter_mut().rev().zip(&self.recent) {
             sums[0] += qd * v;
             sums[1] += v * v;
@@ -139,7 +139,7 @@ impl AlignmentCollector {
         if self.count < FEWEST || !explained(best).is_finite() {
             return None;
         }
-        // Between the lags that were tried, by the parabola through the best and its neighbours.
+        // The best lag is interpolated by the parabola through the best tried lag and its neighbours.
         let shift = match best {
             0 => 0.0,
             best if best + 1 == self.sums.len() => 0.0,

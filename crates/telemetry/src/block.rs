@@ -9,9 +9,8 @@ use std::sync::Arc;
 /// computed from them.
 ///
 /// A block owns its arrays, so it can be sent to another thread, and depends on no other block: it overlaps
-/// its neighbours by the parallel filter's
-/// half-length. The outputs of all blocks together are those of the whole segment, each once, whatever the
-/// size of the blocks.
+/// its neighbours by the parallel filter's half-length. The outputs of all blocks together are those of the
+/// whole segment, each once, whatever the size of the blocks.
 ///
 /// Arrays of joints are row-major, `[sample × joints]`.
 #[derive(Debug, Clone)]
@@ -131,11 +130,10 @@ impl Block {
     /// sample.
     ///
     /// `evaluate(sample, row)` fills the row of a sample; it is called once for each sample from
-    /// [`warm_up`](Block::warm_up) on, ascending. An effect with memory first
-    /// runs over the samples before by itself. `emit(output, t, row)` gets each filtered row, with its place
-    /// in [`outputs`](Block::outputs) and its
-    /// time. Nothing is allocated per sample, and in `scratch` only when it is used for the first time or for
-    /// wider rows.
+    /// [`warm_up`](Block::warm_up) on, ascending. An effect with memory first runs over the samples before by
+    /// itself. `emit(output, t, row)` gets each filtered row, with its place in [`outputs`](Block::outputs)
+    /// and its time. Nothing is allocated per sample, and in `scratch` only when it is used for the first
+    /// time or for wider rows.
     pub fn filter(
         &self,
         width: usize,

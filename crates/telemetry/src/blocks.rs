@@ -44,8 +44,8 @@ impl<'a> BlockMaker<'a> {
         self.window.extend_from_slice(values);
         self.length += 1;
         let last = self.outputs + self.plan.outputs_per_block - 1;
-        // The block needs its last output's reach, and each sample in it the kernel's; then it is as if the
-        // segment went on for ever.
+        // The block needs the filter's reach behind its last output, and each of its samples the kernel's
+        // reach: then the block's end has no influence.
         let reach = self.plan.parallel.half_length() + self.plan.kernel.half_length();
         (self.length == self.place(last) + reach + 1)
             .then(|| self.block(last + 1, self.length - self.plan.kernel.half_length()))
@@ -54,7 +54,7 @@ impl<'a> BlockMaker<'a> {
     /// The segment is over: gives the next of the blocks that are left, `None` once there is none and the
     /// next segment can come.
     pub fn finish_segment(&mut self) -> Option<Block> {
-        // One past the last sample that is used.
+        // Index one past the last sample that is used.
         let end = self.length.saturating_sub(self.plan.edge);
         if self.length >= self.plan.shortest && self.place(self.outputs) < end {
             let all = (end - 1 - self.plan.edge) / self.plan.decimation() + 1;

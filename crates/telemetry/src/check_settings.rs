@@ -1,6 +1,6 @@
-//! From where on it is worth saying what a sensor, a drive or a logger did to a log.
+//! Thresholds from which on an artefact of a sensor, a drive or a logger is reported.
 
-use crate::Alignment;
+use crate::alignment::Alignment;
 
 /// From where on something is worth saying. What the real logs of the tests show lies below each of these
 /// unless it is truly there.

@@ -1,4 +1,4 @@
-//! When the samples were taken, where the stamps jitter.
+//! The times at which samples were taken, where the stamps jitter.
 
 use crate::columns::Layout;
 use std::fmt;
@@ -7,12 +7,10 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Clock {
     /// Samples were taken at equal distances; where stamps jitter, it is the stamping that does. The stamps
-    /// are kept, and not used
-    /// for differentiation.
+    /// are kept, and not used for differentiation.
     Uniform,
     /// Samples were taken when the stamps say; they are interpolated to equal distances (by cubics through
-    /// four samples, inside a
-    /// segment).
+    /// four samples, inside a segment).
     Stamped,
 }
 
@@ -31,19 +29,18 @@ pub enum ClockChoice {
     /// The one under which the positions are smoother; see [`Survey::clock`](crate::Survey::clock).
     #[default]
     Auto,
-    /// As told.
+    /// This one.
     Fixed(Clock),
 }
 
 /// Error of the middle of five samples against the cubic through the other four, at equal distances. White
-/// noise of deviation σ
-/// gives σ·√70/6.
-pub(crate) fn uniform_misfit(x: [f64; 5]) -> f64 {
+/// noise of deviation σ gives σ·√70/6.
+pub(crate) fn uniform_interpolation_error(x: [f64; 5]) -> f64 {
     x[2] - (4.0 * (x[1] + x[3]) - x[0] - x[4]) / 6.0
 }
 
 /// Error of the middle of five samples against the cubic through the other four, at the stamps `t`.
-pub(crate) fn stamped_misfit(t: [f64; 5], x: [f64; 5]) -> f64 {
+pub(crate) fn stamped_interpolation_error(t: [f64; 5], x: [f64; 5]) -> f64 {
     let weights = lagrange([t[0], t[1], t[3], t[4]], t[2]);
     x[2] - (weights[0] * x[0] + weights[1] * x[1] + weights[2] * x[3] + weights[3] * x[4])
 }
@@ -92,8 +89,8 @@ impl Resampler {
         self.recent[3 * self.width..].copy_from_slice(values);
         self.seen += 1;
         if self.seen >= 4 {
-            // The cubic serves best between its two middle samples; at the start of the segment it also
-            // serves before them.
+            // The cubic is most accurate between its two middle samples; at the start of the segment it is
+            // also used before them.
             let until = self.recent[2 * self.width];
             self.hand_out_until(until, &mut hand_out);
         }
@@ -102,7 +99,7 @@ impl Resampler {
     /// The segment is over: hands out the rest and starts anew.
     pub fn end_segment(&mut self, mut hand_out: impl FnMut(&[f64])) {
         if self.seen >= 4 {
-            // A stamp that is late by rounding only must not cost the last sample.
+            // The last sample is kept if its stamp is late by rounding only.
             let until = self.recent[3 * self.width] + 1e-6 * self.period;
             self.hand_out_until(until, &mut hand_out);
         }

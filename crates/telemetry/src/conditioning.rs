@@ -1,7 +1,8 @@
 //! How logs are conditioned: chosen once for a session, applied to each log.
 
+use crate::clock::ClockChoice;
 use crate::cutoff::{self, BANDWIDTHS, CutoffSuggestion};
-use crate::{ClockChoice, LogError, Survey};
+use crate::{LogError, Survey};
 use std::fmt;
 
 /// What the user fixes; what is left `None` is chosen from the data.
@@ -71,8 +72,8 @@ impl Conditioning {
         let suggested = suggestions.iter().map(|suggestion| suggestion.cutoff_hz).fold(0.0, f64::max);
         let from_data = if suggested > 0.0 { suggested.min(highest) } else { highest };
         let cutoff_hz = options.cutoff_hz.unwrap_or(from_data);
-        // The positions' filter must bend no acceleration; the parallel filter bends columns and torque alike
-        // and may stop where the motion ends.
+        // The positions' filter must not change accelerations within the motion's band. The parallel filter
+        // changes columns and torque alike, so its cut-off may be the motion's bandwidth.
         let parallel = (cutoff_hz / BANDWIDTHS).max(LEAST_PARALLEL_HZ).min(cutoff_hz);
         let conditioning = Conditioning {
             cutoff_hz,

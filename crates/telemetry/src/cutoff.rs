@@ -1,6 +1,7 @@
 //! A cut-off frequency from the data's own spectrum.
 
-use crate::{Spectrum, Survey};
+use crate::Survey;
+use crate::spectrum::Spectrum;
 use std::f64::consts::PI;
 use std::fmt;
 
@@ -23,8 +24,7 @@ pub enum Bound {
     /// A higher one would let more noise into the acceleration than it saves of the signal.
     Noise,
     /// It is eight times the frequency below which all but a thousandth of the velocity's power lies:
-    /// vibration above it is no motion of the
-    /// rigid body.
+    /// vibration above it is no motion of the rigid body.
     Motion,
     /// The sample rate allows no more.
     SampleRate,
@@ -62,7 +62,7 @@ pub(crate) fn suggest(survey: &Survey, log: usize) -> Vec<CutoffSuggestion> {
     let longest = survey.segments.iter().map(|segment| segment.t_end - segment.t_start).fold(0.0, f64::max);
     let lowest = (LEAST_PERIODS / longest).min(highest);
     let moving = survey.joints.iter().enumerate().filter(|(_, joint)| joint.travel() > 0.0);
-    let suggestion = |(index, joint): (usize, &crate::JointSurvey)| {
+    let suggestion = |(index, joint): (usize, &crate::joint_survey::JointSurvey)| {
         let (cutoff, bound) = match survey.spectrum.windows {
             0 => (highest, Bound::SampleRate),
             _ => from_spectrum(&survey.spectrum, index),
@@ -84,9 +84,8 @@ const LEAST_PERIODS: f64 = 10.0;
 /// the least.
 ///
 /// Signal is what rises to twice the noise. The noise's density does not fall with frequency (it is a
-/// position's, differentiated twice), so it is no
-/// more than the lowest density at any higher frequency; under the signal it goes on as a white position
-/// noise would, with ω⁴.
+/// position's, differentiated twice), so it is no more than the lowest density at any higher frequency; under
+/// the signal it goes on as a white position noise would, with ω⁴.
 fn from_spectrum(spectrum: &Spectrum, joint: usize) -> (f64, Bound) {
     let density = smoothed(&spectrum.acceleration[joint]);
     let bins = density.len();
@@ -105,11 +104,12 @@ fn from_spectrum(spectrum: &Spectrum, joint: usize) -> (f64, Bound) {
     let velocity: Vec<f64> = (0..bins).map(|bin| signal[bin] / (bin.max(1) as f64).powi(2)).collect();
 
     let error = |cutoff: usize| -> f64 {
-        let at = |bin: usize| {
-            let gain = gain(bin as f64 / cutoff as f64);
-            signal[bin] * (1.0 - gain).powi(2) + noise[bin] * gain * gain
-        };
-        (1..bins).map(at).sum()
+        (1..bins)
+            .map(|bin| {
+                let gain = gain(bin as f64 / cutoff as f64);
+                signal[bin] * (1.0 - gain).powi(2) + noise[bin] * gain * gain
+            })
+            .sum()
     };
     let errors: Vec<f64> = (1..bins).map(error).collect();
     let least = errors.iter().copied().fold(f64::INFINITY, f64::min);

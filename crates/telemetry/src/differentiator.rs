@@ -7,8 +7,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// Applies a [`SmoothingKernel`] to many samples at once: by fast convolution (overlap-save) where the full
-/// kernel fits, tap by tap at the ends of a
-/// segment.
+/// kernel fits, tap by tap at the ends of a segment.
 pub(crate) struct Differentiator {
     kernel: SmoothingKernel,
     forward: Arc<dyn RealToComplex<f64>>,
@@ -34,7 +33,7 @@ impl Differentiator {
         let responses = std::array::from_fn(|order| {
             time.fill(0.0);
             for (j, tap) in kernel.taps(order).iter().enumerate() {
-                // Correlation, so the kernel is turned round; its middle lies at time 0.
+                // Correlation is convolution with the reversed kernel, whose middle lies at time 0.
                 time[(size + half - j) % size] = tap / size as f64;
             }
             let mut response = forward.make_output_vec();
@@ -57,9 +56,9 @@ impl Differentiator {
 
     /// Smooths and differentiates several signals of a segment of `length` samples.
     ///
-    /// `wanted` tells for each signal which of value, first and second derivative are asked for; `x(signal,
-    /// k)` is sample k, known within a
-    /// half-length around `range`; `put(signal, order, k, value)` gets the results for all k in `range`.
+    /// `wanted` says for each signal which of value, first and second derivative are asked for; `x(signal,
+    /// k)` is sample k, known within a half-length around `range`; `put(signal, order, k, value)` gets the
+    /// results for all k in `range`.
     pub fn apply(
         &mut self,
         wanted: &[[bool; 3]],
@@ -69,7 +68,7 @@ impl Differentiator {
         mut put: impl FnMut(usize, usize, usize, f64),
     ) {
         let half = self.kernel.half_length();
-        // Where the full kernel fits.
+        // Samples for which the full kernel lies inside the segment.
         let inner_start = half.clamp(range.start, range.end);
         let inner_end = length.saturating_sub(half).clamp(inner_start, range.end);
         for k in (range.start..inner_start).chain(inner_end..range.end) {
@@ -100,7 +99,7 @@ impl Differentiator {
         mut put: impl FnMut(usize, f64),
     ) {
         let first = k - self.end_taps.before;
-        // About the middle sample the sums are small, and so is their rounding.
+        // The middle sample is subtracted first: the sums are smaller then, and so is their rounding error.
         let middle = x(k);
         for order in (0..3).filter(|&order| wanted[order]) {
             let taps = self.end_taps.taps[order].iter().enumerate();
@@ -132,7 +131,7 @@ impl Differentiator {
             {
                 *product = signal * response;
             }
-            // The inverse transform wants these two real, which they are but for rounding.
+            // The inverse transform requires these two to be real; rounding may leave an imaginary part.
             let last = self.product.len() - 1;
             self.product[0].im = 0.0;
             self.product[last].im = 0.0;

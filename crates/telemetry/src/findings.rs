@@ -1,7 +1,12 @@
 //! What should be known of a log before anything is fitted to it: what sensors, drives and loggers did to it,
 //! what follows, and how to mend it.
 
-use crate::{Alignment, CheckSettings, JointSurvey, SignalShape, Survey, TorqueSurvey};
+pub use crate::check_settings::CheckSettings;
+
+use crate::Survey;
+use crate::alignment::Alignment;
+use crate::joint_survey::{JointSurvey, TorqueSurvey};
+use crate::signal_shape::SignalShape;
 use std::fmt;
 
 /// What is wrong.
@@ -217,7 +222,7 @@ impl CheckSettings {
         let shape = &torque.shape;
         let mut found = Vec::new();
         let flat_top = self.flat_top(torque, shape);
-        // What stands still at a flat top is the flat top.
+        // A signal that stands still at its limit is reported as a flat top, not twice.
         let at_top = |value: f64| flat_top.is_some() && (value == torque.max || value == torque.min);
         let still = shape.still.filter(|still| still.rows as f64 > self.still_runs * shape.mean_run);
         if let Some(still) = still.filter(|still| !at_top(still.value)) {
@@ -253,7 +258,7 @@ impl CheckSettings {
             found.push((FindingKind::FlatTop, measured));
         }
         let across = shape.smallest > (self.steps_across_zero * shape.step).max(self.dead_band * torque.rms);
-        // Where it rests at 0 for seconds there is no need of a threshold.
+        // Long stretches of zeros have been reported above; they are no dead band.
         if still.is_none_or(|still| still.value != 0.0) && shape.zero_share > self.zero_share && across {
             found.push((
                 FindingKind::TorqueDeadBand,
@@ -273,8 +278,8 @@ impl CheckSettings {
             let rows = shape.at_ends[side];
             rows >= self.flat_rows && rows as f64 > self.flat_share * shape.near_ends[side] as f64
         };
-        let fine = |&(end, _): &(f64, usize)| shape.step < self.torque_step * end.abs();
-        let (end, side) = ends.into_iter().filter(fine).find(flat)?;
+        let (end, side) =
+            ends.into_iter().filter(|&(end, _)| shape.step < self.torque_step * end.abs()).find(flat)?;
         Some(format!("has a flat top: {} rows at exactly {end:.4}", shape.at_ends[side]))
     }
 }

@@ -1,6 +1,6 @@
 //! Quantiles of a stream in constant memory.
 
-/// Octaves below and above 1 that are told apart; what lies beyond counts as the outermost.
+/// Octaves below and above 1 that have bins of their own; what lies beyond counts as the outermost.
 const OCTAVES: i64 = 64;
 /// Bins per octave as a power of two.
 const BITS: u32 = 4;

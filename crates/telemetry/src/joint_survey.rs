@@ -1,10 +1,14 @@
 //! What a log shows of one joint.
 
-use crate::alignment::{Alignment, AlignmentCollector};
+pub use crate::alignment::Alignment;
+pub use crate::signal_shape::{SignalShape, Still};
+pub use crate::spectrum::Spectrum;
+
+use crate::alignment::AlignmentCollector;
 use crate::check_settings::CheckSettings;
-use crate::clock::{stamped_misfit, uniform_misfit};
+use crate::clock::{stamped_interpolation_error, uniform_interpolation_error};
 use crate::histogram::Histogram;
-use crate::signal_shape::{ShapeCollector, SignalShape};
+use crate::signal_shape::ShapeCollector;
 
 /// What a log shows of one joint, over all usable rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,10 +28,8 @@ pub struct JointSurvey {
     /// The torque, where the log has it.
     pub torque: Option<TorqueSurvey>,
     /// Standard deviation of the position's white noise, from fourth differences: their median magnitude,
-    /// over windows where the
-    /// reading changes at all, divided by what unit white noise gives. Low-passed noise looks smaller than it
-    /// is, motion fast for
-    /// the sample rate looks like noise. In rad or m.
+    /// over windows where the reading changes at all, divided by what unit white noise gives. Low-passed
+    /// noise looks smaller than it is, motion fast for the sample rate looks like noise. In rad or m.
     pub position_noise_std: f64,
     /// What the encoder made of the position.
     pub position_shape: SignalShape,
@@ -81,10 +83,9 @@ pub struct DerivativeSurvey {
     /// Largest.
     pub max: f64,
     /// Slope of the derivative of the signal below (`q` for `qd`, `qd` for `qdd`; by central differences)
-    /// over this column, by least
-    /// squares: 1 where the two agree; NaN where it can't be told.
+    /// over this column, by least squares: 1 where the two agree; NaN where there is too little motion.
     pub agreement: f64,
-    /// Of a velocity, how it relates to the positions in detail; `None` where there is too little to tell by.
+    /// Of a velocity, how it relates to the positions in detail; `None` where there is too little motion.
     pub alignment: Option<Alignment>,
 }
 
@@ -103,7 +104,7 @@ impl DerivativeSurvey {
 }
 
 /// What noise the difference of five samples shows when its median magnitude is 1: 1 / (Φ⁻¹(¾)·√70/6).
-const NOISE_PER_MISFIT: f64 = 6.0 / (0.674_489_75 * 8.366_600_265_340_756);
+const NOISE_PER_INTERPOLATION_ERROR: f64 = 6.0 / (0.674_489_75 * 8.366_600_265_340_756);
 
 /// The five latest samples of a signal, oldest first.
 pub(crate) type Five = [f64; 5];
@@ -113,11 +114,12 @@ pub(crate) struct JointCollector {
     rows: f64,
     q: Moments,
     tau: Option<(Moments, Histogram)>,
-    misfit: Histogram,
+    interpolation_error: Histogram,
     /// Sum of squared slopes over four steps, their number, and the sum of 2 over the squared time that each
     /// took.
     slopes: [f64; 3],
-    /// Misfits at places where the stamps are uneven: under equal distances, and under the stamps.
+    /// Interpolation errors at places where the stamps are uneven: under equal distances, and under the
+    /// stamps.
     uneven: [Histogram; 2],
     qd: Option<Derivative>,
     qdd: Option<Derivative>,
@@ -134,7 +136,7 @@ impl JointCollector {
             rows: 0.0,
             q: Moments::default(),
             tau: torque.then(|| (Moments::default(), Histogram::new())),
-            misfit: Histogram::new(),
+            interpolation_error: Histogram::new(),
             slopes: [0.0; 3],
             uneven: [Histogram::new(), Histogram::new()],
             alignment: qd.then(|| AlignmentCollector::new(period)),
@@ -186,17 +188,17 @@ impl JointCollector {
             self.slopes[2] += 2.0 / (time * time);
         }
         if q.iter().any(|&x| x != q[0]) {
-            let misfit = uniform_misfit(q);
-            self.misfit.push(misfit);
+            let interpolation_error = uniform_interpolation_error(q);
+            self.interpolation_error.push(interpolation_error);
             if uneven {
-                self.uneven[0].push(misfit);
-                self.uneven[1].push(stamped_misfit(t, q));
+                self.uneven[0].push(interpolation_error);
+                self.uneven[1].push(stamped_interpolation_error(t, q));
             }
         }
         if let Some((_, histogram)) = &mut self.tau
             && tau.iter().any(|&x| x != tau[0])
         {
-            histogram.push(uniform_misfit(tau));
+            histogram.push(uniform_interpolation_error(tau));
         }
         for (derivative, below, x) in [(&mut self.qd, q, qd), (&mut self.qdd, qd, qdd)] {
             if let Some(derivative) = derivative {
@@ -210,15 +212,16 @@ impl JointCollector {
     }
 
     /// ln of how much smoother the position is under equal distances than under the stamps; `None` where
-    /// there is nothing to tell by.
+    /// too few stamps are uneven.
     pub fn smoother_when_uniform(&self) -> Option<f64> {
         let [uniform, stamped] = self.uneven.each_ref().map(Histogram::median);
         (uniform > 0.0 && stamped > 0.0 && self.uneven[0].total() >= 20).then(|| (stamped / uniform).ln())
     }
 
     pub fn finish(&self, name: &str, stamped: bool) -> JointSurvey {
-        let misfit = if stamped && self.uneven[1].total() > 0 { &self.uneven[1] } else { &self.misfit };
-        let position_noise_std = misfit.median() * NOISE_PER_MISFIT;
+        let interpolation_error =
+            if stamped && self.uneven[1].total() > 0 { &self.uneven[1] } else { &self.interpolation_error };
+        let position_noise_std = interpolation_error.median() * NOISE_PER_INTERPOLATION_ERROR;
         let [squares, count, noise_gain] = self.slopes;
         let velocity_square = (squares - noise_gain * position_noise_std.powi(2)) / count.max(1.0);
         JointSurvey {
@@ -232,7 +235,7 @@ impl JointCollector {
                 min: moments.min,
                 max: moments.max,
                 rms: (moments.square / self.rows + moments.mean * moments.mean).sqrt(),
-                noise_std: histogram.median() * NOISE_PER_MISFIT,
+                noise_std: histogram.median() * NOISE_PER_INTERPOLATION_ERROR,
                 shape: self.tau_shape.finish(),
             }),
             position_noise_std,

@@ -6,10 +6,8 @@ use std::f64::consts::{PI, TAU};
 /// it.
 ///
 /// Given as a function of time with its first two derivatives, so that a derivative of the filtered signal is
-/// one convolution. The window is z²·I₂(z),
-/// z = β√(1−u²), a relative of Kaiser's I₀(z) that ends without a step in value or slope: Kaiser's step of
-/// 0.3 % would bend the second derivative of slow
-/// motion by 1 %.
+/// one convolution. The window is z²·I₂(z), z = β√(1−u²), a relative of Kaiser's I₀(z) that ends without a
+/// step in value or slope: Kaiser's step of 0.3 % would bend the second derivative of slow motion by 1 %.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LowPass {
     /// Frequency where the gain is ½ (−6 dB), in Hz.
@@ -98,9 +96,8 @@ fn bessel_ratios(z2: f64) -> [f64; 3] {
 /// degree.
 ///
 /// Near the end of a segment, where the low-pass would stick out, taps of a local least-squares polynomial of
-/// fifth degree take its place, so that no
-/// sample has to be invented; it follows motion in the band better than any cut low-pass, and noise grows
-/// only in the last few samples.
+/// fifth degree take its place, so that no sample has to be invented; it follows motion in the band better
+/// than any cut low-pass, and noise grows only in the last few samples.
 ///
 /// Up to 0.6 of the cut-off the gains are the ideal ones to about 1e-4, with 80 dB. Only the second
 /// derivative is worse where a cut-off above a tenth of the sample rate leaves few taps: 1e-3 at most.
@@ -136,7 +133,7 @@ impl SmoothingKernel {
             full[1].push(-first * period);
             full[2].push(second * period);
         }
-        // What is missing for polynomials to pass exactly is added in the shape of the window.
+        // A correction in the shape of the window makes the kernel exact for polynomials.
         let weights: Vec<f64> = offsets().map(|time| low_pass.window(time)[0]).collect();
         correct_moments(&weights, half_length, period, Self::DEGREE, &mut full);
         SmoothingKernel { low_pass, period, half_length, full }
@@ -197,7 +194,7 @@ impl SmoothingKernel {
         }
         (out.before, out.after) = (before, after);
         out.weights.clear();
-        // The triweight: smooth at its rim, so that taps change little from sample to sample.
+        // The triweight is smooth at the ends of its support, so taps change little from sample to sample.
         out.weights.extend(
             (0..=before + after).map(|j| (1.0 - ((j as f64 - before as f64) / reach).powi(2)).powi(3)),
         );
@@ -228,8 +225,8 @@ fn root_sum_of_squares(taps: &[f64]) -> f64 {
 const TERMS: usize = 6;
 
 /// Adds weights·polynomial to the taps for value, first and second derivative at sample `middle`, so that
-/// they are exact for polynomials up to `degree`.
-/// From taps of zero this makes those of the weighted least-squares polynomial.
+/// they are exact for polynomials up to `degree`. From taps of zero this makes those of the weighted
+/// least-squares polynomial.
 fn correct_moments(weights: &[f64], middle: usize, period: f64, degree: usize, taps: &mut [Vec<f64>; 3]) {
     let terms = degree + 1;
     // Offsets from the centre in units of half the length: powers of −1…1 keep the small system well
@@ -252,7 +249,7 @@ fn correct_moments(weights: &[f64], middle: usize, period: f64, degree: usize, t
     }
     let at_middle = powers(middle);
     for (order, taps) in taps.iter_mut().enumerate() {
-        // What the exact operator makes of each power, less what the taps make of it.
+        // The exact operator applied to each power, minus the taps applied to it.
         let mut missing = [0.0; TERMS];
         for i in order..terms {
             let falling: usize = (i - order + 1..=i).product();

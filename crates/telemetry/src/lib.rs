@@ -1,26 +1,29 @@
 #![doc = include_str!("../README.md")]
 
+pub mod clock;
+pub mod cutoff;
+pub mod findings;
+pub mod joint_survey;
+pub mod segments;
+
 mod alignment;
 mod block;
 mod blocks;
 mod check_settings;
-mod clock;
 mod columns;
 mod conditioning;
-mod cutoff;
+mod csv_log;
 mod differentiator;
 mod error;
-mod findings;
 mod gap;
 mod histogram;
-mod joint_survey;
 mod kernel;
+mod log_file;
 mod number;
 mod parallel_filter;
 mod plan;
 mod reader;
 mod recording;
-mod segments;
 mod signal_shape;
 mod spectrum;
 mod spike;
@@ -29,25 +32,19 @@ mod stream;
 mod survey;
 mod writer;
 
-pub use alignment::Alignment;
 pub use block::{Block, Signals};
-pub use check_settings::CheckSettings;
-pub use clock::{Clock, ClockChoice};
 pub use columns::TorqueColumns;
 pub use conditioning::{Conditioning, ConditioningOptions};
-pub use cutoff::{Bound, CutoffSuggestion};
 pub use error::LogError;
-pub use findings::{Finding, FindingKind, findings};
-pub use gap::GapReason;
-pub use joint_survey::{DerivativeSurvey, JointSurvey, TorqueSurvey};
-pub use kernel::{LowPass, SmoothingKernel};
-pub use parallel_filter::{FilterScratch, ParallelFilter};
+pub use log_file::looks_like;
 pub use plan::LogPlan;
-pub use reader::looks_like;
 pub use recording::Recording;
-pub use segments::{GapCount, Segment, SpikeCount};
-pub use signal_shape::{SignalShape, Still};
-pub use spectrum::Spectrum;
 pub use stream::{StreamSummary, stream};
 pub use survey::{Session, Survey, arrange_session, survey};
 pub use writer::{LogColumns, LogWriter};
+
+/// Zero-phase low-passes, and the derivatives that a smoothing kernel gives.
+pub mod filter {
+    pub use crate::kernel::{LowPass, SmoothingKernel};
+    pub use crate::parallel_filter::{FilterScratch, ParallelFilter};
+}

@@ -9,8 +9,8 @@ const EXACT_POWERS: [f64; 23] = [
 /// The number that `cell` spells (blanks around it allowed), `None` where it spells none.
 ///
 /// Digits with a point take a fast path: up to 2⁵³ as an integer over an exact power of ten, one correctly
-/// rounded division
-/// (Clinger 1990). All else goes to the standard library, so the result is always the nearest `f64`.
+/// rounded division (Clinger 1990). All else goes to the standard library, so the result is always the
+/// nearest `f64`.
 pub(crate) fn parse(cell: &[u8]) -> Option<f64> {
     fast(cell).or_else(|| std::str::from_utf8(cell).ok()?.trim().parse().ok())
 }

@@ -5,8 +5,7 @@ use crate::kernel::LowPass;
 /// A decimating zero-phase low-pass over rows of any width.
 ///
 /// The same linear operator goes over the columns and the torque, so it takes noise away without bias
-/// (parallel filtering).
-/// At the end of a segment its kernel is cut and scaled to sum one.
+/// (parallel filtering). At the end of a segment its kernel is cut and scaled to sum one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParallelFilter {
     half_length: usize,
@@ -68,9 +67,8 @@ impl ParallelFilter {
     }
 
     /// Filters rows of `width` values. `range` are the samples at hand, `outputs` the samples to put out,
-    /// ascending. `evaluate` fills the row of a
-    /// sample (asked once for each that an output covers, ascending); `emit` gets each output's place in
-    /// `outputs` and its row.
+    /// ascending. `evaluate` fills the row of a sample (asked once for each that an output covers,
+    /// ascending); `emit` gets each output's place in `outputs` and its row.
     ///
     /// # Errors
     /// What either of them returns; nothing more is asked then.
@@ -84,7 +82,7 @@ impl ParallelFilter {
         mut emit: impl FnMut(usize, &[f64]) -> Result<(), E>,
     ) -> Result<(), E> {
         let (Some(&first), Some(&last)) = (outputs.first(), outputs.last()) else { return Ok(()) };
-        // The widest vector instructions that the processor has: rows can be thousands of numbers wide.
+        // The widest vector instructions of the processor are used, since rows can have thousands of numbers.
         let arch = pulp::Arch::new();
         let slots = 2 * self.half_length / self.decimation + 2;
         scratch.resize(width, slots);

@@ -68,7 +68,7 @@ impl LogPlan {
         let kernel = SmoothingKernel::new(LowPass::new(conditioning.cutoff_hz, ATTENUATION_DB), period);
         let parallel = ParallelFilter::new(conditioning.parallel_cutoff_hz, period, options.decimation);
         let edge = edge(&kernel);
-        let measured = |plausible: &dyn Fn(&crate::JointSurvey) -> bool| {
+        let measured = |plausible: &dyn Fn(&crate::joint_survey::JointSurvey) -> bool| {
             survey.joints.iter().map(|joint| options.use_measured_derivatives && plausible(joint)).collect()
         };
         LogPlan {

@@ -1,7 +1,8 @@
 //! A log in memory: for simulators and small files.
 
 use crate::columns::{Layout, Optional};
-use crate::reader::{LogReader, Row, Rows, unusable};
+use crate::log_file::open_log;
+use crate::reader::{Row, Rows, unusable};
 use crate::stream::stream_rows;
 use crate::survey::survey_rows;
 use crate::{Block, Conditioning, LogColumns, LogError, LogWriter, Survey, TorqueColumns};
@@ -30,14 +31,13 @@ pub struct Recording {
 
 impl Recording {
     /// Reads a whole log into memory. Rows that can't be used become rows of NaN, so that gaps stay gaps; a
-    /// joint without a
-    /// signal that others have gets NaN for it.
+    /// joint without a signal that others have gets NaN for it.
     ///
     /// # Errors
     /// What [`survey`](crate::survey()) finds but for time running backwards, which is seen when the
     /// recording is used.
     pub fn from_csv(path: &Path, joints: &[String], torque: TorqueColumns) -> Result<Self, LogError> {
-        let mut reader = LogReader::open(path, joints, torque)?;
+        let mut reader = open_log(path, joints, torque)?;
         let layout = reader.layout().clone();
         let n = joints.len();
         let mut values = vec![0.0; layout.width];
@@ -92,9 +92,10 @@ impl Recording {
     /// [`LogError::Shape`], [`LogError::Unwritable`].
     pub fn write_csv(&self, path: &Path) -> Result<(), LogError> {
         self.check()?;
-        let unwritable = |source| LogError::Unwritable { path: path.into(), source };
         let mut writer = LogWriter::create(path, &self.joints, self.columns())?;
-        self.write_rows(&mut writer).and_then(|()| writer.finish()).map_err(unwritable)?;
+        self.write_rows(&mut writer)
+            .and_then(|()| writer.finish())
+            .map_err(|source| LogError::Unwritable { path: path.into(), source })?;
         Ok(())
     }
 

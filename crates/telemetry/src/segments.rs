@@ -1,7 +1,9 @@
 //! Splitting a log where samples are missing.
 
+pub use crate::gap::GapReason;
+
+use crate::LogError;
 use crate::reader::{Row, Rows};
-use crate::{GapReason, LogError};
 
 /// How often a log is interrupted for one reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,5 +1,5 @@
-//! What a sensor or a logger made of a signal: steps, flat tops, dead bands, stretches in which nothing
-//! changes.
+//! Artefacts of a sensor or a logger in a signal: quantisation steps, flat tops, dead bands, constant
+//! stretches.
 
 use crate::histogram::Histogram;
 
@@ -122,7 +122,8 @@ impl ShapeCollector {
         }
         let largest = self.ends[0].0.max(-self.ends[1].0);
         let near = x.abs() < NEAR_ZERO * largest;
-        // Twice the level to get away again: noise at the level is not a touch each time.
+        // Hysteresis: the signal leaves the level at twice the distance, so that noise is not counted as many
+        // touches.
         if near && !self.near_zero {
             self.near_zero = true;
         } else if self.near_zero && x.abs() > 2.0 * NEAR_ZERO * largest {

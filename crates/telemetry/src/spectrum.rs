@@ -1,4 +1,4 @@
-//! Power spectra of the signals, estimated while they stream by.
+//! Power spectra of the signals, estimated in one pass.
 
 use crate::columns::Layout;
 use realfft::num_complex::Complex;
@@ -9,8 +9,8 @@ use std::sync::Arc;
 /// One-sided power spectral densities (Welch 1967: Hann windows, half overlapped, never across a gap).
 ///
 /// Of a position it is the density of its second difference, the acceleration: a position has so much power
-/// near 0 Hz that it
-/// would leak through the window and hide the noise at high frequency; its second difference does not.
+/// near 0 Hz that it would leak through the window and hide the noise at high frequency; its second
+/// difference does not.
 #[derive(Debug, Clone, Default)]
 pub struct Spectrum {
     /// Distance of the bins, in Hz; bin k is at k times it. The last one is half the sample rate.
@@ -175,7 +175,9 @@ impl Welch {
         }
         let energy: f64 = self.window.iter().map(|w| w * w).sum();
         let scale = 2.0 / (rate * energy * self.windows as f64);
-        let one = |power: &[f64]| power.iter().map(|p| p * scale).collect();
-        self.power.chunks_exact(self.samples / 2 + 1).map(one).collect()
+        self.power
+            .chunks_exact(self.samples / 2 + 1)
+            .map(|power| power.iter().map(|p| p * scale).collect())
+            .collect()
     }
 }

@@ -1,10 +1,11 @@
 //! Spikes in a log, found in the survey's pass and left out in the passes that follow.
 
+use crate::LogError;
 use crate::columns::Layout;
 use crate::gap::GapReason;
 use crate::histogram::Histogram;
 use crate::reader::{Row, Rows};
-use crate::{LogError, SpikeCount};
+use crate::segments::SpikeCount;
 use phiw_spikes::{SpikeSettings, WINDOW, bend, excursion, excursion_at_edge, spike_length};
 use std::collections::VecDeque;
 use std::path::Path;
@@ -35,7 +36,7 @@ impl SpikeFinder {
     /// The last samples of a segment.
     pub fn end(&mut self, place: usize, mut window: [f64; WINDOW]) {
         let most = &mut self.columns[place].1;
-        // What the samples behind them are too few for in `push`.
+        // Samples at the end of a segment, which `push` has not judged as too few samples follow them.
         for start in 1..WINDOW - 2 {
             *most = most.max(excursion(&window[start..]).0);
         }
@@ -47,7 +48,7 @@ impl SpikeFinder {
     /// not looked for.
     pub fn bounds(&self, layout: &Layout, settings: SpikeSettings) -> Option<Vec<f64>> {
         let bound = |place: usize, (usual, _): &(Histogram, f64)| match place {
-            // Stamps are judged by the segments; a temperature is no part of the fit.
+            // Stamps are checked where segments are split; a temperature is not fitted.
             0 => f64::INFINITY,
             place if layout.may_be_missing(place) => f64::INFINITY,
             _ => settings.bound(usual.total() as usize, |share| usual.quantile(share)),
@@ -60,11 +61,14 @@ impl SpikeFinder {
     /// The largest excursion of each column but the time, as a multiple of what is usual; 0 where that is not
     /// known.
     pub fn multiples(&self, settings: SpikeSettings) -> Vec<f64> {
-        let multiple = |(usual, most): &(Histogram, f64)| {
-            let bound = settings.bound(usual.total() as usize, |share| usual.quantile(share));
-            if bound.is_finite() && bound > 0.0 { settings.multiple * most.max(0.0) / bound } else { 0.0 }
-        };
-        self.columns.iter().skip(1).map(multiple).collect()
+        self.columns
+            .iter()
+            .skip(1)
+            .map(|(usual, most)| {
+                let bound = settings.bound(usual.total() as usize, |share| usual.quantile(share));
+                if bound.is_finite() && bound > 0.0 { settings.multiple * most.max(0.0) / bound } else { 0.0 }
+            })
+            .collect()
     }
 }
 
@@ -190,7 +194,7 @@ impl<R: Rows> Rows for WithoutSpikes<R> {
                 self.before[0].replace(next.values)
             }
             Row::Gap { reason: GapReason::Spike, .. } => Some(next.values),
-            // The segment is over: nothing before is compared with.
+            // A new segment starts: it is not compared with samples of the one before.
             _ => {
                 self.spare.extend(self.before.iter_mut().filter_map(Option::take));
                 Some(next.values)

@@ -1,10 +1,11 @@
-//! Rows in which the drives had stopped logging: no torque changes though the robot moves. They say nothing,
-//! and are left out.
+//! Rows in which the drives had stopped logging: no torque changes though the robot moves. They are left out.
 
+use crate::LogError;
+use crate::check_settings::CheckSettings;
 use crate::columns::Layout;
+use crate::gap::GapReason;
 use crate::reader::{Row, Rows};
 use crate::signal_shape::{LONG, MOVED};
-use crate::{CheckSettings, GapReason, LogError};
 use std::path::Path;
 
 /// Stretches that are remembered; a log with more is one of torques in steps.

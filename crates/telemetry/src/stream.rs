@@ -2,11 +2,13 @@
 
 use crate::blocks::BlockMaker;
 use crate::clock::Resampler;
-use crate::reader::{LogReader, Rows};
+use crate::log_file::open_log;
+use crate::reader::Rows;
+use crate::segments::Segment;
 use crate::segments::{SegmentSink, split};
 use crate::spike::WithoutSpikes;
 use crate::still::WithoutStill;
-use crate::{Block, Conditioning, LogError, LogPlan, Segment, Survey};
+use crate::{Block, Conditioning, LogError, LogPlan, Survey};
 use std::ops::ControlFlow;
 
 /// What a [`stream`] gave.
@@ -28,9 +30,8 @@ pub struct StreamSummary {
 
 /// Reads a surveyed log again and hands its conditioned samples to `sink`, block by block, in order.
 ///
-/// Memory is that of one block and the filters' reach, whatever the length of the log. `progress` is told the
-/// bytes done and the bytes in
-/// total now and then. The sink can break off.
+/// Memory is that of one block and the filters' reach, whatever the length of the log. `progress` is called
+/// with the bytes done and the bytes in total now and then. The sink can break off.
 ///
 /// # Errors
 /// What [`survey`](crate::survey()) finds, if the file has changed since; [`LogError::Cutoff`] and
@@ -42,7 +43,7 @@ pub fn stream(
     sink: &mut dyn FnMut(Block) -> ControlFlow<()>,
 ) -> Result<StreamSummary, LogError> {
     let joints: Vec<String> = survey.joints.iter().map(|joint| joint.name.clone()).collect();
-    let mut rows = LogReader::open(&survey.path, &joints, survey.torque)?;
+    let mut rows = open_log(&survey.path, &joints, survey.torque)?;
     let summary = stream_rows(&mut rows, survey, conditioning, progress, sink)?;
     if !summary.stopped && rows.content_hash() != survey.content_hash {
         return Err(LogError::Changed { path: survey.path.clone() });

@@ -1,15 +1,21 @@
 //! The first pass over a log: what is in it, without changing anything.
 
-use crate::clock::{Clock, uniform_misfit};
+use crate::LogError;
+use crate::check_settings::CheckSettings;
+use crate::clock::{Clock, uniform_interpolation_error};
 use crate::columns::{Layout, TorqueColumns};
+use crate::gap::GapReason;
 use crate::histogram::Histogram;
+use crate::joint_survey::JointSurvey;
 use crate::joint_survey::{Five, JointCollector};
-use crate::reader::{LogReader, Row, Rows};
+use crate::log_file::open_log;
+use crate::reader::{Row, Rows};
+use crate::segments::{GapCount, Segment};
 use crate::segments::{RowCounts, SegmentSink, SpikeCount, split};
+use crate::spectrum::Spectrum;
 use crate::spectrum::SpectrumEstimator;
 use crate::spike::{SpikeFinder, WithoutSpikes};
 use crate::still::{StillFinder, WithoutStill};
-use crate::{CheckSettings, GapCount, GapReason, JointSurvey, LogError, Segment, Spectrum};
 use phiw_spikes::{SpikeSettings, WINDOW};
 use std::path::{Path, PathBuf};
 
@@ -55,8 +61,8 @@ pub struct Survey {
     /// 1.5 to 2.5 medians.
     pub longest_step: f64,
     /// The clock under which the positions are smoother: the median error of a sample against the cubic
-    /// through its four
-    /// neighbours is compared at places where the stamps are uneven. [`Clock::Uniform`] must win by a tenth.
+    /// through its four neighbours is compared at places where the stamps are uneven. [`Clock::Uniform`] must
+    /// win by a tenth.
     pub clock: Clock,
     /// One entry a joint, in the order asked for.
     pub joints: Vec<JointSurvey>,
@@ -100,8 +106,7 @@ impl Survey {
 /// Numbers the logs of a session and puts them on one time axis.
 ///
 /// Stamps that overlap nowhere are taken to count from one origin and are kept. Where any two logs overlap,
-/// each log is put behind the
-/// one before it in the order given.
+/// each log is put behind the one before it in the order given.
 pub fn arrange_session(surveys: &mut [Survey]) {
     let mut ranges: Vec<_> = surveys.iter().map(Survey::time_range).collect();
     ranges.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -120,9 +125,8 @@ pub fn arrange_session(surveys: &mut [Survey]) {
 
 /// Reads a log once and says what is in it.
 ///
-/// Constant memory: statistics, histograms and spectra, and one small record a segment. `progress` is told
-/// the bytes done and the
-/// bytes in total now and then.
+/// Constant memory: statistics, histograms and spectra, and one small record a segment. `progress` is
+/// called with the bytes done and the bytes in total now and then.
 ///
 /// # Errors
 /// A file that can't be read, columns that are missing, cells that are not numbers, time that runs backwards,
@@ -133,10 +137,10 @@ pub fn survey(
     torque: TorqueColumns,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Survey, LogError> {
-    let mut open = || LogReader::open(path, joints, torque);
+    let mut open = || open_log(path, joints, torque);
     let (mut survey, reader) = survey_rows(&mut open, joints, progress)?;
     survey.torque = torque;
-    survey.ignored_columns.clone_from(&reader.columns().ignored);
+    survey.ignored_columns = reader.ignored_columns().to_vec();
     survey.content_hash = reader.content_hash();
     Ok(survey)
 }
@@ -154,14 +158,14 @@ pub(crate) fn survey_rows<R: Rows>(
     let mut counts = split(&mut rows, head.longest(), &mut collector)?;
     let all = collector.all_steps();
     if !head.holds_for(all) {
-        // The log goes on unlike its head: once more, with what is now known.
+        // The steps of the whole log differ from those of its head: the pass is repeated with them.
         rows = open()?;
         collector = Collector::new(rows.layout(), all, progress);
         counts = split(&mut rows, all.longest(), &mut collector)?;
     }
     let (mut spikes, mut spike_bounds) = (Vec::new(), Vec::new());
     if let Some(bounds) = collector.spikes.bounds(rows.layout(), SpikeSettings::default()) {
-        // They would bend every number of the survey: once more, without them.
+        // Spikes would distort all statistics: the pass is repeated without them.
         let steps = collector.steps;
         let mut without = WithoutSpikes::new(open()?, bounds.clone());
         collector = Collector::new(without.layout(), steps, progress);
@@ -172,7 +176,8 @@ pub(crate) fn survey_rows<R: Rows>(
     }
     let still = collector.still.stretches(&CheckSettings::default());
     if !still.is_empty() {
-        // They pull all parameters towards less: once more, without them.
+        // Rows without logged torques would bias all parameters towards zero: the pass is repeated without
+        // them.
         let steps = collector.steps;
         let bounds = spike_bounds.clone();
         let bounds = if bounds.is_empty() { vec![f64::INFINITY; rows.layout().width] } else { bounds };
@@ -218,7 +223,7 @@ impl Steps {
         while steps.len() < HEAD {
             match rows.next(&mut values)? {
                 Row::Sample { .. } => {
-                    // Time that stands still or runs backwards is the splitter's to report.
+                    // Time that stands still or runs backwards is reported by `split`.
                     steps.extend(previous.map(|previous| values[0] - previous).filter(|step| *step > 0.0));
                     previous = Some(values[0]);
                 }
@@ -232,8 +237,7 @@ impl Steps {
     }
 
     /// A lost sample doubles the step, jitter widens it: a split comes above 1.5 medians where stamps are
-    /// even, above 2.5 where they
-    /// are not.
+    /// even, above 2.5 where they are not.
     fn longest(self) -> f64 {
         (1.25 * self.high).clamp(1.5 * self.median, 2.5 * self.median)
     }
@@ -268,13 +272,14 @@ struct Collector<'a> {
 
 impl<'a> Collector<'a> {
     fn new(layout: &Layout, steps: Steps, progress: &'a mut dyn FnMut(u64, u64)) -> Self {
-        let joint = |i: usize| {
-            let has = |places: &[Option<usize>]| places[i].is_some();
-            let optional = [&layout.qd, &layout.qdd, &layout.temp].map(|places| has(places));
-            JointCollector::new(steps.median, layout.torque, optional)
-        };
         Collector {
-            joints: (0..layout.joints).map(joint).collect(),
+            joints: (0..layout.joints)
+                .map(|i| {
+                    let has = |places: &[Option<usize>]| places[i].is_some();
+                    let optional = [&layout.qd, &layout.qdd, &layout.temp].map(|places| has(places));
+                    JointCollector::new(steps.median, layout.torque, optional)
+                })
+                .collect(),
             spectrum: SpectrumEstimator::new(layout, steps.median),
             spikes: SpikeFinder::new(layout),
             still: StillFinder::new(layout),
@@ -359,7 +364,7 @@ const UNIFORM_WINS: f64 = 0.1;
 impl SegmentSink for Collector<'_> {
     fn sample(&mut self, values: &[f64]) -> bool {
         let (width, n) = (self.layout.width, self.layout.joints);
-        // Also across splits: they may come from a head unlike the rest.
+        // Steps across splits count too, as the splits may come from a head that differs from the rest.
         if let Some(last) = self.last_stamp.replace(values[0]) {
             self.step_histogram.push(values[0] - last);
         }
@@ -390,7 +395,7 @@ impl SegmentSink for Collector<'_> {
         }
         if self.in_segment >= 5 {
             let t = self.five(Some(0));
-            let uneven = uniform_misfit(t).abs() > UNEVEN * self.steps.median;
+            let uneven = uniform_interpolation_error(t).abs() > UNEVEN * self.steps.median;
             for i in 0..n {
                 let torque = self.layout.torque.then_some(tau + i);
                 let (q, tau) = (self.five(Some(q + i)), self.five(torque));

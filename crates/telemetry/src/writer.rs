@@ -1,4 +1,4 @@
-//! Logs out.
+//! Writing logs.
 
 use crate::LogError;
 use std::fs::File;

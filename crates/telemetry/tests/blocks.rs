@@ -1,8 +1,7 @@
 //! Blocks give what the whole record gives, and that is plain convolution.
 
-use phiw_telemetry::{
-    Block, Conditioning, ConditioningOptions, FilterScratch, LogPlan, Recording, stream, survey,
-};
+use phiw_telemetry::filter::FilterScratch;
+use phiw_telemetry::{Block, Conditioning, ConditioningOptions, LogPlan, Recording, stream, survey};
 use proptest::prelude::*;
 use std::ops::ControlFlow;
 

@@ -1,6 +1,7 @@
 //! Stamps that jitter: were the samples taken then, or only stamped then?
 
-use phiw_telemetry::{Clock, ClockChoice, Conditioning, ConditioningOptions, Recording, Survey};
+use phiw_telemetry::clock::{Clock, ClockChoice};
+use phiw_telemetry::{Conditioning, ConditioningOptions, Recording, Survey};
 use std::f64::consts::TAU;
 
 const PERIOD: f64 = 0.004;

@@ -1,8 +1,7 @@
 //! Cut-offs chosen from the data.
 
-use phiw_telemetry::{
-    Block, Bound, Conditioning, ConditioningOptions, Recording, TorqueColumns, stream, survey,
-};
+use phiw_telemetry::cutoff::Bound;
+use phiw_telemetry::{Block, Conditioning, ConditioningOptions, Recording, TorqueColumns, stream, survey};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

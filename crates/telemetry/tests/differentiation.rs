@@ -1,6 +1,7 @@
 //! Smoothing and differentiation against closed forms.
 
-use phiw_telemetry::{Block, Conditioning, ConditioningOptions, LowPass, Recording, SmoothingKernel};
+use phiw_telemetry::filter::{LowPass, SmoothingKernel};
+use phiw_telemetry::{Block, Conditioning, ConditioningOptions, Recording};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 

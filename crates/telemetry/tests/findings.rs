@@ -1,10 +1,9 @@
 //! Each class of what sensors, drives and loggers do to a log is found, and nothing is found where there is
 //! nothing.
 
-use phiw_telemetry::{
-    CheckSettings, Conditioning, ConditioningOptions, FindingKind, GapReason, TorqueColumns, findings,
-    stream, survey,
-};
+use phiw_telemetry::findings::{CheckSettings, FindingKind, findings};
+use phiw_telemetry::segments::GapReason;
+use phiw_telemetry::{Conditioning, ConditioningOptions, TorqueColumns, stream, survey};
 use std::fmt::Write;
 use std::ops::ControlFlow;
 

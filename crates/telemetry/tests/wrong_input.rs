@@ -1,8 +1,7 @@
 //! What is wrong with a log is named with its place and its mend.
 
-use phiw_telemetry::{
-    Conditioning, ConditioningOptions, GapReason, LogError, Recording, TorqueColumns, stream, survey,
-};
+use phiw_telemetry::segments::GapReason;
+use phiw_telemetry::{Conditioning, ConditioningOptions, LogError, Recording, TorqueColumns, stream, survey};
 use std::ops::ControlFlow;
 use std::path::Path;
 

@@ -51,7 +51,8 @@ pub enum FeetError {
 /// ```toml
 /// [[foot]]
 /// link = "left_foot"  # a link that moves, or the root of a floating base
-/// sole = [[0.15, 0.05, -0.08], [0.15, -0.05, -0.08], [-0.07, -0.05, -0.08], [-0.07, 0.05, -0.08]]  # m, in the link's frame
+/// # m, in the link's frame
+/// sole = [[0.15, 0.05, -0.08], [0.15, -0.05, -0.08], [-0.07, -0.05, -0.08], [-0.07, 0.05, -0.08]]
 /// ```
 ///
 /// # Errors

@@ -44,8 +44,8 @@ impl Stance {
 /// One ZMP over a motion: its worst instants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WorstZmp {
-    /// Smallest signed margin to the region's border \[m\]; −∞ if the robot leaves the floor at some sample, +∞ for a motion
-    /// without samples.
+    /// Smallest signed margin to the region's border \[m\]; −∞ if the robot leaves the floor at some sample,
+    /// +∞ for a motion without samples.
     pub margin: f64,
     /// The sample at which it is that small.
     pub sample: usize,

@@ -2,9 +2,10 @@
 
 use crate::workspace::{base_motion, parameter_count};
 use crate::{Balance, ZmpModel, ZmpWorkspace};
-use phiw_dynamics::{
-    BodyKinematics, BodyMotion, DimensionError, PARAMETERS_PER_BODY, Placement, Spatial, Vec3, check_size,
-};
+use phiw_dynamics::body_kinematics::BodyMotion;
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
+use phiw_dynamics::{BodyKinematics, DimensionError, Placement, Spatial, Vec3};
 
 /// Rows of first moment, force and moment.
 const ROWS: usize = 9;

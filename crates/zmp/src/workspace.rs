@@ -1,10 +1,10 @@
 //! One pass over the bodies: from a motion and inertial parameters to the balance.
 
 use crate::Balance;
-use phiw_dynamics::{
-    BodyKinematics, BodyMotion, DimensionError, Inertia, InertialParameters, PARAMETERS_PER_BODY, Placement,
-    Spatial, Vec3, check_size,
-};
+use phiw_dynamics::body_kinematics::BodyMotion;
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::inertia::{Inertia, InertialParameters, PARAMETERS_PER_BODY};
+use phiw_dynamics::{BodyKinematics, DimensionError, Placement, Spatial, Vec3};
 
 /// The parameters of everything that stands, in one vector: those of the base link, then those of the moving
 /// bodies.

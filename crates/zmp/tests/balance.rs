@@ -2,8 +2,9 @@
 
 mod robots;
 
+use phiw_dynamics::inertia::Inertia;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
-use phiw_dynamics::{AnalyticBackend, DynamicsBackend, Inertia, Placement, Spatial, Tree, Vec3};
+use phiw_dynamics::{AnalyticBackend, DynamicsBackend, Placement, Spatial, Tree, Vec3};
 use phiw_zmp::{Balance, ZmpModel, ZmpWorkspace, standing_parameters};
 use proptest::prelude::*;
 use robots::{Built, assert_close, robot, upper_body};

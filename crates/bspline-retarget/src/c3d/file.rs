@@ -136,7 +136,7 @@ fn frame_count(header: &Header, parameters: &Parameters, available: usize) -> Re
         parameters.long_count("POINT", "LONG_FRAMES").filter(|&frames| frames > 0),
         parameters.count("POINT", "FRAMES").filter(|&frames| frames > 0 && frames < 65535),
         (!saturated).then_some(numbered),
-        // Nothing says how many there are beyond 65535: as many as there are.
+        // The file does not say how many frames there are beyond 65535: all that its length holds are read.
         saturated.then_some(available),
     ];
     let mut claimed = counts.into_iter().flatten();

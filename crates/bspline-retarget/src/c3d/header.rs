@@ -20,7 +20,7 @@ pub(super) struct Header {
 /// Block of the parameter section (1-based), after the mark of the format has been checked.
 pub(super) fn parameter_block(bytes: &[u8]) -> Result<u8, C3dError> {
     match bytes.get(..BLOCK) {
-        // What is no C3D at all should be called so even if it is short.
+        // A short file that is no C3D is reported as no C3D, not as too short.
         _ if bytes.len() >= 2 && bytes[1] != 0x50 => Err(C3dError::NotC3d { found: bytes[1] }),
         Some(block) => Ok(block[0]),
         None => Err(C3dError::Truncated { what: "the header", from: 0, to: BLOCK, length: bytes.len() }),

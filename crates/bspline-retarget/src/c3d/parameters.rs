@@ -31,8 +31,10 @@ pub enum ParameterValue {
 impl Parameters {
     /// A parameter by group and name.
     pub fn get(&self, group: &str, name: &str) -> Option<&ParameterValue> {
-        let wanted = |parameter: &&Parameter| parameter.group == group && parameter.name == name;
-        self.0.iter().find(wanted).map(|parameter| &parameter.value)
+        self.0
+            .iter()
+            .find(|parameter| parameter.group == group && parameter.name == name)
+            .map(|parameter| &parameter.value)
     }
 
     /// A number of a parameter, whatever its kind.
@@ -185,10 +187,11 @@ fn texts(data: &[u8], dimensions: &[u8]) -> Vec<String> {
     if length == 0 {
         return Vec::new();
     }
-    let clean = |text: &[u8]| {
-        String::from_utf8_lossy(text).trim_matches(|c: char| c.is_whitespace() || c == '\0').to_owned()
-    };
-    data.chunks_exact(length).map(clean).collect()
+    data.chunks_exact(length)
+        .map(|text| {
+            String::from_utf8_lossy(text).trim_matches(|c: char| c.is_whitespace() || c == '\0').to_owned()
+        })
+        .collect()
 }
 
 /// A place in the file.

@@ -1,4 +1,4 @@
-//! C3D out.
+//! Writing C3D files.
 
 use super::header::Header;
 use super::{BLOCK, Processor};
@@ -47,7 +47,7 @@ pub fn write_c3d(recording: &MarkerRecording, format: C3dFormat, notes: &[(&str,
         Storage::Real => -1.0,
         Storage::Integer { scale } => scale,
     };
-    // The data's block is written in the section that says how long itself is: fill it in once that is known.
+    // The number of the data's first block depends on the length of this section: it is filled in at the end.
     let section = |data_block: usize| {
         let mut section = Section::new(processor);
         section.integers("POINT", "USED", &[points as u16]);
@@ -141,12 +141,14 @@ impl Section {
             } else {
                 255
             });
-        let padded = |text: &&str| {
-            let mut bytes = text.as_bytes()[..text.len().min(length)].to_vec();
-            bytes.resize(length, b' ');
-            bytes
-        };
-        let data: Vec<u8> = texts.iter().flat_map(padded).collect();
+        let data: Vec<u8> = texts
+            .iter()
+            .flat_map(|text| {
+                let mut bytes = text.as_bytes()[..text.len().min(length)].to_vec();
+                bytes.resize(length, b' ');
+                bytes
+            })
+            .collect();
         self.parameter(group, name, -1, &[length as u8, texts.len() as u8], &data);
     }
 

@@ -242,7 +242,7 @@ impl Task {
                 phase: phase + start,
             })
             .collect();
-        // People look down at what they do, and nothing about them is quite still.
+        // People look down at what they do, and no joint is quite still.
         let along = [
             ("neck_pitch", 0.35, 0.05),
             ("neck_yaw", -0.05, 0.12),

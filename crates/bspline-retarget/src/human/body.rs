@@ -7,7 +7,7 @@ use crate::recording::MarkerRecording;
 use phiw_dynamics::Vec3;
 use std::collections::BTreeMap;
 
-/// Standard deviation of a length that a static trial told \[m\].
+/// Standard deviation of a length that a static trial measured \[m\].
 const CALIBRATED_SPREAD_M: f64 = 0.01;
 
 /// A marker's place on its segment \[m\], from the segment's joint or from its end.
@@ -55,8 +55,8 @@ pub struct HumanBody {
 }
 
 impl HumanBody {
-    /// The body for a recording. `calibrated` are places of markers that a static trial told, and the lengths
-    /// it told (one for each of [`SEGMENT_PARAMETERS`]); `robot_coordinates` columns are left free between
+    /// The body for a recording. `calibrated` are places of markers from a static trial, and its
+    /// lengths (one for each of [`SEGMENT_PARAMETERS`]); `robot_coordinates` columns are left free between
     /// trajectories and parameters.
     pub(crate) fn new(
         map: &MarkerMap,
@@ -148,8 +148,8 @@ impl HumanBody {
         for (name, markers) in &map.segments {
             let Some(segment) = Segment::from_name(name) else { continue };
             for name in &markers.cluster {
-                // Whether it is placed is asked after it has been found: an absent marker should be called
-                // that.
+                // The place is looked up after the marker was found, so that an absent marker is reported
+                // as absent.
                 let index = map.find(name, recording)?;
                 match calibrated.get(name) {
                     Some(&placed) => self.place(name, index, placed, map, first_parameter),
@@ -200,12 +200,15 @@ impl HumanBody {
             let index = self.parameters.iter().position(|parameter| parameter.name == name);
             index.map(|index| parameters[index])
         };
-        let place = |(name, placed): (&String, &Placed)| {
-            let local = ["x", "y", "z"].map(|axis| value(format!("{name}.{axis}")));
-            let local_m = std::array::from_fn(|axis| local[axis].unwrap_or(placed.local_m[axis]));
-            (name.clone(), Placed { local_m, ..*placed })
-        };
-        self.marker_names.iter().zip(&self.placed).map(place).collect()
+        self.marker_names
+            .iter()
+            .zip(&self.placed)
+            .map(|(name, placed)| {
+                let local = ["x", "y", "z"].map(|axis| value(format!("{name}.{axis}")));
+                let local_m = std::array::from_fn(|axis| local[axis].unwrap_or(placed.local_m[axis]));
+                (name.clone(), Placed { local_m, ..*placed })
+            })
+            .collect()
     }
 
     fn slide_along(

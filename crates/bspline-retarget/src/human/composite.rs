@@ -5,7 +5,8 @@
 
 use super::kinematics::{HumanScratch, Kinematics, Source};
 use super::masses::Masses;
-use phiw_dynamics::{Scalar, Spatial, Vec3};
+use phiw_dynamics::scalar::Scalar;
+use phiw_dynamics::{Spatial, Vec3};
 
 impl Kinematics {
     /// Σ weight · |p − measured|²; after [`Self::place`].
@@ -81,7 +82,7 @@ impl Kinematics {
             for &(ancestor, other) in &node.above {
                 let value = power(&scratch.twists[ancestor], &momentum);
                 let (high, low) = (column.max(other), column.min(other));
-                // A length that comes twice in one chain meets itself on the diagonal, once from each side.
+                // A length that occurs twice in one chain adds to its diagonal element twice.
                 normal[low * size + high] += if high == low { value + value } else { value };
             }
         }

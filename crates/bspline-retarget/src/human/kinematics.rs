@@ -3,7 +3,8 @@
 //! Each node moves by one coordinate: an angle of θ^h, or a length of ξ^h, which is a slide that all samples
 //! share. All of it is generic over the scalar: a number, or a SIMD register of samples.
 
-use phiw_dynamics::{Mat3, Scalar, Spatial, Vec3};
+use phiw_dynamics::scalar::Scalar;
+use phiw_dynamics::{Mat3, Spatial, Vec3};
 
 /// Where a node's coordinate comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]

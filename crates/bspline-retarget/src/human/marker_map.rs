@@ -49,7 +49,7 @@ pub enum JointMode {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SegmentMarkers {
-    /// Markers whose place on the segment a static trial tells.
+    /// Markers whose place on the segment is measured in a static trial.
     #[serde(default)]
     pub cluster: Vec<String>,
     /// Markers at a place \[m\] from the joint before the segment: x forward, y left, z up, arms hanging.
@@ -129,12 +129,11 @@ impl MarkerMap {
     /// # Errors
     /// [`MapError::Toml`], or a segment that there is not.
     pub fn from_toml(text: &str) -> Result<Self, MapError> {
-        let one_line = |error: toml::de::Error| {
+        let map: MarkerMap = toml::from_str(text).map_err(|error| {
             let line =
                 error.span().map_or(1, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
             MapError::Toml(format!("line {line}: {}", error.message().replace('\n', "; ")))
-        };
-        let map: MarkerMap = toml::from_str(text).map_err(one_line)?;
+        })?;
         if !(map.marker_spread_m.is_finite() && map.marker_spread_m >= 0.0) {
             let message =
                 format!("`marker_spread_m` is {}: give a length in metres, 0 or more", map.marker_spread_m);
@@ -227,7 +226,9 @@ mod tests {
     }
 
     fn without_spread(map: &str) -> String {
-        let other = |line: &&str| !line.trim_start().starts_with("marker_spread_m");
-        map.lines().filter(other).map(|line| format!("{line}\n")).collect()
+        map.lines()
+            .filter(|line| !line.trim_start().starts_with("marker_spread_m"))
+            .map(|line| format!("{line}\n"))
+            .collect()
     }
 }

@@ -1,6 +1,7 @@
-//! Unit points at the markers, in sum.
+//! Sums over unit point masses at the markers.
 
-use phiw_dynamics::{Scalar, Spatial, Vec3};
+use phiw_dynamics::scalar::Scalar;
+use phiw_dynamics::{Spatial, Vec3};
 
 /// Points in sum: their weight, first moment, and second moment about the world's origin (xx, xy, yy, xz, yz,
 /// zz).

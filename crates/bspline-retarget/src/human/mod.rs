@@ -11,5 +11,5 @@ mod skeleton;
 pub use body::{HumanBody, Placed};
 pub(crate) use kinematics::{HumanScratch, rotate, rotate_back};
 pub use marker_map::{JointMode, MapError, MarkerMap, SegmentMarkers};
-pub use outside::{BodyJoint, BodyMarker};
+pub use outside::{BodyMarker, HumanJoint};
 pub use skeleton::{SEGMENT_PARAMETERS, Segment, SegmentParameter, Side};

@@ -1,4 +1,4 @@
-//! The body for whoever draws it, or has kinematics of their own.
+//! The body's joints and markers as plain data, for pictures and for other kinematics.
 
 use super::body::HumanBody;
 use super::kinematics::{MotionKind, Source};
@@ -8,7 +8,7 @@ use phiw_dynamics::Vec3;
 /// A joint with one coordinate, or a length: it turns about an axis of its parent's frame, or slides along
 /// it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BodyJoint {
+pub struct HumanJoint {
     /// The joint before it, as an index; `None` is the world.
     pub parent: Option<usize>,
     /// Whether it turns; else it slides.
@@ -37,7 +37,7 @@ pub struct BodyMarker {
 
 impl HumanBody {
     /// All joints and lengths, each after the one it hangs on; `parameters` are the values of ξ^h.
-    pub fn joints(&self, parameters: &[f64]) -> Vec<BodyJoint> {
+    pub fn joints(&self, parameters: &[f64]) -> Vec<HumanJoint> {
         let joint = |node: &super::kinematics::Node| {
             let mut axis = [0.0; 3];
             axis[node.motion.axis] = node.motion.sign;
@@ -47,7 +47,7 @@ impl HumanBody {
                 Source::Column(column) => (None, parameters[column - self.first_parameter]),
             };
             let turns = node.motion.kind == MotionKind::Turn;
-            BodyJoint { parent: node.parent, turns, axis, coordinate, value }
+            HumanJoint { parent: node.parent, turns, axis, coordinate, value }
         };
         self.kinematics.nodes().iter().map(joint).collect()
     }
@@ -55,10 +55,14 @@ impl HumanBody {
     /// The markers that the model has.
     pub fn markers(&self) -> Vec<BodyMarker> {
         let points = self.kinematics.points().iter().zip(&self.markers).zip(&self.marker_names);
-        let marker = |((point, &recorded), name): ((&super::kinematics::Point, &usize), &String)| {
-            BodyMarker { name: name.clone(), recorded, joint: point.node, local_m: point.local.0 }
-        };
-        points.map(marker).collect()
+        points
+            .map(|((point, &recorded), name)| BodyMarker {
+                name: name.clone(),
+                recorded,
+                joint: point.node,
+                local_m: point.local.0,
+            })
+            .collect()
     }
 
     /// Where the coordinates that move over time rest \[rad, m\].

@@ -5,7 +5,8 @@ use super::pass::Batch;
 use super::samples::{LANES, Lane};
 use crate::human::{HumanBody, HumanScratch, Segment, rotate, rotate_back};
 use crate::robot::{BodyPoint, Correspondence, RobotModel, world};
-use phiw_dynamics::{Lanes, Placement, Scalar, Spatial, Tree, Vec3};
+use phiw_dynamics::scalar::{Lanes, Scalar};
+use phiw_dynamics::{Placement, Spatial, Tree, Vec3};
 
 /// A correspondence, prepared for one body and robot.
 pub(super) struct Line {
@@ -33,12 +34,15 @@ struct Axis {
 
 impl Line {
     pub fn all(body: &HumanBody, robot: &RobotModel, weight: f64) -> Vec<Self> {
-        let line = |correspondence: &Correspondence| Line {
-            weight: weight * correspondence.weight,
-            human: turns(body, correspondence),
-            robot: axes(&robot.tree, correspondence),
-        };
-        robot.correspondences.iter().map(line).collect()
+        robot
+            .correspondences
+            .iter()
+            .map(|correspondence| Line {
+                weight: weight * correspondence.weight,
+                human: turns(body, correspondence),
+                robot: axes(&robot.tree, correspondence),
+            })
+            .collect()
     }
 }
 
@@ -125,7 +129,7 @@ impl Problem<'_> {
                 }
             }
             if target.is_none() {
-                // The vectors are seen from the pelvis: what turns them turns the pelvis back.
+                // The vectors are expressed in the pelvis' frame, so the pelvis' rotation is subtracted.
                 let force = rotate(&pelvis, &-force);
                 let mut sum = Vec3::zero();
                 for (segment, vector) in &correspondence.human {

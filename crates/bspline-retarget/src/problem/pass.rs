@@ -5,7 +5,8 @@ use super::{Collect, Problem};
 use crate::human::HumanScratch;
 use crate::solver::{Arrow, Pattern};
 use crate::weights::Cost;
-use phiw_dynamics::{Lanes, Placement, Scalar, Spatial, Vec3};
+use phiw_dynamics::scalar::{Lanes, Scalar};
+use phiw_dynamics::{Placement, Spatial, Vec3};
 
 /// Room for a pass.
 pub(crate) struct Scratch {
@@ -216,7 +217,8 @@ impl pulp::NullaryFnOnce for OverWindows<'_, '_> {
         for (index, span) in windows.spans.iter().enumerate() {
             let Span { first, samples, count } = *span;
             problem.place(variables, samples, batch, row);
-            // What parameters have with parameters is the sum over all windows: only the rest is of these.
+            // The block of parameters with parameters is summed over all windows; the other blocks belong to
+            // one.
             for range in problem.pattern.ranges() {
                 batch.normal[range].fill(Lane::zero());
             }

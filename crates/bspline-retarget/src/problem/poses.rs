@@ -1,4 +1,4 @@
-//! Human and robot in one sample, for whoever looks at a solution.
+//! Poses of human and robot in one sample of a solution.
 
 use super::Problem;
 use super::correspondence::robot_vector;
@@ -63,11 +63,15 @@ impl Problem<'_> {
         sample: usize,
         scratch: &PoseScratch,
     ) -> Vec<Vec3<f64>> {
-        let vector = |(index, line)| match self.target(index) {
-            Some(vectors) => vectors[sample],
-            None => self.human_vector(line, &scratch.human),
-        };
-        robot.correspondences.iter().enumerate().map(vector).collect()
+        robot
+            .correspondences
+            .iter()
+            .enumerate()
+            .map(|(index, line)| match self.target(index) {
+                Some(vectors) => vectors[sample],
+                None => self.human_vector(line, &scratch.human),
+            })
+            .collect()
     }
 
     /// The sample nearest to where a control point pulls most.

@@ -1,4 +1,4 @@
-//! w_η η, the third term of (15), and what settles what markers leave open.
+//! w_η η, the third term of (15), and small priors on what the markers do not determine.
 
 use super::{Collect, Problem};
 
@@ -46,7 +46,7 @@ impl Problem<'_> {
                 if weight == 0.0 {
                     continue;
                 }
-                // Off the diagonal each pair comes once for two.
+                // An element off the diagonal counts twice, as only one triangle is visited.
                 let twice = if other == point { 1.0 } else { 2.0 };
                 for coordinate in 0..n {
                     let (i, j) = (point * n + coordinate, other * n + coordinate);

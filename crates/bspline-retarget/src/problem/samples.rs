@@ -3,7 +3,8 @@
 use crate::bspline::Basis;
 use crate::human::HumanBody;
 use crate::recording::MarkerRecording;
-use phiw_dynamics::{Lanes, Vec3};
+use phiw_dynamics::Vec3;
+use phiw_dynamics::scalar::Lanes;
 
 /// Samples that are worked on at once: what a 256-bit register holds.
 pub(super) const LANES: usize = 4;
@@ -71,8 +72,10 @@ impl Samples {
     /// The samples of a batch, and 1 for those that are there; what is beyond the last is the last again.
     pub fn batch(&self, batch: usize) -> ([usize; LANES], Lane) {
         let first = batch * LANES;
-        let present = |lane| if first + lane < self.count { 1.0 } else { 0.0 };
-        (std::array::from_fn(|lane| (first + lane).min(self.count - 1)), Lanes(std::array::from_fn(present)))
+        (
+            std::array::from_fn(|lane| (first + lane).min(self.count - 1)),
+            Lanes(std::array::from_fn(|lane| if first + lane < self.count { 1.0 } else { 0.0 })),
+        )
     }
 }
 

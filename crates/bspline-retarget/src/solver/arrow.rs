@@ -1,7 +1,7 @@
 //! Block-banded matrices with a dense border: the normal equations of a spline, and their Cholesky factor in
 //! O(N).
 //!
-//! A spline of degree p makes a control point meet the p after it; parameters that all samples share are a
+//! A spline of degree p couples a control point with the p after it; parameters that all samples share are a
 //! dense border. What stands in a control point's columns on and below the diagonal, border included, is a
 //! dense panel, and the factor of the matrix has the same panels.
 
@@ -13,8 +13,8 @@ use faer::linalg::cholesky::llt::factor::{
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::{matmul::matmul, triangular_solve};
 use faer::{Accum, MatMut, MatRef, Par, Spec};
-use phiw_dynamics::Lanes;
 use phiw_dynamics::dense::dot;
+use phiw_dynamics::scalar::Lanes;
 
 /// A symmetric matrix \[H, B'; B, C\]; only what lies on or below the diagonal is used.
 #[derive(Clone)]
@@ -182,7 +182,7 @@ impl Arrow {
 
     /// Replaces a right-hand side by the solution; after [`Self::factor`].
     pub fn solve(&self, right: &mut [f64]) {
-        // The same loops, compiled for the registers that this machine has.
+        // The same loops, compiled for the widest SIMD registers of the machine.
         pulp::Arch::new().dispatch(Substitute { factor: self, right });
     }
 
@@ -193,7 +193,7 @@ impl Arrow {
         let (spline, parameters) = right.split_at_mut(tail);
         // Rows of a panel's blocks that there are.
         let rows = |point: usize| ((self.degree + 1) * n).min(tail - point * n);
-        // A right-hand side that begins with zeros has nothing to hand on there.
+        // Leading zeros of the right-hand side contribute nothing and are skipped.
         let begin = spline.iter().position(|&value| value != 0.0).map_or(self.points, |first| first / n);
         for point in begin..self.points {
             let (known, below) = spline[point * n..][..rows(point)].split_at_mut(n);

@@ -112,7 +112,8 @@ impl<'a> Descent<'a> {
             self.problem.normal_equations(&self.variables, &mut self.scratch, &mut self.arrow);
             let Some(promised) = self.step() else { return Stop::NoDecrease };
             self.steps += 1;
-            // A short step says nothing of how much there is still to come: what the whole one promised does.
+            // Convergence is judged by the decrease that the full step predicts, since a short step is small
+            // anyway.
             if promised.max(before - self.cost.total()) <= tolerance * before {
                 return Stop::Converged;
             }
@@ -124,7 +125,7 @@ impl<'a> Descent<'a> {
     fn step(&mut self) -> Option<f64> {
         for _ in 0..TRIES {
             if self.bounded.find(&self.arrow, &self.variables, &self.gradient, self.damping) {
-                // A shorter step costs no new factor.
+                // A shorter step needs no new factorisation.
                 for share in [1.0, SHORTENED] {
                     let Some(kept) = self.go(share) else { continue };
                     if share < 1.0 || kept < BAD_GOOD.0 {
@@ -148,7 +149,7 @@ impl<'a> Descent<'a> {
         clamp(&mut self.trial, &self.bounded.bounds);
         let cost = self.problem.evaluate(&self.trial, &mut self.scratch, Some(&mut self.trial_gradient));
         let decrease = self.cost.total() - cost.total();
-        // What is not a number is no decrease.
+        // NaN is not a decrease.
         if decrease.is_nan() || decrease <= 0.0 {
             return None;
         }
@@ -164,7 +165,7 @@ fn bounds(problem: &Problem<'_>) -> Vec<(f64, f64)> {
     let Some(robot) = problem.robot else { return Vec::new() };
     let joints = (0..robot.tree.joint_count()).map(|joint| {
         let limits = robot.tree.joint(joint).limits;
-        // So far inside that rounding does not carry a curve out again.
+        // The margin keeps the curve inside in spite of rounding.
         (limits.lower + MARGIN, limits.upper - MARGIN)
     });
     let free = (f64::NEG_INFINITY, f64::INFINITY);

@@ -1,4 +1,5 @@
-//! Which coordinates of a sample meet in J'J: a left hand never meets a right one.
+//! The sparsity of J'J of one sample: coordinates of the left and the right hand are not coupled, for
+//! example.
 
 use std::ops::Range;
 
@@ -35,8 +36,10 @@ impl Pattern {
             }
             runs
         };
-        let row = |row| [runs(row, row..point), runs(row, point..size)];
-        Pattern { size, runs: (0..point).map(row).collect() }
+        Pattern {
+            size,
+            runs: (0..point).map(|row| [runs(row, row..point), runs(row, point..size)]).collect(),
+        }
     }
 
     /// Runs of columns in a row: coordinates, and parameters.

@@ -1,4 +1,4 @@
-//! The paper's way: a quasi-Newton method (limited-memory BFGS, by argmin), blind to the structure.
+//! The paper's method: quasi-Newton (limited-memory BFGS, by argmin), which does not use the structure.
 
 use super::{Solution, Stop};
 use crate::problem::Problem;
@@ -55,7 +55,8 @@ impl Gradient for Objective<'_> {
 /// spline it is the paper's method; over a basis of degree 1 with a control point for each sample it is the
 /// one without splines.
 ///
-/// `seen` is told the objective whenever it is computed: how far one is at what time.
+/// `seen` is called with the objective whenever it is computed, so that its decrease over time can be
+/// recorded.
 pub fn quasi_newton(
     problem: &Problem<'_>,
     start: Vec<f64>,

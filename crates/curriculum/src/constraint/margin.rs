@@ -17,8 +17,8 @@ pub struct MotionMargin {
     pub worst_s: f64,
     /// Standard deviation of the multi-body margin there, by all that is known of the parameters \[m\].
     pub margin_std: f64,
-    /// The part of it that torques can not identify: the base link, and what of the others only the prior says
-    /// \[m\].
+    /// The part of it that torques can not identify: the base link, and what of the others only the prior
+    /// says \[m\].
     pub unidentifiable_std: f64,
 }
 

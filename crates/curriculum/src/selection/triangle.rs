@@ -152,8 +152,8 @@ impl Triangle {
     }
 
     /// √(tr(R·C·Rᵀ)/rows): RMS of the standard deviation of Φ·w over the `rows` rows that this R stands for,
-    /// where C is the covariance of w. Directions of w that these rows do not feel do not count, however little
-    /// is known of them. None if the covariance is of other parameters.
+    /// where C is the covariance of w. Directions of w that these rows do not feel do not count, however
+    /// little is known of them. None if the covariance is of other parameters.
     pub(crate) fn uncertainty_of(&self, covariance: &Mat<f64>, rows: usize) -> Option<f64> {
         let size = self.size;
         if covariance.nrows() != size {

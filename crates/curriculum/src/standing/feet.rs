@@ -3,7 +3,9 @@
 use crate::CurriculumError;
 use faer::Mat;
 use faer::prelude::Solve;
-use phiw_dynamics::{BodyMotion, DimensionError, Foot, Mat3, Placement, Tree, Vec3, check_index, check_size};
+use phiw_dynamics::body_kinematics::BodyMotion;
+use phiw_dynamics::check::{check_index, check_size};
+use phiw_dynamics::{DimensionError, Foot, Mat3, Placement, Tree, Vec3};
 
 /// Newton steps at most, and the gap between sole and floor at which the loop counts as closed \[m, rad\].
 const MOST_STEPS: usize = 30;

@@ -3,7 +3,8 @@
 use super::{Feet, VIRTUAL_JOINTS};
 use crate::CurriculumError;
 use crate::motion::Motion;
-use phiw_dynamics::{Foot, JointType, Tree, Vec3, check_size};
+use phiw_dynamics::check::check_size;
+use phiw_dynamics::{Foot, JointType, Tree, Vec3};
 use phiw_regressor::BaseParameters;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,7 +1,7 @@
 //! A = L·D·Lᵀ of a symmetric positive definite matrix: Cholesky without square roots, so that it runs on any
 //! scalar.
 
-use crate::Scalar;
+use crate::scalar::Scalar;
 
 /// Solves `A·x = b`: `x` replaces `b`; the factor replaces the lower triangle of `A` (size × size, row by
 /// row).

@@ -5,13 +5,18 @@ use super::robot::{Inertial, Joint, JointKind, Link, Robot};
 use super::topology::Topology;
 use super::{Finding, UrdfError, UrdfReading};
 use super::{inertial, joint};
-use crate::{Body, Inertia, JointType, Limits, PARAMETERS_PER_BODY, Placement, Tree, Vec3};
+use crate::inertia::{Inertia, PARAMETERS_PER_BODY};
+use crate::{Body, JointLimits, JointType, Placement, Tree, Vec3};
 
 /// Gravity of a robot whose URDF's z axis points up \[m/s²\].
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 
-const UNLIMITED: Limits =
-    Limits { lower: f64::NEG_INFINITY, upper: f64::INFINITY, velocity: f64::INFINITY, effort: f64::INFINITY };
+const UNLIMITED: JointLimits = JointLimits {
+    lower: f64::NEG_INFINITY,
+    upper: f64::INFINITY,
+    velocity: f64::INFINITY,
+    effort: f64::INFINITY,
+};
 
 /// A joint that waits for its turn.
 struct Pending {

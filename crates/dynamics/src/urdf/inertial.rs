@@ -3,7 +3,8 @@
 use super::joint::{is_usable, is_usable_pose, pose};
 use super::robot::{Inertial, Link};
 use super::{Finding, UrdfError};
-use crate::{Inertia, Mat3, Placement};
+use crate::inertia::Inertia;
+use crate::{Mat3, Placement};
 
 /// Share of the trace by which rounding in the file may break positivity or the triangle inequality.
 const ROUNDING: f64 = 1e-6;

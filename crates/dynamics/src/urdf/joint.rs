@@ -2,7 +2,7 @@
 
 use super::robot::{Joint, JointKind, Pose};
 use super::{Finding, UrdfError};
-use crate::{Limits, Mat3, Placement, Vec3};
+use crate::{JointLimits, Mat3, Placement, Vec3};
 
 /// How far a declared axis may be from unit length before it is reported.
 const AXIS_ROUNDING: f64 = 1e-6;
@@ -79,7 +79,7 @@ pub(super) fn axis(joint: &Joint, findings: &mut Vec<Finding>) -> Result<Vec3<f6
 }
 
 /// The joint's limits.
-pub(super) fn limits(joint: &Joint, findings: &mut Vec<Finding>) -> Limits {
+pub(super) fn limits(joint: &Joint, findings: &mut Vec<Finding>) -> JointLimits {
     let declared = &joint.limit;
     let name = || joint.name.clone();
     let mut missing = Vec::new();
@@ -109,5 +109,5 @@ pub(super) fn limits(joint: &Joint, findings: &mut Vec<Finding>) -> Limits {
     if !missing.is_empty() && joint.kind != JointKind::Continuous {
         findings.push(Finding::MissingLimits { joint: name(), missing });
     }
-    Limits { lower, upper, velocity, effort }
+    JointLimits { lower, upper, velocity, effort }
 }

@@ -1,6 +1,6 @@
 //! Robots from URDF files, and back.
 //!
-//! [`read_urdf`] builds the [`Tree`] and tells what in the file should not be trusted ([`Finding`]): a URDF
+//! [`read_urdf`] builds the [`Tree`] and reports what in the file should not be trusted ([`Finding`]): a URDF
 //! without inertials, with massless links or impossible inertias is read all the same.
 //! [`write_identified_urdf`] writes the tree's parameters into the URDF that it came from.
 

@@ -3,7 +3,8 @@
 use super::UrdfError;
 use super::source::{child, children, name, parse};
 use super::splice::Splices;
-use crate::{Body, Inertia, JointType, Tree, Vec3};
+use crate::inertia::Inertia;
+use crate::{Body, JointType, Tree, Vec3};
 use roxmltree::Node;
 use std::collections::HashMap;
 

@@ -2,8 +2,8 @@
 //!
 //! # What it asks
 //!
-//! How much larger the error on motion held out is over possible bodies and dissipative friction than by least
-//! squares, how many of the least-squares bodies are impossible, and how long one fit takes.
+//! How much larger the error on motion held out is over possible bodies and dissipative friction than by
+//! least squares, how many of the least-squares bodies are impossible, and how long one fit takes.
 //!
 //! # How it is run
 //!
@@ -24,10 +24,9 @@ use crate::environment;
 use anyhow::Context;
 use phiw::arguments::SessionArguments;
 use phiw::session::Session;
-use phiw_dynamics::PARAMETERS_PER_BODY;
-use phiw_identification::{
-    Consistent, ConsistentSettings, Identified, Model, consistent, identify, impossible_bodies,
-};
+use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
+use phiw_identification::consistent::{Consistent, ConsistentSettings, consistent, impossible_bodies};
+use phiw_identification::{Identified, Model, identify};
 use robots::{Robot, robots};
 use std::time::Instant;
 

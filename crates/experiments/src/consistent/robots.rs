@@ -14,8 +14,8 @@ pub struct Robot {
     pub validate: Vec<PathBuf>,
 }
 
-/// What a robot's folder holds: its name in the table, the folder, the URDF, and how the names of the logs begin
-/// that are fitted and held out.
+/// What a robot's folder holds: its name in the table, the folder, the URDF, and how the names of the logs
+/// begin that are fitted and held out.
 const SETS: [(&str, &str, &str, &[&str], &str); 7] = [
     ("tx40", "tx40", "tx40.urdf", &["train"], "validate"),
     ("emps", "emps", "emps.urdf", &["train"], "validate"),

@@ -1,7 +1,8 @@
 //! What is compared, and this workspace's side of it.
 
+use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
 use phiw_dynamics::random_tree::{RandomNumbers, random_state};
-use phiw_dynamics::{DimensionError, PARAMETERS_PER_BODY, Placement, Tree, Workspace};
+use phiw_dynamics::{DimensionError, Placement, Tree, Workspace};
 use phiw_regressor::JointTorqueRegressor;
 
 /// What is compared: total mass and standard parameters as read from the URDF; joint torque regressor,

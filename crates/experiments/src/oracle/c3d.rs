@@ -4,7 +4,7 @@ use super::python::{self, Python};
 use crate::environment;
 use anyhow::Context;
 use phiw_bspline_retarget::c3d::{C3d, C3dFormat, Processor, Storage, read_c3d, write_c3d};
-use phiw_bspline_retarget::read_recording;
+use phiw_bspline_retarget::markers::read_recording;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 

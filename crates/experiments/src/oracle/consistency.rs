@@ -160,8 +160,8 @@ fn problem(request: &Request) -> anyhow::Result<Problem> {
     Ok(problem)
 }
 
-/// A problem of a few to many random states of the robot: bodies up to three times heavier or lighter than the
-/// URDF's, one of them wrong in its sign now and then; viscous and Coulomb friction, some of it negative.
+/// A problem of a few to many random states of the robot: bodies up to three times heavier or lighter than
+/// the URDF's, one of them wrong in its sign now and then; viscous and Coulomb friction, some of it negative.
 fn request(robot: &Case, random: &mut RandomNumbers) -> anyhow::Result<Request> {
     let tree = robot.read()?;
     let described = tree.inertial_parameters();

@@ -1,12 +1,12 @@
-//! `cargo xtask oracle`: this workspace's dynamics against Pinocchio's, robot by robot, its C3D reader against
-//! ezc3d's, and its fit of possible bodies against CVXPY's.
+//! `cargo xtask oracle`: this workspace's dynamics against Pinocchio's, robot by robot, its C3D reader
+//! against ezc3d's, and its fit of possible bodies against CVXPY's.
 //!
 //! # What it asks
 //!
 //! Whether independent programs compute the same. Regressor, inverse dynamics, mass matrix, forward dynamics
 //! and centre of mass are compared at random states of every robot at hand and of random ones, on fixed and
-//! floating bases; C3D files coordinate by coordinate; the optimum over possible bodies on random problems of real
-//! robots.
+//! floating bases; C3D files coordinate by coordinate; the optimum over possible bodies on random problems of
+//! real robots.
 //!
 //! # How it is run
 //!

@@ -26,6 +26,10 @@
 //! behind it (`numbers.csv`, `iterations.csv`, `parameters.csv`, `motions.csv`, `detection.csv`,
 //! `secrets.csv`); `setup.json`, which all runs in the folder share; and `runs/`.
 
+// These files know each other around two types. `Setup` is what all runs in a folder share: it is made of the
+// arguments, is written beside the runs, and every run is scored by it. `RunFile` is one run as it is kept,
+// with its job, score and detections; jobs write it and the report's tables read it. subject.rs reads any of
+// the robots, and whole_body.rs is the longest of these cases.
 mod arguments;
 mod arm;
 mod detection;

@@ -7,7 +7,7 @@ use phiw_estimation::{
     EstimationError, Estimator, Evidence, LeastSquares, MotionLog, RobotModel, RowsAt, WeightedLeastSquares,
 };
 use phiw_identification::accuracy::{parameter_rmse, torque_rmse};
-use phiw_identification::{TorqueError, torque_error};
+use phiw_identification::fitting::{TorqueError, torque_error};
 use phiw_regressor::RegressorError;
 use phiw_zmp::{ZmpModel, ZmpWorkspace, standing_parameters};
 use serde::{Deserialize, Serialize};

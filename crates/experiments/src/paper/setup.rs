@@ -17,13 +17,14 @@ use phiw_curriculum::growth::Growth;
 use phiw_curriculum::motion::{Motion, MotionDataset};
 use phiw_curriculum::relaxation::{ConditionRelaxation, Relaxation, UncertaintyRelaxation};
 use phiw_curriculum::selection::MotionCandidates;
-use phiw_dynamics::{PARAMETERS_PER_BODY, Workspace, World};
+use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
+use phiw_dynamics::{Workspace, World};
 use phiw_estimation::{
     Estimator, Evidence, LeastSquares, MotionLikelihood, MotionLog, ParameterPrior, Robot, RobotModel,
     RowsAt, WeightedLeastSquares,
 };
 use phiw_growth::{ScoreTest, TraceResidual};
-use phiw_identification::{parameter_name, standard_unit};
+use phiw_identification::model::{parameter_name, standard_unit};
 use phiw_plant::{PlantEffect, Sensors, Timing};
 use phiw_regressor::factor::Factor;
 use phiw_simulated_robot::{FeedForward, SimulatedRobot};

@@ -3,8 +3,9 @@
 use super::whole_body::{self, Standing};
 use crate::environment;
 use anyhow::Context;
+use phiw_dynamics::inertia::InertialParameters;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
-use phiw_dynamics::{Foot, InertialParameters, Tree, World};
+use phiw_dynamics::{Foot, Tree, World};
 use phiw_effects::Catalogue;
 use phiw_estimation::{Robot, RobotModel};
 use phiw_plant::{Friction, GainSettings, Gains, PlantEffect, apparent_inertia};

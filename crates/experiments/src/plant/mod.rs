@@ -24,6 +24,9 @@
 //! Into `target/plant` below the working directory, or where `--out` says: `score.md` (what is printed),
 //! `cases.json` and `cases.csv`. `--keep DIR` keeps each case's files.
 
+// These files know each other: a case draws its secret from the robot and ends as a score, the score says
+// which case it is of, and `command` runs the cases under its `Arguments`. They are one record in several
+// files.
 pub(crate) mod case;
 pub(crate) mod engine;
 mod score;

@@ -1,10 +1,12 @@
 //! A short film: person and robot as sticks, from the front and from the side.
 
 use super::page::Page;
+use super::scene::{Example, Scene};
 use super::stick_figure::{Figure, HEIGHT, View, WIDTH, label};
-use super::{Example, Scene};
 use phiw_bspline_retarget::human::{JointMode, Segment, Side};
-use phiw_bspline_retarget::{MarkerRecording, RetargetOptions, Retargeted, Retargeter, RobotModel};
+use phiw_bspline_retarget::markers::MarkerRecording;
+use phiw_bspline_retarget::robot::RobotModel;
+use phiw_bspline_retarget::{RetargetOptions, Retargeted, Retargeter};
 use phiw_dynamics::{Placement, Vec3};
 use phiw_report::plot::{BoxGroup, BoxPlot, box_plot};
 use std::fmt::Write;

@@ -1,14 +1,14 @@
 //! Whole databases through `phiw retarget`: the seated set, two-handed motions made from it, the embedded
 //! motions.
 
-use super::Scene;
 use super::page::Page;
+use super::scene::Scene;
 use anyhow::Context;
 use phiw::arguments::{Derivatives, RetargetArguments};
 use phiw::console::Console;
 use phiw_bspline_retarget::c3d::{C3dFormat, write_c3d};
 use phiw_bspline_retarget::embedded::embedded_motions;
-use phiw_bspline_retarget::{MarkerRecording, read_recording};
+use phiw_bspline_retarget::markers::{MarkerRecording, read_recording};
 use phiw_report::plot::{BoxGroup, BoxPlot, box_plot};
 use phiw_report::statistics::median;
 use std::path::{Path, PathBuf};

@@ -2,10 +2,11 @@
 //! splines by quasi-Newton, and by the solver that knows the structure.
 
 use super::page::Page;
-use super::{Example, Scene};
+use super::scene::{Example, Scene};
 use phiw_bspline_retarget::bspline::Basis;
+use phiw_bspline_retarget::markers::MarkerRecording;
 use phiw_bspline_retarget::solver::{Iterations, QuasiNewton, Solution, quasi_newton, solve};
-use phiw_bspline_retarget::{Calibration, MarkerRecording, Problem, RetargetOptions, Retargeter};
+use phiw_bspline_retarget::{Calibration, Problem, RetargetOptions, Retargeter};
 use phiw_report::plot::{BoxGroup, BoxPlot, box_plot};
 use phiw_report::statistics::median;
 use rand::SeedableRng;

@@ -1,11 +1,14 @@
 //! mink, frame by frame, on the same markers: as near to the same problem as its tasks go.
 
+use super::mjcf;
 use super::page::Page;
-use super::{Example, Scene, mjcf};
+use super::scene::{Example, Scene};
 use crate::oracle::python::Python;
 use anyhow::Context;
 use phiw_bspline_retarget::human::{Segment, Side};
-use phiw_bspline_retarget::{BodyPoint, MarkerRecording, RetargetOptions, Retargeted, RobotModel};
+use phiw_bspline_retarget::markers::MarkerRecording;
+use phiw_bspline_retarget::robot::{BodyPoint, RobotModel};
+use phiw_bspline_retarget::{RetargetOptions, Retargeted};
 use phiw_dynamics::Placement;
 use serde::{Deserialize, Serialize};
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! The human model as an MJCF file, for MuJoCo and what is built on it.
 
-use phiw_bspline_retarget::human::{BodyJoint, HumanBody};
+use phiw_bspline_retarget::human::{HumanBody, HumanJoint};
 use std::fmt::Write;
 
 /// Every joint and length of the body as a body of its own, `joint_<index>`, and the markers as sites,
@@ -32,7 +32,7 @@ pub fn human(body: &HumanBody, parameters: &[f64]) -> String {
 
 fn write_body(
     index: usize,
-    joints: &[BodyJoint],
+    joints: &[HumanJoint],
     children: &[Vec<usize>],
     sites: &[String],
     text: &mut String,

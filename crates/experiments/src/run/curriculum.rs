@@ -12,7 +12,7 @@ use crate::paper::{
 use anyhow::Context;
 use phiw::console::Console;
 use phiw_estimation::{MotionLog, RobotModel};
-use phiw_identification::TorqueError;
+use phiw_identification::fitting::TorqueError;
 use phiw_plant::PlantEffect;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};

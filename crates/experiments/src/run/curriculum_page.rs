@@ -5,7 +5,7 @@ use crate::paper::{RunFile, Score, balance, choices};
 use phiw_dynamics::Tree;
 use phiw_effects::sentence;
 use phiw_estimation::RobotModel;
-use phiw_identification::TorqueError;
+use phiw_identification::fitting::TorqueError;
 use phiw_plant::{Friction, PlantEffect};
 use phiw_report::number::{percent, significant};
 use phiw_report::page::{ExperimentPage, Picture, Section, Table};

@@ -25,6 +25,8 @@
 //! Into `out/run` in the workspace, or where `--out` says: `report.html`, `motions/` and `runs/` of the
 //! curriculum, and a folder of results for each explained robot (`example/`, `tx40/`).
 
+// These two know each other: curriculum.rs makes the runs and writes their page, which curriculum_page.rs
+// puts together from the runs.
 mod curriculum;
 mod curriculum_page;
 pub(crate) mod synthetic;

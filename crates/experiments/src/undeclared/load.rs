@@ -3,7 +3,8 @@
 
 use super::plant::Scene;
 use super::secret::{Form, Secret};
-use phiw_dynamics::{Inertia, Mat3, Placement, Tree, Vec3};
+use phiw_dynamics::inertia::Inertia;
+use phiw_dynamics::{Mat3, Placement, Tree, Vec3};
 
 /// The rigid body as it is, which is not always as it is declared.
 pub struct Loads {

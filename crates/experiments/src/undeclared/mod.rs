@@ -38,6 +38,11 @@
 //! seeds (`dev`, `report`): `score.md`, `cases.csv` with one row for each case, and `outcomes/`, what
 //! `--resume` goes on from. `--keep DIR` keeps the files of each case.
 
+// Three groups of files know each other. A `Secret` (secret.rs) is one of the forms in elasticity.rs,
+// family.rs, friction.rs, load.rs and mechanism.rs, each of which computes its torque over a `Scene` of
+// plant.rs, and plant.rs adds the secret's torque up. case.rs calls the two special ways to draw a case,
+// saturation.rs and wide.rs, which use its numbers. logging.rs and sensors.rs, and table.rs and
+// wide_table.rs, are each one subject in two files: the ordinary part, and what the wide suites add to it.
 mod case;
 mod certainty;
 mod draw;

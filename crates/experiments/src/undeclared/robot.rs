@@ -47,9 +47,10 @@ impl Robot {
 #[cfg(test)]
 mod tests {
     use super::robots;
+    use phiw_dynamics::inertia::Inertia;
     use phiw_dynamics::random_tree::{RandomNumbers, RandomState, random_state};
     use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
-    use phiw_dynamics::{Body, Inertia, Workspace};
+    use phiw_dynamics::{Body, Workspace};
     use phiw_regressor::{BaseParameters, BaseParametersOptions};
 
     /// `irregular`: links whose published inertia is no body's.

@@ -5,10 +5,8 @@
 
 use phiw_dynamics::random_tree::{RandomNumbers, RandomTreeOptions, random_tree};
 use phiw_dynamics::{Tree, Workspace};
-use phiw_identification::{
-    BlockSource, Data, Design, Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Entry,
-    Evaluator, Fold, Sample,
-};
+use phiw_identification::effect::{EffectError, EffectParameter, Entry, Evaluator, Sample};
+use phiw_identification::{BlockSource, Data, Design, Effect, EffectCatalogue, EffectSpec, Fold};
 use phiw_regressor::BaseParameters;
 use phiw_telemetry::{Block, Conditioning, ConditioningOptions, Recording};
 use std::f64::consts::TAU;

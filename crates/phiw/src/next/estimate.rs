@@ -7,14 +7,17 @@ use crate::model_file::ModelFile;
 use crate::session::{Session, declared};
 use phiw_curriculum::CurriculumError;
 use phiw_curriculum::selection::{MotionCandidates, Triangle};
-use phiw_dynamics::{InertialParameters, Tree};
+use phiw_dynamics::Tree;
+use phiw_dynamics::inertia::InertialParameters;
 use phiw_effects::Catalogue;
 use phiw_estimation::{
     BayesianLeastSquares, Estimate, Estimator, Evidence, LogNoise, ParameterPrior, Robot, RobotModel, RowsAt,
 };
+use phiw_identification::checks::check_size_of_robot;
+use phiw_identification::fitting::{fit, merge};
+use phiw_identification::model::with_masses;
 use phiw_identification::{
-    Design, EffectCatalogue, EffectSpec, IdentificationError, Identified, Progress, check_size_of_robot, fit,
-    identify, merge, with_masses,
+    Design, EffectCatalogue, EffectSpec, IdentificationError, Identified, Progress, identify,
 };
 use phiw_limits::Limits;
 use phiw_regressor::{BaseParameters, RegressorError};

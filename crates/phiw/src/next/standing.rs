@@ -3,8 +3,9 @@
 use crate::Error;
 use crate::arguments::NextArguments;
 use phiw_curriculum::constraint::{StanceError, StanceSettings};
+use phiw_dynamics::Tree;
+use phiw_dynamics::inertia::InertialParameters;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
-use phiw_dynamics::{InertialParameters, Tree};
 use phiw_zmp::{Stance, feet_from_toml};
 use std::path::Path;
 

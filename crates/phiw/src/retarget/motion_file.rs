@@ -137,8 +137,9 @@ fn facts(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use phiw_bspline_retarget::RetargetOptions;
     use phiw_bspline_retarget::human::MarkerMap;
-    use phiw_bspline_retarget::{MarkerSettings, RetargetOptions};
+    use phiw_bspline_retarget::markers::MarkerSettings;
     use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 
     /// A motion made with other bounds of what a spike is was kept as if it were the same.

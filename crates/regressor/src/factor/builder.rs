@@ -5,7 +5,7 @@ use crate::RegressorError;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, recommended_block_size};
 use faer::{Mat, Par};
-use phiw_dynamics::{check_index, check_size};
+use phiw_dynamics::check::{check_index, check_size};
 
 /// Collects rows of \[Φ f\] and folds them into R, a block at a time. Memory does not depend on the number of
 /// rows, and nothing is allocated after [`FactorBuilder::new`].

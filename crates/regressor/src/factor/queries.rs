@@ -3,7 +3,7 @@
 use super::{Factor, solve_lower, solve_upper};
 use crate::RegressorError;
 use faer::Mat;
-use phiw_dynamics::check_size;
+use phiw_dynamics::check::check_size;
 use phiw_dynamics::dense::dot;
 
 /// A column whose part orthogonal to the columns before it is smaller than this share of its norm is

@@ -3,7 +3,7 @@
 use super::FactorBuilder;
 use crate::RegressorError;
 use faer::{Mat, MatRef};
-use phiw_dynamics::{check_index, check_size};
+use phiw_dynamics::check::{check_index, check_size};
 
 /// The upper triangular R with RᵀR = \[Φ f\]ᵀ\[Φ f\]; the last column is the right-hand side f.
 ///

@@ -6,7 +6,7 @@
 
 use crate::RegressorError;
 use crate::factor::{Factor, FactorBuilder};
-use phiw_dynamics::{check_index, check_size};
+use phiw_dynamics::check::{check_index, check_size};
 
 /// The rows of one torque.
 #[derive(Clone, Debug)]
@@ -75,11 +75,13 @@ impl GroupedFactor {
     /// `w` has the wrong length.
     pub fn residual_sums_of_squares(&self, w: &[f64]) -> Result<Vec<f64>, RegressorError> {
         check_size("parameters", w.len(), self.parameter_count)?;
-        let of_group = |group: &Group| {
-            let own: Vec<f64> = group.parameters.iter().map(|&parameter| w[parameter]).collect();
-            group.factor.residual_sum_of_squares(&own)
-        };
-        self.groups.iter().map(of_group).collect()
+        self.groups
+            .iter()
+            .map(|group| {
+                let own: Vec<f64> = group.parameters.iter().map(|&parameter| w[parameter]).collect();
+                group.factor.residual_sum_of_squares(&own)
+            })
+            .collect()
     }
 
     /// The groups' factors restricted to `kept` parameters (renumbered in that order).
@@ -116,12 +118,15 @@ impl GroupedFactor {
     pub fn merge(&self, other: &Self) -> Result<Self, RegressorError> {
         check_size("groups", other.groups.len(), self.groups.len())?;
         check_size("parameters", other.parameter_count, self.parameter_count)?;
-        let merge = |(mine, theirs): (&Group, &Group)| {
-            check_size("parameters of a group", theirs.parameters.len(), mine.parameters.len())?;
-            Ok(Group { parameters: mine.parameters.clone(), factor: mine.factor.merge(&theirs.factor)? })
-        };
-        let groups: Result<Vec<Group>, RegressorError> =
-            self.groups.iter().zip(&other.groups).map(merge).collect();
+        let groups: Result<Vec<Group>, RegressorError> = self
+            .groups
+            .iter()
+            .zip(&other.groups)
+            .map(|(mine, theirs)| {
+                check_size("parameters of a group", theirs.parameters.len(), mine.parameters.len())?;
+                Ok(Group { parameters: mine.parameters.clone(), factor: mine.factor.merge(&theirs.factor)? })
+            })
+            .collect();
         Self::new(self.parameter_count, groups?)
     }
 }

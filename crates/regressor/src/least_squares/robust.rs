@@ -3,7 +3,7 @@
 use super::{Group, GroupedFactor, WeightedSolution, weighted_least_squares};
 use crate::RegressorError;
 use crate::factor::FactorBuilder;
-use phiw_dynamics::check_index;
+use phiw_dynamics::check::check_index;
 
 /// How rows are judged.
 #[derive(Clone, Copy, Debug)]

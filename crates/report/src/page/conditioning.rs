@@ -5,14 +5,14 @@ use maud::{Markup, html};
 
 /// What was done to the logs before the fit.
 #[derive(Debug, Clone, Default)]
-pub struct Conditioning {
+pub struct ConditioningSection {
     /// Quantity and value, in the order to be shown: `cut-off`, `11.2 Hz, from the torque's spectrum`.
     pub entries: Vec<(String, String)>,
     /// Pictures such as spectra.
     pub pictures: Vec<Picture>,
 }
 
-impl Conditioning {
+impl ConditioningSection {
     pub(super) fn markup(&self) -> Markup {
         html! {
             @if !self.entries.is_empty() {

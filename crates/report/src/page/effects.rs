@@ -17,7 +17,7 @@ pub struct EffectSection {
     /// The sentence that explains it.
     pub sentence: String,
     /// Its fitted parameters.
-    pub parameters: Vec<EffectParameter>,
+    pub parameters: Vec<EffectParameterRow>,
     /// Pooled held-out error before it came in (1 is all).
     pub relative_before: f64,
     /// Pooled held-out error with it in.
@@ -39,7 +39,7 @@ pub struct EffectSection {
 
 /// A fitted parameter of an effect.
 #[derive(Debug, Clone, Default)]
-pub struct EffectParameter {
+pub struct EffectParameterRow {
     /// The joint that it belongs to.
     pub joint: String,
     /// Its name.
@@ -95,16 +95,16 @@ pub struct Remaining {
     pub candidates: Vec<CandidateRow>,
     /// Pictures such as the residual against a signal.
     pub pictures: Vec<Picture>,
-    /// What cannot be told from these logs.
-    pub cannot_be_told: Vec<CannotBeTold>,
+    /// What these logs do not identify.
+    pub unidentifiable: Vec<UnidentifiableEffect>,
 }
 
 /// An effect that the motion does not excite.
 #[derive(Debug, Clone, Default)]
-pub struct CannotBeTold {
+pub struct UnidentifiableEffect {
     /// Its name in the catalogue.
     pub kind: String,
-    /// The joints, or groups of joints, on which it cannot be told.
+    /// The joints, or groups of joints, on which it is unidentifiable.
     pub joints: Vec<String>,
     /// The motion, or the signal, that would tell.
     pub telling_motion: String,
@@ -174,7 +174,7 @@ impl Rival {
     }
 }
 
-fn parameters(parameters: &[EffectParameter]) -> Markup {
+fn parameters(parameters: &[EffectParameterRow]) -> Markup {
     html! {
         div.scroll { table.fit {
             thead { tr { th { "Joint" } th { "Parameter" } th.number { "Value" } th.number { "Std" } th { "Unit" } } }
@@ -239,12 +239,12 @@ impl Remaining {
             @for sentence in &self.description { p { (sentence) } }
             @for picture in &self.pictures { (picture.markup()) }
             (candidates(&self.candidates))
-            (cannot_be_told(&self.cannot_be_told))
+            (unidentifiable(&self.unidentifiable))
         }
     }
 }
 
-fn cannot_be_told(effects: &[CannotBeTold]) -> Markup {
+fn unidentifiable(effects: &[UnidentifiableEffect]) -> Markup {
     if effects.is_empty() {
         return html! {};
     }

@@ -1,4 +1,4 @@
-//! A page that tells an experiment: headline, then sections of sentences, tables and pictures.
+//! The page of an experiment: headline, then sections of sentences, tables and pictures.
 
 use super::parts::Picture;
 use super::{list, shell};
@@ -112,6 +112,6 @@ impl Table {
 
 /// Whether a cell stands at the right: it begins like a number, or is empty.
 fn is_number(cell: Option<&String>) -> bool {
-    let begins = |cell: &String| cell.trim_start_matches(['-', '−', '+', '<']).chars().next();
-    cell.and_then(begins).is_none_or(|first| first.is_ascii_digit() || first == '–')
+    cell.and_then(|cell| cell.trim_start_matches(['-', '−', '+', '<']).chars().next())
+        .is_none_or(|first| first.is_ascii_digit() || first == '–')
 }

@@ -12,7 +12,7 @@ const POORLY_DETERMINED: f64 = 0.3;
 
 /// The identified parameters.
 #[derive(Debug, Clone, Default)]
-pub struct Parameters {
+pub struct ParametersSection {
     /// The parameters in any order; the page sorts them by relative standard deviation.
     pub rows: Vec<ParameterRow>,
     /// What the reader should know about them: how deviations were estimated, `cond`.
@@ -52,7 +52,7 @@ pub struct BaseParameter {
     pub regroups: String,
 }
 
-impl Parameters {
+impl ParametersSection {
     pub(super) fn markup(&self) -> Markup {
         if self.rows.is_empty() {
             return html! {};

@@ -18,7 +18,7 @@ pub struct SpectrumLine<'a> {
 
 /// What [`spectrum`] shows.
 #[derive(Debug, Clone, Copy)]
-pub struct Spectrum<'a> {
+pub struct SpectrumPlot<'a> {
     /// The spectra, told apart by colour up to six.
     pub lines: &'a [SpectrumLine<'a>],
     /// The quantity, with its unit: `torque [N·m/√Hz]`.
@@ -28,7 +28,7 @@ pub struct Spectrum<'a> {
 }
 
 /// Spectra over frequency, both axes logarithmic.
-pub fn spectrum(input: &Spectrum<'_>) -> Svg {
+pub fn spectrum(input: &SpectrumPlot<'_>) -> Svg {
     let cut_off = input.cut_off.filter(|&f| super::drawable(f) && f > 0.0);
     let shown: Vec<(Vec<f64>, Vec<f64>)> = input
         .lines

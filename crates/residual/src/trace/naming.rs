@@ -71,10 +71,13 @@ impl Search<'_> {
     /// refine. `self.specs` are put in that order.
     ///
     /// What makes the error on motion held out larger is left out.
-    pub(super) fn name(&mut self) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
+    pub(super) fn name(
+        &mut self,
+        declared_relative: f64,
+    ) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
         let trial = loop {
             let trial = self.trial()?;
-            let harmful = self.harmful(&trial);
+            let harmful = self.harmful(&trial, declared_relative);
             if harmful.is_empty() {
                 break trial;
             }
@@ -90,9 +93,15 @@ impl Search<'_> {
 
     /// The places of the effects, ascending, that make the error on motion held out larger: the worst, the
     /// worst of what is left without it, and so on. What others are forms of stays.
-    fn harmful(&self, trial: &Trial) -> Vec<usize> {
+    ///
+    /// Errors count by their logarithms; where the error of all torques together is still larger than
+    /// `declared_relative`, that of the declared model over the torques, by their squares.
+    fn harmful(&self, trial: &Trial, declared_relative: f64) -> Vec<usize> {
         let mut left_out: Vec<usize> = Vec::new();
         let mut present = trial.held_out_squares(&trial.fit);
+        let sum = |squares: &[f64]| squares.iter().sum::<f64>();
+        let torque: f64 = trial.held_out.iter().map(Products::right_hand_side).sum();
+        let declared = declared_relative * declared_relative * torque;
         loop {
             let found = trial.members.par_iter().zip(&trial.places).filter(|(member, place)| {
                 **place >= self.declared && !trial.is_required(member) && !left_out.contains(place)
@@ -102,13 +111,18 @@ impl Search<'_> {
                 let squares = trial.held_out_squares(&fit);
                 (trial.gain(&squares, &present), place, squares)
             });
-            let worst = without.min_by(|a, b| a.0.total_cmp(&b.0));
-            match worst.filter(|(gain, ..)| *gain <= 0.0) {
-                Some((_, place, squares)) => {
+            let mut without: Vec<(f64, usize, Vec<f64>)> = without.collect();
+            without.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let harms = without.first().is_some_and(|(gain, ..)| *gain <= 0.0);
+            if !harms && sum(&present) > declared {
+                without.sort_by(|a, b| sum(&a.2).total_cmp(&sum(&b.2)));
+            }
+            match without.into_iter().next() {
+                Some((_, place, squares)) if harms || sum(&present) > declared => {
                     left_out.push(place);
                     present = squares;
                 }
-                None => break,
+                _ => break,
             }
         }
         left_out.sort_unstable();

@@ -1,7 +1,7 @@
 //! One pass over the logs with a fitted model: what it leaves, sample by sample, in constant memory.
 
 use phiw_identification::{BlockSource, Design, Fold, IdentificationError};
-use phiw_telemetry::FilterScratch;
+use phiw_telemetry::filter::FilterScratch;
 
 /// What the residual of each torque looks like on some folds.
 #[derive(Clone, Debug, Default)]

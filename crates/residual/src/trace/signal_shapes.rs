@@ -3,7 +3,8 @@
 use super::stage::Fixed;
 use phiw_dynamics::Tree;
 use phiw_effects::{Constants, OwnTorque, ParameterKind, SignalRanges, smooth_sign};
-use phiw_identification::{Effect, Needs, Sample};
+use phiw_identification::Effect;
+use phiw_identification::effect::{Needs, Sample};
 
 /// A signal, as in `report.json`, and broken lines over it in one joint's torque.
 pub(super) type Shape = (String, Box<dyn Effect>);

@@ -5,9 +5,9 @@ use super::input::{TraceInput, TraceOptions};
 use crate::selection::{self, Hypothesis, Member, Products, Torque, Variant};
 use phiw_dynamics::Tree;
 use phiw_effects::Catalogue;
-use phiw_identification::{
-    Data, Design, Effect, EffectCatalogue, EffectSpec, Fold, IdentificationError, ReferenceModel, accumulate,
-};
+use phiw_identification::effect::ReferenceModel;
+use phiw_identification::fitting::accumulate;
+use phiw_identification::{Data, Design, Effect, EffectCatalogue, EffectSpec, Fold, IdentificationError};
 use phiw_regressor::factor::{Factor, FactorBuilder};
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_regressor::{BaseParameters, RegressorError};

@@ -1,7 +1,8 @@
 //! The result of a trace.
 
 use super::probe::Dependence;
-use phiw_identification::{EffectSpec, Identified, TorqueError};
+use phiw_identification::fitting::TorqueError;
+use phiw_identification::{EffectSpec, Identified};
 
 /// The answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

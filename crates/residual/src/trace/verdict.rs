@@ -4,13 +4,14 @@ use super::probe::{self, Fit};
 use super::residuals::residual_shape;
 use super::search::Search;
 use super::tracing::{Remaining, Tracing, Verdict};
-use phiw_identification::{IdentificationError, Identified, TorqueError, accumulate, fit, torque_error};
+use phiw_identification::fitting::{TorqueError, accumulate, fit, torque_error};
+use phiw_identification::{IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
 
 impl Search<'_> {
     pub(super) fn finish(mut self) -> Result<Tracing, IdentificationError> {
         let before = self.declared_error()?;
-        let (mut effects, named) = self.name()?;
+        let (mut effects, named) = self.name(before.1.relative)?;
         let refinements = effects.split_off(named);
         if effects.is_empty() && refinements.is_empty() && self.is_worse_than(&before.1)? {
             self.specs.clone_from(&self.input.declared);

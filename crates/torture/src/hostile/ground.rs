@@ -3,8 +3,8 @@
 use super::case::Case;
 use super::table::Table;
 use super::trial::{Answer, Trial};
-use phiw_bspline_retarget::MarkerRecording;
 use phiw_bspline_retarget::embedded::embedded_motions;
+use phiw_bspline_retarget::markers::MarkerRecording;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{JointType, Tree, Workspace};
 use phiw_telemetry::Recording;

@@ -3,8 +3,8 @@
 use super::bytes;
 use super::case::{Case, Class, Expectation};
 use super::ground::Ground;
-use phiw_bspline_retarget::MarkerRecording;
 use phiw_bspline_retarget::c3d::{C3dFormat, write_c3d};
+use phiw_bspline_retarget::markers::MarkerRecording;
 use rand::RngExt;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;

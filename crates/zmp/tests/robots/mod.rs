@@ -1,9 +1,10 @@
 //! Robots and motions for tests.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
+use phiw_dynamics::inertia::{Inertia, InertialParameters};
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, RandomTreeOptions, random_state, random_tree};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
-use phiw_dynamics::{Inertia, InertialParameters, Mat3, Tree, Vec3};
+use phiw_dynamics::{Mat3, Tree, Vec3};
 use phiw_zmp::standing_parameters;
 use proptest::prelude::*;
 

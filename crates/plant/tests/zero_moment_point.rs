@@ -1,14 +1,22 @@
 //! Robots that stand: where the two ZMPs differ, and which of them a force plate measures.
 
-mod robots;
+mod plants;
 
 use phiw_dynamics::{BackendError, Placement, SimulationBackend, Tree, Vec3, World};
 use phiw_plant::{ComputedTorque, Gains, Plant, PlantRun, PlantSetup, RigidBodyModel, Timing};
 use phiw_sim_rapier::RapierBackend;
-use phiw_zmp::feet_from_toml;
-use phiw_zmp::{MotionBalance, Stance, SupportPolygon, ZmpModel, ZmpWorkspace};
-use robots::{model, upper_body};
+use phiw_zmp::{
+    MotionBalance, Stance, SupportPolygon, ZmpModel, ZmpWorkspace, feet_from_toml, standing_parameters,
+};
+use plants::model;
 use std::f64::consts::TAU;
+
+/// The 18-joint upper body on a fixed base, and the parameters of all that stands.
+fn upper_body() -> (Tree, Vec<f64>) {
+    let (tree, floating) = (model("upper_body18", false), model("upper_body18", true));
+    let parameters = standing_parameters(&floating.bodies()[0].inertial, &tree.inertial_parameters());
+    (tree, parameters)
+}
 
 /// The support file of a model, for its tree with a floating base.
 fn feet(name: &str, tree: &Tree) -> Vec<phiw_dynamics::Foot> {

@@ -1,0 +1,75 @@
+//! The rules of CONTRIBUTING.md that no tool checks.
+
+use std::path::{Path, PathBuf};
+
+/// Widest line of code (rustfmt.toml), and so of a comment \[columns\]. Stable rustfmt leaves comments as
+/// they are.
+const WIDEST: usize = 110;
+
+/// Lines of a source text, counted from 1, whose comment goes beyond [`WIDEST`]. A row of a table in a
+/// documentation comment cannot be broken and may be wider.
+fn wide_comments(source: &str) -> Vec<usize> {
+    let is_wide = |line: &str| {
+        let line = line.trim_end();
+        // `//` in the middle of a word is part of an address.
+        let mut starts = line.match_indices("//").map(|(at, _)| at);
+        let comment = starts.find(|&at| line[..at].is_empty() || line[..at].ends_with(' '));
+        line.chars().count() > WIDEST
+            && comment.is_some_and(|at| !line[at..].trim_start_matches(['/', '!', ' ']).starts_with('|'))
+    };
+    source.lines().enumerate().filter(|(_, line)| is_wide(line)).map(|(at, _)| at + 1).collect()
+}
+
+/// All Rust sources below a folder, but for what is built.
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() && path.file_name().is_some_and(|name| name != "target") {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// Comments grew to 137 columns, as rustfmt does not look at them.
+#[test]
+fn comments_are_no_wider_than_code() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut files = Vec::new();
+    for folder in ["crates", "xtask", "fuzz"] {
+        sources(&root.join(folder), &mut files);
+    }
+    assert!(
+        files.iter().any(|file| file.ends_with("dynamics/src/lib.rs")),
+        "no sources in {}",
+        root.display()
+    );
+    let mut wide = Vec::new();
+    for file in &files {
+        let source = std::fs::read_to_string(file).unwrap();
+        wide.extend(wide_comments(&source).iter().map(|line| format!("{}:{line}", file.display())));
+    }
+    assert!(wide.is_empty(), "break these comments at {WIDEST} columns:\n{}", wide.join("\n"));
+}
+
+#[track_caller]
+fn check(line: &str, is_wide: bool) {
+    let source = format!("fn f() {{}}\n{line}\n");
+    assert_eq!(wide_comments(&source), if is_wide { vec![2] } else { vec![] }, "{line}");
+}
+
+#[test]
+fn a_wide_comment_is_found_wherever_it_stands() {
+    let words = "word ".repeat(22); // 110 columns with the space at its end
+    check(&format!("// {words}"), true);
+    check(&format!("    /// {words}"), true);
+    check(&format!("//! {words}"), true);
+    check(&format!("let x = 1; // {words}"), true);
+    check(&format!("// {}", &words[..107]), false);
+    check(&format!("// {}", &words[..108].replace(' ', "é")), true);
+    check(&format!("// {}", "é".repeat(107)), false);
+    check(&format!("let x = \"{words}\";"), false);
+    check(&format!("let x = \"https://{words}\";"), false);
+    check(&format!("/// | {words} |"), false);
+}
