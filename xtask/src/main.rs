@@ -6,7 +6,7 @@ mod test;
 mod torture;
 
 use clap::{Parser, Subcommand};
-use phiw_experiments::{oracle, paper, plant, retarget, run, synthetic_log, undeclared};
+use phiw_experiments::{consistent, oracle, paper, plant, retarget, run, synthetic_log, undeclared};
 use std::process::ExitCode;
 
 #[derive(Parser)]
@@ -35,6 +35,8 @@ enum Task {
     /// Compare dynamics with Pinocchio and C3D files with ezc3d, installed from PyPI into a private
     /// environment.
     Oracle(oracle::Arguments),
+    /// What it costs that identified bodies can exist, on real logs.
+    Consistent(consistent::Arguments),
     /// Robot logs with effects that nobody declared: generate, trace with `phiw explain`, score.
     Undeclared(undeclared::Arguments),
     /// The experiments of the paper's section 5, resumable, on one machine or many.
@@ -62,6 +64,7 @@ fn main() -> anyhow::Result<ExitCode> {
             paper::command(&arguments).map(|()| ExitCode::SUCCESS)
         }
         Task::Plant(arguments) => plant::command(&arguments).map(|()| ExitCode::SUCCESS),
+        Task::Consistent(arguments) => consistent::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Undeclared(arguments) => undeclared::command(&arguments).map(|()| ExitCode::SUCCESS),
     }
 }

@@ -2,7 +2,9 @@
 
 use crate::Constants;
 use phiw_dynamics::{JointType, Tree};
-use phiw_identification::effect::{EffectParameter, Entry, Evaluator, Needs, Sample};
+use phiw_identification::effect::{
+    EffectParameter, Entry, Evaluator, Needs, QuadraticForm, QuadraticTerm, Sample,
+};
 use phiw_identification::{Effect, EffectSpec};
 
 /// sign(v), smoothed over the speed `width`; the plain sign where `width` is zero.
@@ -78,6 +80,7 @@ pub struct OwnTorque<F> {
     parameters: Vec<EffectParameter>,
     needs: Needs,
     linear_in_motion: bool,
+    quadratic: Option<QuadraticForm>,
     formula: F,
 }
 
@@ -108,6 +111,7 @@ impl<F: Formula> OwnTorque<F> {
             joint,
             needs: Needs::default(),
             linear_in_motion: false,
+            quadratic: None,
             formula,
         }
     }
@@ -121,6 +125,12 @@ impl<F: Formula> OwnTorque<F> {
     /// The same with parameters that are `highest` at most.
     pub fn at_most(mut self, highest: f64) -> Self {
         self.parameters.iter_mut().for_each(|parameter| parameter.bounds.1 = highest);
+        self
+    }
+
+    /// The same with a first parameter that is the joint's entry of a quadratic form.
+    pub fn in_form(mut self, form: QuadraticForm) -> Self {
+        self.quadratic = Some(form);
         self
     }
 
@@ -146,6 +156,11 @@ impl<F: Formula> Effect for OwnTorque<F> {
     }
     fn is_linear_in_motion(&self, _parameter: usize) -> bool {
         self.linear_in_motion
+    }
+    fn quadratic_terms(&self) -> Vec<QuadraticTerm> {
+        let coordinates = [self.joint; 2];
+        let term = |form| QuadraticTerm { parameter: 0, form, coordinates, factor: 1.0 };
+        self.quadratic.map(term).into_iter().collect()
     }
     fn evaluator(&self) -> Box<dyn Evaluator + '_> {
         Box::new(FormulaEvaluator { formula: &self.formula, memory: F::Memory::default() })

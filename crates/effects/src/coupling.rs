@@ -6,7 +6,7 @@ use crate::fitted::FittedEffect;
 use crate::friction::WIDTH;
 use crate::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
 use phiw_dynamics::Tree;
-use phiw_identification::effect::{EffectParameter, Entry, Evaluator, Sample};
+use phiw_identification::effect::{EffectParameter, Entry, Evaluator, QuadraticForm, QuadraticTerm, Sample};
 use phiw_identification::{Effect, EffectSpec};
 
 /// Torque at one joint from the motion of another, both ways or one way.
@@ -220,6 +220,19 @@ impl Effect for Coupling {
     fn is_linear_in_motion(&self, parameter: usize) -> bool {
         self.terms.get(parameter).is_some_and(|term| term.dimension != ParameterKind::Torque)
     }
+    fn quadratic_terms(&self) -> Vec<QuadraticTerm> {
+        let of_term = |(parameter, term): (usize, &Term)| {
+            let form = match term.dimension {
+                ParameterKind::PerVelocity => QuadraticForm::Power,
+                ParameterKind::Inertia => QuadraticForm::KineticEnergy,
+                _ => return None,
+            };
+            // One way only, half of it is in each of the mirrored entries.
+            let factor = if term.columns.iter().all(Option::is_some) { 1.0 } else { 0.5 };
+            Some(QuadraticTerm { parameter, form, coordinates: self.site, factor })
+        };
+        self.terms.iter().enumerate().filter_map(of_term).collect()
+    }
     fn evaluator(&self) -> Box<dyn Evaluator + '_> {
         Box::new(CouplingColumns {
             site: self.site,
@@ -244,5 +257,37 @@ impl Evaluator for CouplingColumns {
         for (column, formula) in columns.iter_mut().zip(&self.formulas) {
             *column = formula(&motion);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Coupling, Motion, TERMS};
+    use phiw_identification::{Effect, EffectSpec};
+
+    /// The power of a term's columns is what its entries of the matrix say: twice the entry times both
+    /// speeds.
+    #[test]
+    fn the_quadratic_form_of_a_coupling_is_the_power_of_its_columns() {
+        let speeds = [0.7, -1.3];
+        let motion = Motion { velocity: speeds, acceleration: speeds, width: 0.1 };
+        let mut counted = 0;
+        for term in TERMS {
+            let effect = Coupling {
+                site: [3, 5],
+                terms: vec![term],
+                parameters: Vec::new(),
+                spec: EffectSpec::new("transmission_coupling", &[]),
+            };
+            let columns = speeds.iter().zip(term.columns);
+            let power: f64 = columns.filter_map(|(speed, column)| Some(speed * column?(&motion))).sum();
+            for found in effect.quadratic_terms() {
+                assert_eq!(found.coordinates, [3, 5]);
+                let expected = 2.0 * found.factor * speeds[0] * speeds[1];
+                assert!((power - expected).abs() < 1e-12, "{}: {power}, not {expected}", term.name);
+                counted += 1;
+            }
+        }
+        assert_eq!(counted, 4);
     }
 }

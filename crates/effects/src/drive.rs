@@ -5,7 +5,7 @@ use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
-use phiw_identification::effect::{JointProperty, Needs, Sample};
+use phiw_identification::effect::{JointProperty, Needs, QuadraticForm, Sample};
 
 /// Ia·q̈.
 pub struct RotorInertia;
@@ -35,7 +35,7 @@ impl EffectKind for RotorInertia {
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = sample.qdd()[joint];
         let parameters = [("Ia", ParameterKind::Inertia, 0.0)];
         let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
-        Box::new(effect.linear_in_motion())
+        Box::new(effect.linear_in_motion().in_form(QuadraticForm::KineticEnergy))
     }
 }
 

@@ -5,7 +5,7 @@ use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, product, values};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
-use phiw_identification::effect::{JointProperty, Needs, Sample};
+use phiw_identification::effect::{JointProperty, Needs, QuadraticForm, Sample};
 
 /// The constant of every smoothed sign: the speed over which it turns \[rad/s, m/s\].
 pub(crate) const WIDTH: &str = "sign_width";
@@ -57,7 +57,7 @@ impl EffectKind for Viscous {
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = sample.qd()[joint];
         let parameters = [("fv", ParameterKind::PerVelocity, 0.0)];
         let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
-        Box::new(effect.linear_in_motion())
+        Box::new(effect.linear_in_motion().in_form(QuadraticForm::Power))
     }
 }
 

@@ -13,10 +13,12 @@
 //! | [`plant`] | does it find them in the closed loop of a physics engine, tracked poorly? |
 //! | [`retarget`] | how fast and how close is retargeting, over whole databases and against others? |
 //! | [`oracle`] | do dynamics and C3D reader agree with Pinocchio and ezc3d? |
+//! | [`consistent`] | what does it cost that identified bodies can exist? |
 //! | [`synthetic_log`] | does memory grow with the length of a log? It makes the log. |
 //!
 //! Unlike the library crates, experiments print, and write where they are told.
 
+pub mod consistent;
 pub mod environment;
 pub mod oracle;
 pub mod paper;

@@ -60,6 +60,28 @@ pub struct Entry {
     pub parameter: usize,
 }
 
+/// A form over the joints' velocities or accelerations that no motion of a real robot makes negative.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum QuadraticForm {
+    /// Σ v_i·D_ij·v_j, what viscous friction takes from the motion \[W\].
+    Power,
+    /// Σ v_i·J_ij·v_j, twice the kinetic energy of rotors \[J\].
+    KineticEnergy,
+}
+
+/// What one unit of a parameter adds to the symmetric matrix of a quadratic form.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct QuadraticTerm {
+    /// Index into [`Effect::parameters`].
+    pub parameter: usize,
+    /// The form.
+    pub form: QuadraticForm,
+    /// Velocity coordinates of the tree: row and column; the mirrored entry gets the same.
+    pub coordinates: [usize; 2],
+    /// What one unit adds.
+    pub factor: f64,
+}
+
 /// A physical effect beside the rigid body: linear in its parameters, once its constants are fixed.
 pub trait Effect: Send + Sync {
     /// What builds the effect again.
@@ -86,6 +108,11 @@ pub trait Effect: Send + Sync {
     /// torque depends on later samples too.
     fn is_causal(&self) -> bool {
         true
+    }
+    /// What its parameters add to quadratic forms that are never negative: friction takes energy in every
+    /// motion, also where it is coupled between joints.
+    fn quadratic_terms(&self) -> Vec<QuadraticTerm> {
+        Vec::new()
     }
     /// A new evaluator of its columns.
     fn evaluator(&self) -> Box<dyn Evaluator + '_>;

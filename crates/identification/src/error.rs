@@ -20,6 +20,9 @@ pub enum IdentificationError {
     /// The log and the robot do not fit each other.
     #[error(transparent)]
     Input(#[from] crate::checks::InputError),
+    /// What was said to be known of the bodies contradicts itself.
+    #[error(transparent)]
+    Consistency(#[from] phiw_consistency::ConsistencyError),
     /// A model file that does not fit the robot.
     #[error("{0}")]
     Model(String),

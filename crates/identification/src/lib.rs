@@ -3,6 +3,7 @@
 pub mod accuracy;
 pub mod block_source;
 pub mod checks;
+pub mod consistent;
 pub mod design;
 pub mod effect;
 pub mod model;

@@ -1,12 +1,14 @@
 //! An identified model: rigid body, effects, and the data of the fit; written to `model.json` and read back.
 
 use crate::checks::check_size_of_robot;
+use crate::consistent::Consistent;
 use crate::effect::EffectError;
 use crate::factor_rows::FactorRows;
 use crate::fit::Fit;
 use crate::reference::ReferenceModel;
 use crate::{Design, Effect, EffectCatalogue, EffectSpec, IdentificationError};
 use phiw_dynamics::Tree;
+use phiw_dynamics::check::check_size;
 use phiw_dynamics::inertia::{PARAMETER_NAMES, PARAMETERS_PER_BODY};
 use phiw_limits::Limits;
 use phiw_regressor::BaseParameters;
@@ -44,6 +46,22 @@ pub struct Model {
     pub factor: FactorRows,
     /// Cut-offs of the low-pass over positions and of the parallel filter \[Hz\].
     pub cutoff_hz: (f64, f64),
+    /// The same fit over bodies that can exist: what a simulator or a controller should be given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub consistent: Option<ConsistentModel>,
+}
+
+/// Parameters of bodies that can exist, and of effects within their bounds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ConsistentModel {
+    /// Weight of the URDF's bodies, in nats of independent samples.
+    pub prior_weight: f64,
+    /// How far the objective can be above its optimum, in the same unit.
+    pub gap: f64,
+    /// Standard parameters of each body, all possible.
+    pub bodies: Vec<BodyParameters>,
+    /// Parameters of each effect of [`Model::effects`], in its order.
+    pub effects: Vec<Vec<f64>>,
 }
 
 /// A parameter with its standard deviation.
@@ -140,7 +158,38 @@ impl Model {
             residual_std: fit.residual_std.clone(),
             factor: FactorRows::of(&fit.factor, fit.determined()),
             cutoff_hz,
+            consistent: None,
         })
+    }
+
+    /// The same with the fit over possible bodies beside it.
+    ///
+    /// # Errors
+    /// It is not of this design.
+    pub fn with_consistent(
+        mut self,
+        design: &Design,
+        consistent: &Consistent,
+    ) -> Result<Self, IdentificationError> {
+        check_size(
+            "standard parameters",
+            consistent.standard.len(),
+            PARAMETERS_PER_BODY * self.bodies.len(),
+        )?;
+        check_size("parameters", consistent.parameters.len(), design.parameter_count())?;
+        let bodies = self.bodies.iter().zip(consistent.standard.as_chunks().0);
+        let effects = 0..design.effects().len();
+        self.consistent = Some(ConsistentModel {
+            prior_weight: consistent.weight,
+            gap: consistent.gap,
+            bodies: bodies
+                .map(|(body, inertial)| BodyParameters { joint: body.joint.clone(), inertial: *inertial })
+                .collect(),
+            effects: effects
+                .map(|effect| consistent.parameters[design.effect_parameters(effect)].to_vec())
+                .collect(),
+        });
+        Ok(self)
     }
 
     /// Whether the numbers of a file can be a model's: finite, of a size that squares can be taken of,
@@ -166,6 +215,16 @@ impl Model {
         }
         if let Some(body) = self.bodies.iter().find(|body| !body.inertial.iter().all(usable)) {
             return wrong(format!("body of {} has a number that is no inertial parameter", body.joint));
+        }
+        if let Some(consistent) = &self.consistent {
+            let counts = self.effects.iter().map(|effect| effect.parameters.len());
+            if !consistent.effects.iter().map(Vec::len).eq(counts) {
+                return wrong("consistent parameters are of other effects".to_owned());
+            }
+            let bodies = consistent.bodies.iter().flat_map(|body| &body.inertial);
+            if !bodies.chain(consistent.effects.iter().flatten()).all(usable) {
+                return wrong("consistent parameters hold a number that is no parameter".to_owned());
+            }
         }
         if self.residual_std.len() != self.joints.len() {
             let (deviations, joints) = (self.residual_std.len(), self.joints.len());
@@ -260,7 +319,28 @@ impl Model {
         Ok(ReferenceModel::new(self.identified_tree(tree)?).with_effects(effects?))
     }
 
-    /// The tree with the model's standard parameters.
+    /// The tree with bodies that can exist; with the least-squares ones where the model has no others.
+    ///
+    /// # Errors
+    /// The tree has other bodies.
+    pub fn consistent_tree(&self, tree: &Tree) -> Result<Tree, IdentificationError> {
+        let Some(consistent) = &self.consistent else { return self.identified_tree(tree) };
+        let parameters: Vec<f64> = consistent.bodies.iter().flat_map(|body| body.inertial).collect();
+        let mut possible = tree.clone();
+        possible.set_inertial_parameters(&parameters)?;
+        Ok(possible)
+    }
+
+    /// Value of the k-th parameter of an effect that belongs to the possible bodies; the least-squares one
+    /// where the model has no others.
+    pub fn consistent_effect(&self, effect: usize, parameter: usize) -> Option<f64> {
+        match &self.consistent {
+            Some(consistent) => consistent.effects.get(effect)?.get(parameter).copied(),
+            None => Some(self.effects.get(effect)?.parameters.get(parameter)?.value),
+        }
+    }
+
+    /// The tree with the model's standard parameters, as least squares has found them.
     ///
     /// # Errors
     /// The tree has other bodies.

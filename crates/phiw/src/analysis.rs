@@ -2,8 +2,8 @@
 
 use crate::session::Session;
 use crate::traces::Traces;
-use crate::{Error, warnings};
-
+use crate::{Error, possible_bodies, warnings};
+use phiw_identification::consistent::{Consistent, ConsistentSettings, consistent};
 use phiw_identification::effect::JointProperty;
 use phiw_identification::fitting::merge;
 use phiw_identification::{Data, EffectCatalogue, EffectSpec, Identified, Model};
@@ -20,6 +20,8 @@ pub struct Analysis<'a> {
     pub identified: &'a Identified,
     /// The same as it is written to `model.json`.
     pub model: Model,
+    /// The same fit over bodies that can exist.
+    pub consistent: Consistent,
     /// Torques over time.
     pub traces: Traces,
     /// RMS of the noise in each joint's filtered torque \[N·m, N\].
@@ -39,12 +41,17 @@ impl<'a> Analysis<'a> {
         let conditioning = session.logs.conditioning();
         let cutoffs = (conditioning.cutoff_hz, conditioning.parallel_cutoff_hz);
         let model = Model::of_fit(design, fit, &session.declared, &session.arguments.hold, cutoffs)?;
+        let settings = ConsistentSettings::default();
+        let consistent =
+            consistent(design, fit, &identified.train_folds, &identified.held_out_folds, &settings)?;
+        let model = model.with_consistent(design, &consistent)?;
         let folds = [data.train.as_slice(), data.held_out.as_slice()];
         let traces = Traces::collect(design, &fit.parameters, folds, &data.sources)?;
         let noise_floor = noise_floor(session, data, &model)?;
         let mut warnings = warnings::all(session, identified);
+        warnings.extend(possible_bodies::warning(&model, &consistent, fit));
         warnings.extend(warnings::at_rest_where_held_out(session, &at_rest));
-        Ok(Analysis { session, identified, model, traces, noise_floor, warnings })
+        Ok(Analysis { session, identified, model, consistent, traces, noise_floor, warnings })
     }
 
     /// Names of the robot's joints.

@@ -1,7 +1,7 @@
 //! The report page of a traced residual: the page of an identification, and what was found.
 
 use crate::analysis::Analysis;
-use crate::{Error, page as identified_page};
+use crate::{Error, page as identified_page, possible_bodies};
 use phiw_effects::Signal;
 use phiw_identification::{Data, Design, predict};
 use phiw_report::IdentificationPage;
@@ -28,6 +28,7 @@ pub fn page(
 ) -> Result<IdentificationPage, Error> {
     let mut page = identified_page::page(analysis, String::new());
     page.headline = headline(analysis, tracing);
+    page.headline.push(possible_bodies::sentence(analysis));
     page.verdict = Some(match tracing.verdict {
         trace::Verdict::Sufficient => Verdict::Sufficient,
         trace::Verdict::Explained => Verdict::Explained,

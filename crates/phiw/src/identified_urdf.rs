@@ -1,4 +1,4 @@
-//! The URDF with the identified parameters in it.
+//! The URDF with the identified parameters in it: those of bodies that can exist.
 
 use crate::Error;
 use crate::analysis::Analysis;
@@ -16,7 +16,7 @@ const EXPRESSED: [JointProperty; 2] = [JointProperty::Damping, JointProperty::Fr
 /// # Errors
 /// The parameters cannot be expressed.
 pub fn identified_urdf(analysis: &Analysis<'_>) -> Result<String, Error> {
-    let tree = analysis.model.identified_tree(&analysis.session.tree)?;
+    let tree = analysis.model.consistent_tree(&analysis.session.tree)?;
     let friction = |joint: usize| {
         let body = analysis.session.tree.joint(joint);
         let [damping, friction] = EXPRESSED.map(|property| fitted(analysis, property, &body.joint));
@@ -50,6 +50,6 @@ fn fitted(analysis: &Analysis<'_>, property: JointProperty, joint: &str) -> Opti
     let catalogue = &analysis.session.catalogue;
     let is_it =
         |spec: &EffectSpec| spec.joints == [joint] && catalogue.joint_property(spec) == Some(property);
-    let effect = analysis.model.effects.iter().find(|effect| is_it(&effect.spec))?;
-    effect.parameters.first().map(|parameter| parameter.value)
+    let effect = analysis.model.effects.iter().position(|effect| is_it(&effect.spec))?;
+    analysis.model.consistent_effect(effect, 0)
 }

@@ -18,6 +18,7 @@ mod not_identified;
 pub mod output;
 pub mod page;
 mod parameters;
+pub mod possible_bodies;
 pub mod report_json;
 pub mod retarget;
 pub mod session;

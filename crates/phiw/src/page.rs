@@ -3,7 +3,7 @@
 use crate::analysis::Analysis;
 use crate::traces::Role;
 use crate::warnings::file_name;
-use crate::{date, not_identified, parameters};
+use crate::{date, not_identified, parameters, possible_bodies};
 use phiw_identification::LogSet;
 use phiw_report::IdentificationPage;
 use phiw_report::number::{percent, significant};
@@ -77,6 +77,7 @@ fn headline(analysis: &Analysis<'_>) -> Vec<String> {
             counted(training.len(), "log")
         ),
         noise,
+        possible_bodies::sentence(analysis),
     ]
 }
 

@@ -43,11 +43,11 @@ fn note(analysis: &Analysis<'_>) -> String {
     format!(
         "Least squares, each torque weighted by its residual; standard deviations by leaving out one twelfth of the training motion after \
          the other, so that correlated samples are not counted as independent. cond of the weighted regressor {}. Logs determine base \
-         parameters only; model.json and identified.urdf hold the standard parameters nearest to the URDF's that have them: {consistent} of {} \
-         bodies are physically consistent (positive definite pseudo-inertia){}",
+         parameters only; model.json holds the standard parameters nearest to the URDF's that have them ({consistent} of {} \
+         bodies are physically consistent: positive definite pseudo-inertia), and beside them, as identified.urdf does, the parameters of \
+         possible bodies and dissipative friction that fit best, with the URDF as prior.",
         significant(analysis.condition_number(), 3),
         bodies.len(),
-        if consistent == bodies.len() { "." } else { ", so use them for torques, not for forward dynamics." }
     )
 }
 

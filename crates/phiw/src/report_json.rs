@@ -2,6 +2,7 @@
 
 use crate::analysis::Analysis;
 use crate::page::conditioning_entries;
+use crate::possible_bodies;
 use crate::traces::Role;
 use phiw_identification::fitting::TorqueError;
 use phiw_report::ReportJson;
@@ -57,10 +58,11 @@ pub fn program(analysis: &Analysis<'_>) -> ProgramJson {
         evidence: Vec::new(),
         unidentifiable: Vec::new(),
         draws: None,
+        consistency: Some(possible_bodies::json(analysis)),
     }
 }
 
 /// One number for each joint.
-pub fn by_joint(joints: &[String], values: &[f64]) -> JointMap<f64> {
+pub fn by_joint<T: Copy>(joints: &[String], values: &[T]) -> JointMap<T> {
     joints.iter().cloned().zip(values.iter().copied()).collect()
 }

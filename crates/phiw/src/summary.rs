@@ -3,6 +3,7 @@
 use crate::analysis::Analysis;
 use crate::identified_urdf::not_expressed;
 use crate::page::{counted, declared_in_words};
+use crate::possible_bodies;
 use crate::traces::Role;
 use phiw_identification::LogSet;
 use phiw_report::number::{percent, significant};
@@ -44,6 +45,7 @@ fn errors(analysis: &Analysis<'_>, text: &mut String) -> std::fmt::Result {
         percent(identified.held_out.relative),
         percent(analysis.traces.relative_with_rests(Role::HeldOut))
     )?;
+    writeln!(text, "{}", possible_bodies::sentence(analysis))?;
     if analysis.session.logs.splits_training_logs() {
         let share = 100.0 * LogSet::HELD_OUT_SHARE;
         writeln!(text, "held out is the last {share} % of each training log, since no --validate was given")?;

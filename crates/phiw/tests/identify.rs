@@ -12,6 +12,7 @@ use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Tree, Workspace};
 use phiw_effects::Catalogue;
 use phiw_identification::Model;
+use phiw_identification::consistent::impossible_bodies;
 use phiw_regressor::{BaseParameters, JointTorqueRegressor};
 use phiw_report::json::Verdict;
 use std::path::Path;
@@ -137,14 +138,18 @@ fn the_identified_urdf_gives_the_torque_of_the_model() {
     for spoil in [unspoiled, without_inertials, lying_without_inertials] as [fn(&str) -> String; 3] {
         let identification = Identification::new(&["viscous_friction", "coulomb_friction"], spoil);
         let model = identification.model();
+        let possible = model.consistent.unwrap();
         let tree = read_urdf(&identification.text("identified.urdf"), &UrdfOptions::default()).unwrap().tree;
         for joint in 0..tree.joint_count() {
-            let fitted = |kind: usize| model.effects[kind * tree.joint_count() + joint].parameters[0].value;
+            let fitted = |kind: usize| possible.effects[kind * tree.joint_count() + joint][0];
             let body = tree.joint(joint);
             assert_eq!([body.damping, body.friction], [fitted(0), fitted(1)], "{}", body.joint);
+            assert!(body.damping >= 0.0 && body.friction >= 0.0);
         }
-        let parameters: Vec<f64> = model.base_parameters.iter().map(|parameter| parameter.value).collect();
-        assert_same_torques(&tree, &parameters);
+        assert_eq!(impossible_bodies(&tree.inertial_parameters()), [0; 0]);
+        let standard: Vec<f64> = possible.bodies.iter().flat_map(|body| body.inertial).collect();
+        let base = BaseParameters::of_tree(&tree, Default::default()).unwrap();
+        assert_same_torques(&tree, &base.from_standard(&standard).unwrap());
     }
 }
 

@@ -160,6 +160,40 @@ pub struct ProgramJson {
     /// What bootstrap draws of the training motion named, if they were asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub draws: Option<DrawsJson>,
+    /// What it costs that the bodies can exist.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub consistency: Option<ConsistencyJson>,
+}
+
+/// The fit over bodies that can exist beside least squares.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ConsistencyJson {
+    /// Weight of the URDF's bodies, in nats of independent samples; chosen by training motion that was left
+    /// out.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub prior_weight: f64,
+    /// How far the objective can be above its optimum, in the same unit.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub gap: f64,
+    /// Whether that is next to nothing.
+    pub certified: bool,
+    /// Bodies, by their joints, that least squares has made impossible.
+    pub impossible: Vec<String>,
+    /// RMS error of each joint on held-out motion (N·m or N).
+    pub validate: JointMap<OfBothFits>,
+    /// Pooled error on held-out motion, RMS of the error over RMS of the torque.
+    pub validate_relative: OfBothFits,
+}
+
+/// A number of both fits.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct OfBothFits {
+    /// By least squares.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub least_squares: f64,
+    /// Over bodies that can exist.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub consistent: f64,
 }
 
 /// What bootstrap draws of the training motion named.

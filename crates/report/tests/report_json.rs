@@ -105,6 +105,17 @@ fn additions_of_the_program_come_last() {
                 draws: 9,
             }],
         }),
+        consistency: Some(ConsistencyJson {
+            prior_weight: 10.0,
+            gap: 1e-9,
+            certified: true,
+            impossible: vec!["joint_2".into()],
+            validate: JointMap::from([(
+                "joint_1".into(),
+                OfBothFits { least_squares: 0.2, consistent: 0.21 },
+            )]),
+            validate_relative: OfBothFits { least_squares: 0.05, consistent: 0.051 },
+        }),
     });
     let text = report.to_json().unwrap();
     assert!(text.find("\"phiw\"") > text.find("\"remaining\""));

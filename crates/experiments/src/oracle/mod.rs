@@ -1,22 +1,26 @@
-//! `cargo xtask oracle`: this workspace's dynamics against Pinocchio's, robot by robot, and its C3D reader
-//! against ezc3d's.
+//! `cargo xtask oracle`: this workspace's dynamics against Pinocchio's, robot by robot, its C3D reader
+//! against ezc3d's, and its fit of possible bodies against CVXPY's.
 //!
 //! # What it asks
 //!
 //! Whether independent programs compute the same. Regressor, inverse dynamics, mass matrix, forward dynamics
 //! and centre of mass are compared at random states of every robot at hand and of random ones, on fixed and
-//! floating bases; C3D files coordinate by coordinate.
+//! floating bases; C3D files coordinate by coordinate; the optimum over possible bodies on random problems of
+//! real robots.
 //!
 //! # How it is run
 //!
-//! `cargo xtask oracle`, or one part of it: `cargo xtask oracle dynamics`, `cargo xtask oracle c3d`. It needs
-//! Python 3.10 or later, and a network the first time: Pinocchio and ezc3d are installed from PyPI, pinned.
+//! `cargo xtask oracle`, or one part of it: `cargo xtask oracle dynamics`, `cargo xtask oracle c3d`,
+//! `cargo xtask oracle consistency`. It needs
+//! Python 3.10 or later, and a network the first time: Pinocchio, ezc3d, CVXPY and Clarabel are
+//! installed from PyPI, pinned.
 //! For this reason it is not part of `cargo xtask test`.
 //!
 //! # What it prints
 //!
 //! A table of the largest relative differences, by robot and quantity. The exit status is not 0 if one is
-//! above 1e-9, or a C3D file is not read alike.
+//! above 1e-9, if a C3D file is not read alike, or if an
+//! optimum is not certified, is above Clarabel's by more than 1e-6, or too many differ.
 //!
 //! # Where results go
 //!
@@ -26,6 +30,7 @@ mod answers;
 mod c3d;
 mod case;
 mod comparison;
+mod consistency;
 mod pinocchio;
 pub(crate) mod python;
 
@@ -49,6 +54,9 @@ pub struct Arguments {
     /// Random robots, besides those that are found as files.
     #[arg(long, default_value_t = 12)]
     random_robots: u64,
+    /// Random problems in all, to compare the fit of possible bodies on.
+    #[arg(long, default_value_t = 200)]
+    problems: usize,
     /// Seed of the states; random robots are numbered from it on.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -67,6 +75,8 @@ enum Part {
     Dynamics,
     /// C3D files against ezc3d.
     C3d,
+    /// Possible bodies that fit best, against CVXPY and Clarabel.
+    Consistency,
 }
 
 /// Prints tables of differences; fails if one is too large.
@@ -77,8 +87,11 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let python = Python::install(&arguments.python, "oracle-python", REQUIREMENTS)?;
     let asked = |part| arguments.part.is_none_or(|only| only == part);
     let recordings_agree = !asked(Part::C3d) || c3d::compare(&python)?;
+    let workspace = environment::workspace_root()?;
+    let optima_agree = !asked(Part::Consistency)
+        || consistency::compare(&python, &workspace, arguments.problems, arguments.seed)?;
     let dynamics_agree = !asked(Part::Dynamics) || dynamics(python, arguments)?;
-    Ok(if recordings_agree && dynamics_agree { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if recordings_agree && optima_agree && dynamics_agree { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// Prints the table of differences to Pinocchio; whether all are small.

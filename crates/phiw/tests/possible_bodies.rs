@@ -1,0 +1,103 @@
+//! What is written for a simulator is a robot that can exist, whatever the logs say.
+
+mod synthetic;
+
+use phiw::arguments::SessionArguments;
+use phiw::console::Console;
+use phiw::identify::{Outcome, identify};
+use phiw_dynamics::random_tree::{RandomNumbers, random_state};
+use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
+use phiw_dynamics::{Tree, Workspace, dense::Cholesky};
+use phiw_identification::Model;
+use phiw_identification::consistent::impossible_bodies;
+use std::path::{Path, PathBuf};
+
+const POSES: usize = 10_000;
+
+/// The robot's set of logs, or nothing where it is absent.
+fn real_logs(set: &str) -> Option<PathBuf> {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/logs").join(set);
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    println!("skipped: ../shared/data/logs/{set} is absent");
+    None
+}
+
+fn run(urdf: PathBuf, train: &[PathBuf], validate: &[PathBuf], out: &Path) -> Outcome {
+    let arguments = SessionArguments {
+        urdf,
+        train: train.to_vec(),
+        validate: validate.to_vec(),
+        declare: ["viscous_friction", "coulomb_friction", "rotor_inertia"].map(str::to_owned).to_vec(),
+        out: out.to_owned(),
+        ..SessionArguments::default()
+    };
+    identify(&arguments, &Console::silent()).unwrap()
+}
+
+/// Every body possible, and M(q) positive definite in random poses, without the rotors' inertia.
+fn assert_can_exist(urdf: &Path) {
+    let tree = read_urdf_file(urdf, &UrdfOptions::default()).unwrap().tree;
+    assert_eq!(impossible_bodies(&tree.inertial_parameters()), [0; 0], "{}", urdf.display());
+    assert!(tree.bodies().iter().all(|body| body.damping >= 0.0 && body.friction >= 0.0));
+    let size = tree.velocity_size();
+    let (mut matrix, mut workspace) = (vec![0.0; size * size], Workspace::new(&tree));
+    let mut random = RandomNumbers::new(1);
+    for pose in 0..POSES {
+        let q = random_state(&tree, &mut random).q;
+        tree.mass_matrix(&q, &mut workspace, &mut matrix).unwrap();
+        assert!(
+            Cholesky::of(size, |row, column| matrix[row * size + column]).is_some(),
+            "M is not positive definite in pose {pose} of {}",
+            urdf.display()
+        );
+    }
+}
+
+#[test]
+fn real_robots_can_exist_once_identified() {
+    for (set, urdf, train, validate) in [
+        ("tx40", "tx40.urdf", &["train.csv"][..], "validate.csv"),
+        ("emps", "emps.urdf", &["train.csv"], "validate.csv"),
+        ("kr300", "kr300.urdf", &["traj_A.csv", "traj_B.csv"], "traj_C.csv"),
+    ] {
+        let Some(logs) = real_logs(set) else { continue };
+        let folder = tempfile::tempdir().unwrap();
+        let train: Vec<PathBuf> = train.iter().map(|log| logs.join(log)).collect();
+        let outcome = run(logs.join(urdf), &train, &[logs.join(validate)], folder.path());
+        assert_can_exist(&folder.path().join("identified.urdf"));
+        let cost = outcome.report.phiw.unwrap().consistency.unwrap();
+        assert!(cost.certified, "{set}: gap {}", cost.gap);
+        let [free, possible] = [cost.validate_relative.least_squares, cost.validate_relative.consistent];
+        assert!(possible < 1.02 * free, "{set}: {possible} held out, {free} by least squares");
+    }
+}
+
+/// A robot of which the URDF gives no mass at all, identified from a log that moves it little.
+#[test]
+fn a_robot_without_masses_gets_bodies_that_can_exist() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let mut parts = synthetic::URDF.split("<inertial>");
+    let mut urdf = parts.next().unwrap().to_owned();
+    parts.for_each(|part| urdf.push_str(part.split_once("</inertial>").unwrap().1));
+    std::fs::write(path("robot.urdf"), urdf).unwrap();
+    synthetic::recording(1, 12.0).write_csv(&path("train.csv")).unwrap();
+    let outcome = run(path("robot.urdf"), &[path("train.csv")], &[], &path("out"));
+    assert_can_exist(&path("out/identified.urdf"));
+    let report = outcome.report.phiw.unwrap();
+    let cost = report.consistency.unwrap();
+    assert!(cost.certified && cost.validate.len() == 3);
+    let said = |text: &str| report.warnings.iter().any(|warning| warning.contains(text));
+    assert_eq!(said("no distribution of mass"), !cost.impossible.is_empty(), "{:?}", report.warnings);
+    assert!(outcome.summary.contains("With bodies that can exist"), "{}", outcome.summary);
+    let page = std::fs::read_to_string(path("out/report.html")).unwrap();
+    assert!(page.contains("With bodies that can exist"));
+    let model: Model =
+        serde_json::from_str(&std::fs::read_to_string(path("out/model.json")).unwrap()).unwrap();
+    let tree: Tree = synthetic::tree();
+    let possible = model.consistent_tree(&tree).unwrap();
+    assert_eq!(impossible_bodies(&possible.inertial_parameters()), [0; 0]);
+    assert_ne!(model.identified_tree(&tree).unwrap().inertial_parameters(), possible.inertial_parameters());
+}
