@@ -23,9 +23,9 @@ impl Search<'_> {
         self.within_bounds(members, start)
     }
 
-    /// The best first of models with these members. All are fitted with the weights of `start`, quickest where
-    /// they begin with its members; the best few, where they may be taken, are then fitted with their own,
-    /// their members in the order of the present model and new ones at `place`. What belongs to each is
+    /// The best first of models with these members. All are fitted with the weights of `start`, quickest
+    /// where they begin with its members; the best few, where they may be taken, are then fitted with their
+    /// own, their members in the order of the present model and new ones at `place`. What belongs to each is
     /// handed through.
     pub(super) fn ranked<T: Send>(
         &self,

@@ -94,8 +94,8 @@ impl Beside {
     }
 }
 
-/// What the criterion gains, to first order, where `squares` weighted squares are taken from what a fit leaves
-/// of torques of `rows` effective rows.
+/// What the criterion gains, to first order, where `squares` weighted squares are taken from what a fit
+/// leaves of torques of `rows` effective rows.
 pub(super) fn gain_of(fit: &Fit, squares: f64, rows: f64, torques: &[usize]) -> f64 {
     // As many as there are rows only where the weights are the fit's own.
     let all: f64 = torques.iter().map(|&torque| fit.weights[torque] * fit.rss[torque]).sum();

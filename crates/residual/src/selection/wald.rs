@@ -50,8 +50,8 @@ pub(super) fn squares_of(problem: &Problem, fit: &Fit, member: Member) -> f64 {
     if own.is_empty() { 0.0 } else { model_squares(&own, &inverse, &values).unwrap_or(0.0) }
 }
 
-/// The places of a member's columns that are determined, their columns of the system's inverse, and their values
-/// less those that stand for absence.
+/// The places of a member's columns that are determined, their columns of the system's inverse, and their
+/// values less those that stand for absence.
 fn block(problem: &Problem, fit: &Fit, member: Member) -> (Vec<usize>, Vec<Vec<f64>>, Vec<f64>) {
     let parameters = problem.variant(member).parameters.iter().copied();
     let own: Vec<usize> = parameters
