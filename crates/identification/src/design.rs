@@ -148,6 +148,12 @@ impl Design {
         self
     }
 
+    /// For each torque the speed of its joint below which it stands still \[rad/s, m/s\]; empty where all rows
+    /// count.
+    pub fn rest_speeds(&self) -> &[f64] {
+        &self.rest_speeds
+    }
+
     /// The same with the effects from `first` on as candidates: where one's columns are not finite on the
     /// logs, they count as zero and [`not_finite`](Design::not_finite) says so, instead of an error. `first`
     /// is at most the number of effects.

@@ -2,16 +2,18 @@
 //! read back.
 
 use crate::{
-    Design, Effect, EffectCatalogue, EffectError, EffectSpec, FactorRows, Fit, IdentificationError,
-    ReferenceModel, check_size_of_robot,
+    BaseMap, Covariance, DataFingerprint, Design, Effect, EffectCatalogue, EffectError, EffectSpec,
+    FactorRows, Fit, IdentificationError, ReferenceModel, check_size_of_robot,
 };
 use phiw_dynamics::{PARAMETER_NAMES, PARAMETERS_PER_BODY, Tree};
 use phiw_limits::Limits;
 use phiw_regressor::BaseParameters;
 use serde::{Deserialize, Serialize};
 
-/// Version of the file's form.
-const SCHEMA: u32 = 1;
+/// Version of the file's form. Version 1 had neither the robot nor the covariance.
+const SCHEMA: u32 = 2;
+/// Versions that are read.
+const READ: std::ops::RangeInclusive<u32> = 1..=SCHEMA;
 /// Beyond this magnitude a number of a model is none: its square times another's has no double.
 const LARGEST: f64 = 1e100;
 
@@ -42,6 +44,23 @@ pub struct Model {
     pub factor: FactorRows,
     /// Cut-offs of the low-pass over positions and of the parallel filter \[Hz\].
     pub cutoff_hz: (f64, f64),
+    /// For each torque, the speed below which its joint stands still and its rows do not count
+    /// \[rad/s, m/s\]. Empty in a model of schema 1, or where all rows count.
+    #[serde(default)]
+    pub rest_speeds: Vec<f64>,
+    /// Covariance of the parameters, base parameters first, then those of the effects; absent from a model of
+    /// schema 1.
+    #[serde(default)]
+    pub covariance: Option<Covariance>,
+    /// The map from standard to base parameters; absent from a model of schema 1.
+    #[serde(default)]
+    pub base_map: Option<BaseMap>,
+    /// The logs that the model comes from.
+    #[serde(default)]
+    pub data: Vec<DataFingerprint>,
+    /// Text of the robot's URDF; absent from a model of schema 1.
+    #[serde(default)]
+    pub urdf: Option<String>,
 }
 
 /// A parameter with its standard deviation.
@@ -138,7 +157,17 @@ impl Model {
             residual_std: fit.residual_std.clone(),
             factor: FactorRows::of(&fit.factor, fit.determined()),
             cutoff_hz,
+            rest_speeds: design.rest_speeds().to_vec(),
+            covariance: Some(fit.covariance.clone()),
+            base_map: Some(BaseMap::of(base)),
+            data: Vec::new(),
+            urdf: None,
         })
+    }
+
+    /// The same with the robot that it is of and the logs that it comes from, so that it can be used by itself.
+    pub fn with_sources(self, urdf: &str, data: Vec<DataFingerprint>) -> Self {
+        Model { urdf: Some(urdf.to_owned()), data, ..self }
     }
 
     /// Whether the numbers of a file can be a model's: finite, of a size that squares can be taken of,
@@ -151,8 +180,12 @@ impl Model {
             Err(IdentificationError::Model(format!("the model's {what}; write it again with phiw")))
         };
         let usable = |value: &f64| value.abs() < LARGEST;
-        if self.schema != SCHEMA {
-            return wrong(format!("schema {} is not {SCHEMA}, which this phiw reads", self.schema));
+        if !READ.contains(&self.schema) {
+            return wrong(format!(
+                "schema {} is not one of {} to {SCHEMA}, which this phiw reads",
+                self.schema,
+                READ.start()
+            ));
         }
         let values =
             self.base_parameters.iter().chain(self.effects.iter().flat_map(|effect| &effect.parameters));
@@ -182,6 +215,22 @@ impl Model {
         let size = self.factor.parameters.len() + 1;
         if self.factor.entries.len() != size * (size + 1) / 2 || !self.factor.entries.iter().all(usable) {
             return wrong(format!("factor is no triangle of {size} finite columns"));
+        }
+        if !self.rest_speeds.is_empty()
+            && (self.rest_speeds.len() != self.joints.len() || !self.rest_speeds.iter().all(usable))
+        {
+            return wrong(format!("rest_speeds is not a list of {} speeds", self.joints.len()));
+        }
+        if let Some(covariance) = &self.covariance {
+            let size = covariance.parameters.len();
+            if !covariance.parameters.is_sorted_by(|a, b| a < b)
+                || covariance.parameters.last().is_some_and(|&last| last >= parameters)
+            {
+                return wrong(format!("covariance names parameters that are not among its {parameters}"));
+            }
+            if covariance.entries.len() != size * (size + 1) / 2 || !covariance.entries.iter().all(usable) {
+                return wrong(format!("covariance is no triangle of {size} finite columns"));
+            }
         }
         Ok(())
     }

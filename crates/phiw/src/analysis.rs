@@ -2,7 +2,7 @@
 
 use crate::session::Session;
 use crate::traces::Traces;
-use crate::{Error, warnings};
+use crate::{Error, fingerprint, warnings};
 use phiw_effects::JointProperty;
 use phiw_identification::{Data, EffectSpec, Identified, Model, merge};
 use phiw_regressor::RegressorError;
@@ -36,7 +36,8 @@ impl<'a> Analysis<'a> {
         let at_rest = session.joints_without_held_out_motion(&identified.held_out_folds)?;
         let conditioning = session.logs.conditioning();
         let cutoffs = (conditioning.cutoff_hz, conditioning.parallel_cutoff_hz);
-        let model = Model::of_fit(design, fit, &session.declared, &session.arguments.hold, cutoffs)?;
+        let model = Model::of_fit(design, fit, &session.declared, &session.arguments.hold, cutoffs)?
+            .with_sources(&session.xml, fingerprint::of_session(session)?);
         let folds = [data.train.as_slice(), data.held_out.as_slice()];
         let traces = Traces::collect(design, &fit.parameters, folds, &data.sources)?;
         let noise_floor = noise_floor(session, data, &model)?;

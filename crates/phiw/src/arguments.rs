@@ -20,6 +20,9 @@ pub enum Command {
     /// The same, then close the loop: find what the model lacks, add it, and report the error before and
     /// after.
     Explain(ExplainArguments),
+    /// Predict the torques of logs with an identified model: per row the torque, its standard deviation, what
+    /// was measured beyond it, and each effect's share.
+    Predict(PredictArguments),
     /// Say what is in logs before anything is fitted: late velocities, torques that are missing or clipped,
     /// units, clocks, and what to do about it.
     Check(CheckArguments),
@@ -37,6 +40,7 @@ impl Command {
         match self {
             Command::Identify(identify) => identify.session.quiet,
             Command::Explain(explain) => explain.session.quiet,
+            Command::Predict(predict) => predict.quiet,
             Command::Check(check) => check.quiet,
             Command::Retarget(retarget) => retarget.quiet,
             Command::Next(next) => next.quiet,
@@ -66,6 +70,33 @@ pub struct ExplainArguments {
     /// named.
     #[arg(long, value_name = "COUNT", default_value_t = 0)]
     pub draws: u32,
+}
+
+/// Arguments of `phiw predict`.
+#[derive(Clone, Debug, Default, Args)]
+pub struct PredictArguments {
+    /// A model.json of `phiw identify` or `phiw explain`; it holds the robot, too.
+    #[arg(long, value_name = "MODEL.json")]
+    pub model: PathBuf,
+    /// Logs (CSV); torques are compared where a log has them.
+    #[arg(value_name = "LOG", required = true)]
+    pub logs: Vec<PathBuf>,
+    /// Joints that stand still in the logs, at 0 or at a value (rad, m); they need no column. What the model
+    /// holds need not be named.
+    #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
+    pub hold: Vec<(String, f64)>,
+    /// Cut-off of the low-pass over positions (Hz); by default the model's.
+    #[arg(long, value_name = "HZ")]
+    pub cutoff_hz: Option<f64>,
+    /// Cut-off of the low-pass over the model's columns and the torque alike (Hz); by default the model's.
+    #[arg(long, value_name = "HZ")]
+    pub parallel_cutoff_hz: Option<f64>,
+    /// The predictions, one row for each row of the logs that can be used (CSV).
+    #[arg(long, value_name = "FILE.csv")]
+    pub out: PathBuf,
+    /// Print nothing but errors.
+    #[arg(long)]
+    pub quiet: bool,
 }
 
 /// Arguments of `phiw check`.

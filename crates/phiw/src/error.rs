@@ -66,6 +66,37 @@ pub enum Error {
         /// What is wrong with it.
         source: Box<IdentificationError>,
     },
+    /// A model file that holds no robot.
+    #[error(
+        "{}: this model.json holds no robot, since an earlier phiw wrote it; write it again with `phiw identify` or `phiw explain`",
+        path.display()
+    )]
+    ModelWithoutRobot {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The robot in a model file is not one that can be worked with.
+    #[error("{}: the robot in it: {source}", path.display())]
+    RobotOfModel {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: Box<UrdfError>,
+    },
+    /// A joint that the model holds elsewhere.
+    #[error(
+        "--hold {joint}={asked}: {} is of the robot with this joint held at {held}; identify a model with it held at {asked}", path.display()
+    )]
+    HeldElsewhere {
+        /// The file.
+        path: PathBuf,
+        /// The joint.
+        joint: String,
+        /// Where it should be held \[rad, m\].
+        asked: f64,
+        /// Where the model holds it \[rad, m\].
+        held: f64,
+    },
     /// A model file of another robot.
     #[error("{} does not fit {}: {source}", path.display(), urdf.display())]
     ModelOfAnother {
@@ -91,7 +122,7 @@ pub enum Error {
         file: PathBuf,
     },
     /// The file for the result is a folder.
-    #[error("--out {}: this is a folder; name a file in it, such as {}", out.display(), out.join("next.csv").display())]
+    #[error("--out {}: this is a folder; name a file in it, such as {}", out.display(), out.join("result.csv").display())]
     OutIsFolder {
         /// What was asked for.
         out: PathBuf,
@@ -241,6 +272,9 @@ impl Error {
             | Error::NotAModel { .. }
             | Error::Model { .. }
             | Error::ModelOfAnother { .. }
+            | Error::ModelWithoutRobot { .. }
+            | Error::RobotOfModel { .. }
+            | Error::HeldElsewhere { .. }
             | Error::Map { .. }
             | Error::Robot { .. }
             | Error::Recording(_)

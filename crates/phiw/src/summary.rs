@@ -106,7 +106,11 @@ fn closing(
 }
 
 /// Columns as wide as they need to be; those from `numbers` on to the right.
-fn write_table<const N: usize>(text: &mut String, rows: &[[String; N]], numbers: usize) -> std::fmt::Result {
+pub(crate) fn write_table<const N: usize>(
+    text: &mut String,
+    rows: &[[String; N]],
+    numbers: usize,
+) -> std::fmt::Result {
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: [usize; N] = std::array::from_fn(width);
     for row in rows {
