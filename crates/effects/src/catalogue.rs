@@ -1,7 +1,7 @@
 //! The catalogue finds kinds of effects by name, declares them for a robot, and builds them from a model's
 //! file.
 
-use crate::{Constants, EffectKind, FittedEffect, JointProperty, SignalRanges};
+use crate::{Constants, EffectKind, FittedEffect, JointProperty, Mechanisms, SignalRanges};
 use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Variants};
@@ -72,6 +72,18 @@ impl Catalogue {
     /// The property of a joint that expresses an effect, if its kind is known and has one.
     pub fn joint_property(&self, spec: &EffectSpec) -> Option<JointProperty> {
         self.kind(&spec.kind).ok()?.joint_property()
+    }
+
+    /// What in a simulator's model does what an effect does, with its fitted values; nothing for a kind that
+    /// is unknown here.
+    pub fn mechanisms(
+        &self,
+        spec: &EffectSpec,
+        parameters: &[EffectParameter],
+        fitted: &[f64],
+    ) -> Mechanisms {
+        let found = FittedEffect::new(spec, parameters, fitted);
+        self.kind(&spec.kind).map(|kind| kind.mechanisms(&found)).unwrap_or_default()
     }
 
     /// What an effect means, with its fitted values; a kind that is unknown here gets its name and numbers.

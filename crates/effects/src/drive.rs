@@ -3,6 +3,7 @@
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, JointProperty, Signal};
+use crate::mechanism::{Mechanism, Mechanisms};
 use phiw_dynamics::Tree;
 use phiw_identification::{Effect, Needs, Sample};
 
@@ -54,6 +55,10 @@ impl EffectKind for TorqueOffset {
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         format!("The torque of {} is off by a constant {}.", found.joints(), found.quantity(0))
     }
+    /// The drive must ask for the offset, too, so that is what its motor takes off.
+    fn mechanisms(&self, found: &FittedEffect<'_>) -> Mechanisms {
+        motor(found, 1.0, -found.value(0))
+    }
     fn seen_against(&self) -> Signal {
         Signal::Position
     }
@@ -82,6 +87,9 @@ impl EffectKind for TorqueGain {
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         format!("The torque of {} is measured {:+.1} % too large.", found.joints(), 100.0 * found.value(0))
     }
+    fn mechanisms(&self, found: &FittedEffect<'_>) -> Mechanisms {
+        motor(found, 1.0 / (1.0 + found.value(0)), 0.0)
+    }
     fn seen_against(&self) -> Signal {
         Signal::Torque
     }
@@ -94,4 +102,10 @@ impl EffectKind for TorqueGain {
         let needs = Needs { total_torque: true, ..Needs::default() };
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns).needing(needs))
     }
+}
+
+/// A motor of this gain and bias at the effect's joint.
+fn motor(found: &FittedEffect<'_>, gain: f64, bias: f64) -> Mechanisms {
+    let joint = found.joint_names().first().cloned().unwrap_or_default();
+    Mechanisms::of(Mechanism::Motor { joint, gain, bias })
 }

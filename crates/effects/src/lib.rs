@@ -11,6 +11,7 @@ mod fitted;
 mod friction;
 mod hysteresis;
 mod kind;
+mod mechanism;
 mod position;
 mod sensing;
 
@@ -18,3 +19,4 @@ pub use catalogue::Catalogue;
 pub use columns::{Formula, OwnTorque, ParameterKind, smooth_sign};
 pub use fitted::{FittedEffect, sentence};
 pub use kind::{Constants, EffectKind, JointProperty, JointRange, Signal, SignalRanges};
+pub use mechanism::{Mechanism, Mechanisms};

@@ -15,7 +15,8 @@ pub struct Arguments {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Fit the declared model to logs: model.json, report.json, report.html, identified.urdf.
+    /// Fit the declared model to logs: model.json, report.json, report.html, identified.urdf,
+    /// identified.xml (MJCF).
     Identify(IdentifyArguments),
     /// The same, then close the loop: find what the model lacks, add it, and report the error before and
     /// after.

@@ -238,6 +238,9 @@ pub enum Error {
     /// The identified parameters cannot be written as a URDF.
     #[error("identified.urdf: {0}")]
     IdentifiedUrdf(Box<UrdfError>),
+    /// The identified parameters cannot be written as MJCF.
+    #[error("identified.xml: {0}")]
+    IdentifiedMjcf(phiw_mjcf::MjcfError),
     /// All logs of the training together.
     #[error("{logs}: {source}")]
     TrainingLogs {
@@ -295,7 +298,11 @@ impl Error {
             | Error::OutIsFile { .. } => 2,
             Error::Identification(IdentificationError::Regressor(_)) => 1,
             Error::Identification(_) => 2,
-            Error::Curriculum(_) | Error::Output(_) | Error::IdentifiedUrdf(_) | Error::Json { .. } => 1,
+            Error::Curriculum(_)
+            | Error::Output(_)
+            | Error::IdentifiedUrdf(_)
+            | Error::IdentifiedMjcf(_)
+            | Error::Json { .. } => 1,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The parameters as the report lists them.
 
 use crate::analysis::Analysis;
+use crate::summary;
 use phiw_dynamics::Inertia;
 use phiw_identification::{BodyParameters, NamedParameter, parameter_name};
 use phiw_report::number::significant;
@@ -37,13 +38,21 @@ fn rows(analysis: &Analysis<'_>) -> Vec<ParameterRow> {
 }
 
 fn note(analysis: &Analysis<'_>) -> String {
+    let mut sentences = vec![consistency(analysis)];
+    sentences.extend(
+        summary::file_notes(analysis).into_iter().map(|note| note.trim_end_matches('.').to_owned() + "."),
+    );
+    sentences.join(" ")
+}
+
+fn consistency(analysis: &Analysis<'_>) -> String {
     let bodies = &analysis.model.bodies;
     let is_physical = |body: &&BodyParameters| Inertia::<f64>::from_parameters(&body.inertial).is_physical();
     let consistent = bodies.iter().filter(is_physical).count();
     format!(
         "Least squares, each torque weighted by its residual; standard deviations by leaving out one twelfth of the training motion after \
          the other, so that correlated samples are not counted as independent. cond of the weighted regressor {}. Logs determine base \
-         parameters only; model.json and identified.urdf hold the standard parameters nearest to the URDF's that have them: {consistent} of {} \
+         parameters only; model.json, identified.urdf and identified.xml hold the standard parameters nearest to the URDF's that have them: {consistent} of {} \
          bodies are physically consistent (positive definite pseudo-inertia){}",
         significant(analysis.condition_number(), 3),
         bodies.len(),
