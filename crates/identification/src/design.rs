@@ -285,6 +285,11 @@ impl DesignScratch<'_> {
         Ok(())
     }
 
+    /// Takes torques of a simulation in the place of the reference model's.
+    pub(crate) fn set_reference(&mut self, reference: BlockReference) {
+        self.reference = reference;
+    }
+
     /// All rows of one sample, side by side as [`RowLayout::range`] says: columns, then the measured torque.
     /// After them, which joints move.
     ///

@@ -21,6 +21,7 @@ mod predict;
 mod prediction_errors;
 mod rates;
 mod reference;
+pub mod reproduction;
 mod robot_findings;
 mod sample;
 

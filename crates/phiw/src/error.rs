@@ -97,6 +97,44 @@ pub enum Error {
         /// Where the model holds it \[rad, m\].
         held: f64,
     },
+    /// A joint that is held in the logs, but moves in the model that is simulated.
+    #[error(
+        "--hold {joint}: {} moves this joint, so a simulation needs its torque; identify a model with it held", path.display()
+    )]
+    HeldInSimulation {
+        /// The model.
+        path: PathBuf,
+        /// The joint.
+        joint: String,
+    },
+    /// A model that no motion follows from.
+    #[error(
+        "{}: it cannot be simulated: M(q) is not positive definite at {t:.3} s of {}{bodies}; predict torques with it, or identify it from motion \
+         that tells more", path.display(), log.display()
+    )]
+    NotPositiveDefinite {
+        /// The model.
+        path: PathBuf,
+        /// The log.
+        log: PathBuf,
+        /// Where in the log \[s\].
+        t: f64,
+        /// Which bodies cannot exist, in words.
+        bodies: String,
+    },
+    /// Logs without a stretch to reproduce.
+    #[error(
+        "{logs}: no stretch of {needed} s without a gap, which a reproduction needs; record longer motion"
+    )]
+    NothingToReproduce {
+        /// The logs.
+        logs: String,
+        /// The shortest window \[s\].
+        needed: f64,
+    },
+    /// A model that cannot be moved on.
+    #[error("the simulation failed: {0}")]
+    Simulation(phiw_identification::reproduction::PlantError),
     /// A model file of another robot.
     #[error("{} does not fit {}: {source}", path.display(), urdf.display())]
     ModelOfAnother {
@@ -278,6 +316,9 @@ impl Error {
             | Error::ModelWithoutRobot { .. }
             | Error::RobotOfModel { .. }
             | Error::HeldElsewhere { .. }
+            | Error::HeldInSimulation { .. }
+            | Error::NotPositiveDefinite { .. }
+            | Error::NothingToReproduce { .. }
             | Error::Map { .. }
             | Error::Robot { .. }
             | Error::Recording(_)
@@ -299,6 +340,7 @@ impl Error {
             Error::Identification(IdentificationError::Regressor(_)) => 1,
             Error::Identification(_) => 2,
             Error::Curriculum(_)
+            | Error::Simulation(_)
             | Error::Output(_)
             | Error::IdentifiedUrdf(_)
             | Error::IdentifiedMjcf(_)

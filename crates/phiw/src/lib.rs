@@ -26,6 +26,7 @@ pub mod predict;
 pub mod report_json;
 pub mod retarget;
 pub mod session;
+pub mod simulate;
 pub mod summary;
 pub mod threads;
 pub mod traces;

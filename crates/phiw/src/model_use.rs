@@ -18,6 +18,8 @@ pub struct Reading<'a> {
     pub logs: &'a [PathBuf],
     /// Joints that stand still in the logs, and where \[rad, m\].
     pub hold: &'a [(String, f64)],
+    /// Whether the logs must have torques, and move all joints that the model moves.
+    pub complete: bool,
     /// Cut-off of the positions' low-pass \[Hz\].
     pub cutoff_hz: Option<f64>,
     /// Cut-off of the parallel filter \[Hz\].
@@ -52,6 +54,9 @@ impl ModelUse {
     pub fn open(path: &Path, reading: &Reading<'_>, progress: Progress<'_>) -> Result<Self, Error> {
         let file = ModelFile::read(path)?;
         let held = extra_holds(&file.model, path, reading.hold)?;
+        if let Some((joint, _)) = held.first().filter(|_| reading.complete) {
+            return Err(Error::HeldInSimulation { path: path.to_owned(), joint: joint.clone() });
+        }
         let tree = robot(&file.model, path, &[])?;
         let (design, parameters) = file.own_design(&tree, &Catalogue::default())?;
         let model = file.model;
@@ -64,7 +69,10 @@ impl ModelUse {
             ..ConditioningOptions::default()
         };
         let every_row = ConditioningOptions { decimation: Some(1), ..thinned.clone() };
-        let logs = LogSet::open_for_prediction(&logged, reading.logs, &every_row, progress)?;
+        let logs = match reading.complete {
+            true => LogSet::open_unexcited(&logged, reading.logs, &[], &every_row, progress)?,
+            false => LogSet::open_for_prediction(&logged, reading.logs, &every_row, progress)?,
+        };
         let thinned = phiw_telemetry::Conditioning::choose(logs.surveys(), &thinned)?;
         let stride = |survey: &Survey| Ok(thinned.plan(survey)?.decimation());
         let strides = logs.surveys().iter().map(stride).collect::<Result<_, Error>>()?;

@@ -43,6 +43,7 @@ pub fn predict(arguments: &PredictArguments, console: &Console) -> Result<Predic
     let reading = Reading {
         logs: &arguments.logs,
         hold: &arguments.hold,
+        complete: false,
         cutoff_hz: arguments.cutoff_hz,
         parallel_cutoff_hz: arguments.parallel_cutoff_hz,
     };
