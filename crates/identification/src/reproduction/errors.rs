@@ -147,7 +147,8 @@ impl Run<'_, '_> {
             }
             window.interpolate(&window.q, self.horizons[horizon], &mut position);
             let errors: Vec<f64> = (0..n).map(|joint| (q[joint] - position[joint]).abs()).collect();
-            let is_lost = errors.iter().zip(self.travel).any(|(error, travel)| !(error <= travel));
+            let mut both = errors.iter().zip(self.travel);
+            let is_lost = both.any(|(error, travel)| error.is_nan() || error > travel);
             if path.lost_from.is_none() && is_lost {
                 path.lost_from = Some(horizon);
             }
