@@ -2,9 +2,13 @@
 //! s.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use phiw_curriculum::selection::{Question, Selection, SmallestCondition, TorqueOptimal};
-use phiw_curriculum::{Candidates, Motion, MotionDataset, Robot, Triangle};
+use phiw_curriculum::motion::{Motion, MotionDataset};
+use phiw_curriculum::selection::{
+    MotionCandidates, Question, Selection, SmallestCondition, TorqueOptimal, Triangle,
+};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+use phiw_effects::Catalogue;
+use phiw_estimation::Robot;
 use phiw_plant::{MultiSine, Reference};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -17,10 +21,10 @@ fn all(criterion: &mut Criterion) {
     let urdf = include_str!("../../../models/upper_body18.urdf");
     let tree = read_urdf(urdf, &UrdfOptions::default()).expect("a URDF").tree;
     let joints = tree.joint_count();
-    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
     let motions = (0..MOTIONS)
         .map(|index| {
-            let sine = MultiSine::random(&tree, 7.0, 0.6, [0.4, 0.4], &mut random);
+            let sine = MultiSine::random(&tree, 7.0, 0.6, [0.4, 0.4], &mut rng);
             let mut signals = [0; 3].map(|_| vec![0.0; SAMPLES * joints]);
             let [q, v, a] = &mut signals;
             for k in 0..SAMPLES {
@@ -31,10 +35,10 @@ fn all(criterion: &mut Criterion) {
         })
         .collect();
     let dataset = MotionDataset::new(joints, motions).expect("a dataset");
-    let robot = Robot::with_viscous_friction(tree, [0.0; 10]).expect("a robot");
+    let robot = Robot::with_viscous_friction(tree, [0.0; 10], Catalogue::default()).expect("a robot");
     let weights = vec![1.0; joints];
     let candidates =
-        Candidates::new(&robot, robot.declared(), &dataset, &weights).expect("motions of this robot");
+        MotionCandidates::new(&robot, robot.declared(), &dataset, &weights).expect("motions of this robot");
     let mut measured = Triangle::empty(candidates.everything().size());
     for candidate in &candidates.all()[..4] {
         measured.absorb(&mut candidate.triangle.clone());
@@ -48,10 +52,10 @@ fn all(criterion: &mut Criterion) {
         history: &[],
     };
     criterion.bench_function("smallest condition, 98 candidates", |bencher| {
-        bencher.iter(|| SmallestCondition.choose(black_box(&question), &mut random));
+        bencher.iter(|| SmallestCondition.choose(black_box(&question), &mut rng));
     });
     criterion.bench_function("torque-optimal, 98 candidates", |bencher| {
-        bencher.iter(|| TorqueOptimal.choose(black_box(&question), &mut random));
+        bencher.iter(|| TorqueOptimal.choose(black_box(&question), &mut rng));
     });
 }
 

@@ -1,19 +1,17 @@
 //! Algorithm 1, lines 10 to 17: select, measure, estimate, relax; and, where the model may grow, look for
 //! what it lacks.
 
-use crate::contest::{rivals_to_separate, unconfirmed};
-use crate::estimation::RowsAt;
+use crate::constraint::Constraint;
+use crate::end::{EndCriterion, FixedCount};
 use crate::experiment::check_noise;
-use crate::growth::Found;
-use crate::planner::{Belief, MeasuredSoFar, Policy, plan};
+use crate::growth::{Found, Growth, Rivalry, rivals_to_separate, unconfirmed};
+use crate::motion::MotionDataset;
+use crate::planner::{Belief, MeasuredSoFar, NoneAllowed, Plan, Policy, plan};
 use crate::random::{Purpose, random};
-use crate::selection::SmallestCondition;
-use crate::triangle::Triangle;
-use crate::{
-    Candidates, ConditionRelaxation, Constraint, CurriculumError, EndCriterion, Estimate, Estimator,
-    Evidence, Experiment, FixedCount, Growth, IterationRecord, Measured, MotionDataset, NoneAllowed, Plan,
-    Relaxation, Rivalry, Robot, RobotModel, Run, Selection,
-};
+use crate::relaxation::{ConditionRelaxation, Relaxation};
+use crate::selection::{MotionCandidates, Selection, SmallestCondition, Triangle};
+use crate::{CurriculumError, CurriculumRun, Experiment, IterationRecord};
+use phiw_estimation::{Estimate, Estimator, Evidence, MotionLog, Robot, RobotModel, RowsAt};
 use phiw_identification::EffectSpec;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -26,7 +24,7 @@ pub struct Curriculum<'a> {
     /// The motions to choose from.
     pub dataset: &'a MotionDataset,
     /// Their factors under the declared model, made once for all runs.
-    pub candidates: &'a Candidates,
+    pub candidates: &'a MotionCandidates,
     /// Where measurements come from.
     pub experiment: &'a dyn Experiment,
     /// Line 12: which motion.
@@ -83,7 +81,7 @@ impl<'a> Curriculum<'a> {
     /// violation instead ([`CurriculumSettings::none_allowed`]).
     pub fn new(
         robot: &'a Robot,
-        (dataset, candidates): (&'a MotionDataset, &'a Candidates),
+        (dataset, candidates): (&'a MotionDataset, &'a MotionCandidates),
         experiment: &'a dyn Experiment,
         constraint: &'a dyn Constraint,
         estimator: &'a dyn Estimator,
@@ -110,8 +108,8 @@ impl<'a> Curriculum<'a> {
     /// As [`Self::step`], or what `saved` returns.
     pub fn run<E: From<CurriculumError>>(
         &self,
-        run: &mut Run,
-        mut saved: impl FnMut(&Run) -> Result<(), E>,
+        run: &mut CurriculumRun,
+        mut saved: impl FnMut(&CurriculumRun) -> Result<(), E>,
     ) -> Result<(), E> {
         while run.ended.is_none() {
             self.step(run)?;
@@ -127,7 +125,7 @@ impl<'a> Curriculum<'a> {
     ///
     /// # Errors
     /// The run is not of this robot, the robot can not be run, or nothing can be estimated.
-    pub fn step(&self, run: &mut Run) -> Result<(), CurriculumError> {
+    pub fn step(&self, run: &mut CurriculumRun) -> Result<(), CurriculumError> {
         check_noise(self.robot, self.experiment, self.estimator)?;
         let Some(plan) = self.plan(run)? else { return Ok(()) };
         let motion = &self.dataset.motions()[plan.choice.motion];
@@ -165,7 +163,9 @@ impl<'a> Curriculum<'a> {
             torque_uncertainty: match &estimate {
                 Some(estimate) => {
                     let candidates = self.candidates_of(&next.model)?;
-                    estimate.uncertainty_along(candidates.everything(), self.dataset.rows())
+                    let everything = candidates.everything();
+                    let covariance = estimate.covariance.as_ref();
+                    covariance.and_then(|known| everything.uncertainty_of(known, self.dataset.rows()))
                 }
                 None => run.history.last().and_then(|record| record.torque_uncertainty),
             },
@@ -184,7 +184,7 @@ impl<'a> Curriculum<'a> {
     }
 
     /// Line 14, and the search for what the model lacks.
-    fn learn(&self, run: &mut Run, measured: &Measured) -> Result<Learning, CurriculumError> {
+    fn learn(&self, run: &mut CurriculumRun, measured: &MotionLog) -> Result<Learning, CurriculumError> {
         let evidence = match run.evidence.take() {
             Some(evidence) => evidence,
             None => Evidence::none(&self.robot.design_of(&run.model)?, self.rows_at)?,
@@ -194,7 +194,7 @@ impl<'a> Curriculum<'a> {
         run.logs.push(measured.clone());
         let mut doubted = open_rivalry(&run.rivals, &run.history).is_some();
         let (mut found, mut believed, mut refuted) = (Found::default(), Vec::new(), Vec::new());
-        // What stood in the place of the answer, and is not true, makes way for it.
+        // Effects that the likelihood refutes are excluded, and the search is repeated without them.
         for _ in 0..self.settings.most_answers {
             found = growth.look(self.robot, &learning.model, &run.logs, doubted, &refuted)?;
             (learning, believed) =
@@ -224,16 +224,19 @@ impl<'a> Curriculum<'a> {
         &self,
         learning: Learning,
         mut effects: Vec<EffectSpec>,
-        logs: &[Measured],
+        logs: &[MotionLog],
         least_gain: f64,
     ) -> Result<(Learning, Vec<EffectSpec>), CurriculumError> {
         let mut with = self.fitted(&learning, &effects, logs)?;
-        while let Some(misfit) = self.misfit(&with)? {
+        while let Some(negative_log_likelihood) = self.negative_log_likelihood(&with)? {
             let (mut gains, mut without) = (Vec::new(), Vec::new());
             for place in 0..effects.len() {
                 let others = [&effects[..place], &effects[place + 1..]].concat();
                 let learning = self.fitted(&learning, &others, logs)?;
-                gains.push(self.misfit(&learning)?.unwrap_or(f64::INFINITY) - misfit);
+                gains.push(
+                    self.negative_log_likelihood(&learning)?.unwrap_or(f64::INFINITY)
+                        - negative_log_likelihood,
+                );
                 without.push(learning);
             }
             let Some(place) = unconfirmed(&gains, least_gain) else { break };
@@ -244,9 +247,13 @@ impl<'a> Curriculum<'a> {
     }
 
     /// −log L of what was learnt, if the estimator knows it.
-    fn misfit(&self, learning: &Learning) -> Result<Option<f64>, CurriculumError> {
+    fn negative_log_likelihood(&self, learning: &Learning) -> Result<Option<f64>, CurriculumError> {
         let design = self.robot.design_of(&learning.model)?;
-        self.estimator.misfit(&design, &learning.evidence, &learning.estimate.parameters)
+        Ok(self.estimator.negative_log_likelihood(
+            &design,
+            &learning.evidence,
+            &learning.estimate.parameters,
+        )?)
     }
 
     /// The same with other `effects` beside the declared ones, fitted to all logs again.
@@ -254,7 +261,7 @@ impl<'a> Curriculum<'a> {
         &self,
         learning: &Learning,
         effects: &[EffectSpec],
-        logs: &[Measured],
+        logs: &[MotionLog],
     ) -> Result<Learning, CurriculumError> {
         let specs = &[self.robot.declared(), effects].concat();
         if learning.model.specs() == *specs {
@@ -270,7 +277,7 @@ impl<'a> Curriculum<'a> {
         &self,
         mut evidence: Evidence,
         present: &RobotModel,
-        logs: &[Measured],
+        logs: &[MotionLog],
     ) -> Result<Learning, CurriculumError> {
         let design = self.robot.design_of(present)?;
         for log in logs {
@@ -286,11 +293,11 @@ impl<'a> Curriculum<'a> {
     ///
     /// # Errors
     /// The belief is of another robot.
-    pub fn candidates_of(&self, model: &RobotModel) -> Result<Cow<'_, Candidates>, CurriculumError> {
+    pub fn candidates_of(&self, model: &RobotModel) -> Result<Cow<'_, MotionCandidates>, CurriculumError> {
         if model.specs() == self.robot.declared() {
             return Ok(Cow::Borrowed(self.candidates));
         }
-        Candidates::of_model(self.robot, model, self.dataset, self.candidates.weights()).map(Cow::Owned)
+        MotionCandidates::of_model(self.robot, model, self.dataset, self.candidates.weights()).map(Cow::Owned)
     }
 
     /// R of all that was measured over the declared parameters, whose cond decides: the next motion (11), and
@@ -299,11 +306,11 @@ impl<'a> Curriculum<'a> {
     /// The columns of effects that were found are left out. With them cond is that of other parameters, in
     /// other units, than before they were found; the offset of a spring is so nearly a weight that cond grows
     /// five-fold, the constraint is never relaxed again, and the same safe motion is asked for until the end.
-    /// What tells effects apart is asked for by rivalry.
+    /// Motions that distinguish effects are chosen by [`Rivalry`].
     ///
     /// # Errors
     /// The run is not of this robot.
-    pub fn measured(&self, run: &Run) -> Result<Option<Triangle>, CurriculumError> {
+    pub fn measured(&self, run: &CurriculumRun) -> Result<Option<Triangle>, CurriculumError> {
         let Some(evidence) = run.evidence.as_ref().filter(|evidence| !evidence.is_empty()) else {
             return Ok(None);
         };
@@ -315,7 +322,7 @@ impl<'a> Curriculum<'a> {
     ///
     /// # Errors
     /// As [`plan()`], or the run is not of this robot or these motions.
-    pub fn plan(&self, run: &Run) -> Result<Option<Plan>, CurriculumError> {
+    pub fn plan(&self, run: &CurriculumRun) -> Result<Option<Plan>, CurriculumError> {
         if run.ended.is_some() {
             return Ok(None);
         }
@@ -364,12 +371,12 @@ fn open_rivalry<'a>(rivals: &'a [Rivalry], history: &[IterationRecord]) -> Optio
 
 /// The first belief of a run: [`RobotModel::unreliable`] about `truth`, the same for the same seed.
 pub fn unreliable_model(truth: &RobotModel, seed: u64) -> RobotModel {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(0);
-    truth.unreliable(&mut random)
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(0);
+    truth.unreliable(&mut rng)
 }
 
-impl Candidates {
+impl MotionCandidates {
     /// RMS over all motions of how far the torques move from one parameter vector to another, over their RMS;
     /// none if they are of different models.
     pub fn torque_change(&self, before: &[f64], after: &[f64]) -> Option<f64> {

@@ -1,6 +1,17 @@
 //! When the curriculum ends.
 
-use crate::{EndReason, IterationRecord};
+use crate::IterationRecord;
+use serde::{Deserialize, Serialize};
+
+/// Why a curriculum ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EndReason {
+    /// The number of iterations that was asked for.
+    Count,
+    /// Another motion would change little.
+    Converged,
+}
 
 /// Decides after each iteration whether it was the last.
 pub trait EndCriterion: Send + Sync {
@@ -69,7 +80,7 @@ impl EndCriterion for Converged {
 ///
 /// [`Converged`] asks what the last motion changed; a dull one changes nothing and ends it. This asks what
 /// the estimate knows of itself ([`IterationRecord::torque_uncertainty`]), and so needs an estimator that
-/// knows its covariance ([`crate::MotionLikelihood`]).
+/// knows its covariance ([`phiw_estimation::MotionLikelihood`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Certain {
     /// Largest RMS standard deviation of the torques that the model predicts for all motions of the dataset,

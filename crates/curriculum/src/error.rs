@@ -1,6 +1,7 @@
 //! What can go wrong in a curriculum.
 
 use phiw_dynamics::DimensionError;
+use phiw_estimation::EstimationError;
 use phiw_identification::{EffectError, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_telemetry::LogError;
@@ -53,23 +54,15 @@ pub enum CurriculumError {
     },
     /// Noise is stated twice.
     #[error(
-        "the estimator counts on a noise of {told} N·m (N) in the torque of {joint}, where the experiment makes {made}: give it the experiment's own torque_noise()"
+        "the estimator counts on a noise of {assumed} N·m (N) in the torque of {joint}, where the experiment makes {made}: give it the experiment's own torque_noise()"
     )]
     Noise {
         /// The joint.
         joint: String,
         /// Standard deviation that the experiment makes \[N·m, N\].
         made: f64,
-        /// Standard deviation that the estimator was told \[N·m, N\].
-        told: f64,
-    },
-    /// A model's effect has no counterpart in a plant.
-    #[error(
-        "no plant is built with {kind} from a model: leave it out there, and add it to the effects of the simulated robot"
-    )]
-    NotSimulated {
-        /// The kind of the effect.
-        kind: String,
+        /// Standard deviation that the estimator assumes \[N·m, N\].
+        assumed: f64,
     },
     /// A saved run is not of this robot or these motions.
     #[error(
@@ -83,6 +76,9 @@ pub enum CurriculumError {
     #[error(transparent)]
     Effect(#[from] EffectError),
     /// The estimate failed.
+    #[error(transparent)]
+    Estimation(#[from] EstimationError),
+    /// A fit failed.
     #[error(transparent)]
     Identification(#[from] IdentificationError),
     /// The robot cannot be run.

@@ -1,13 +1,15 @@
 //! Where measurements come from.
 
-use crate::{CurriculumError, Estimator, Measured, Motion, Robot, RobotModel};
-use rand_chacha::ChaCha8Rng;
+use crate::CurriculumError;
+use crate::motion::Motion;
+use phiw_estimation::{Estimator, MotionLog, Robot, RobotModel};
+use rand::Rng;
 
 /// What happened when a motion was tried.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trial {
     /// The log.
-    pub measured: Measured,
+    pub measured: MotionLog,
     /// When the robot fell, since the motion's start \[s\].
     pub fell_at_s: Option<f64>,
     /// RMS of each joint's tracking error \[rad, m\].
@@ -16,7 +18,7 @@ pub struct Trial {
 
 /// Tries motions on a robot: line 13 of Algorithm 1.
 pub trait Experiment: Send + Sync {
-    /// Lets the robot follow a motion with what is believed of it. The same `random` gives the same trial.
+    /// Lets the robot follow a motion with what is believed of it. The same random numbers give the same trial.
     ///
     /// # Errors
     /// The robot can not be run. A fall is no error.
@@ -25,10 +27,10 @@ pub trait Experiment: Send + Sync {
         robot: &Robot,
         model: &RobotModel,
         motion: &Motion,
-        random: &mut ChaCha8Rng,
+        rng: &mut dyn Rng,
     ) -> Result<Trial, CurriculumError>;
 
-    /// Standard deviation of each torque's noise \[N·m, N\], if it is known. An estimator that is told
+    /// Standard deviation of each torque's noise \[N·m, N\], if it is known. An estimator that assumes
     /// another one is refused.
     fn known_torque_noise(&self) -> Option<Vec<f64>> {
         None
@@ -38,23 +40,23 @@ pub trait Experiment: Send + Sync {
 /// Share by which two statements of one noise may differ: numbers that were written down and read again.
 const ROUNDED: f64 = 1e-6;
 
-/// The noise is stated where it is made. An estimator that takes it for another weighs what it measures
-/// wrongly, and nothing else would tell.
+/// The experiment states the noise that it makes. An estimator that assumes another one weights its
+/// measurements wrongly, and nothing else would show it.
 ///
 /// # Errors
-/// The experiment knows the noise of a torque, and the estimator is told another one. Where there is no noise
+/// The experiment knows the noise of a torque, and the estimator is assumed another one. Where there is no noise
 /// any will do: it stands for rounding.
 pub(crate) fn check_noise(
     robot: &Robot,
     experiment: &dyn Experiment,
     estimator: &dyn Estimator,
 ) -> Result<(), CurriculumError> {
-    let (Some(made), Some(told)) = (experiment.known_torque_noise(), estimator.torque_noise()) else {
+    let (Some(made), Some(assumed)) = (experiment.known_torque_noise(), estimator.torque_noise()) else {
         return Ok(());
     };
-    for ((joint, &made), &told) in robot.tree().joint_names().zip(&made).zip(told) {
-        if made > 0.0 && (told / made - 1.0).abs() > ROUNDED {
-            return Err(CurriculumError::Noise { joint: joint.to_owned(), made, told });
+    for ((joint, &made), &assumed) in robot.tree().joint_names().zip(&made).zip(assumed) {
+        if made > 0.0 && (assumed / made - 1.0).abs() > ROUNDED {
+            return Err(CurriculumError::Noise { joint: joint.to_owned(), made, assumed });
         }
     }
     Ok(())

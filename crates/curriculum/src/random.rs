@@ -12,7 +12,7 @@ pub(crate) enum Purpose {
 
 /// The stream of an iteration for a purpose.
 pub(crate) fn random(seed: u64, iteration: usize, purpose: Purpose) -> ChaCha8Rng {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(16 * (iteration as u64 + 1) + purpose as u64);
-    random
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(16 * (iteration as u64 + 1) + purpose as u64);
+    rng
 }

@@ -1,7 +1,9 @@
 //! What is written down of an iteration, and of a run: everything that is needed to go on.
 
+use crate::end::EndReason;
+use crate::growth::Rivalry;
 use crate::selection::Choice;
-use crate::{Evidence, Measured, Rivalry, RobotModel};
+use phiw_estimation::{Evidence, MotionLog, RobotModel};
 use serde::{Deserialize, Serialize};
 
 /// One iteration.
@@ -35,8 +37,8 @@ pub struct IterationRecord {
     /// RMS over all motions of the dataset of how far the model's torques have moved in this iteration, over
     /// their RMS; none where the model has grown.
     pub torque_change: Option<f64>,
-    /// The two beliefs that the motion was chosen to tell apart, in words; none if it was chosen for what it
-    /// tells of the parameters.
+    /// The two beliefs that the motion was chosen to tell apart, in words; none if it was chosen for the
+    /// parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub separates: Option<[String; 2]>,
     /// The belief after this iteration.
@@ -45,21 +47,11 @@ pub struct IterationRecord {
     pub standard_deviations: Vec<Option<f64>>,
 }
 
-/// Why a curriculum ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum EndReason {
-    /// The number of iterations that was asked for.
-    Count,
-    /// Another motion would change little.
-    Converged,
-}
-
 /// A run of a curriculum: all that is needed to go on with it, to the last bit.
 ///
 /// It is a plain value. Whoever keeps it in a file after each iteration can be killed at any moment.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Run {
+pub struct CurriculumRun {
     /// Seed of all that is random in it.
     pub seed: u64,
     /// The first belief.
@@ -71,7 +63,7 @@ pub struct Run {
     /// All that was measured; none before the first measurement, and once the run has ended.
     pub evidence: Option<Evidence>,
     /// The logs themselves, where the model may grow: new columns need them.
-    pub logs: Vec<Measured>,
+    pub logs: Vec<MotionLog>,
     /// Beliefs that the logs can not tell apart; the next motion is to separate them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rivals: Vec<Rivalry>,
@@ -83,10 +75,10 @@ pub struct Run {
     pub ended: Option<EndReason>,
 }
 
-impl Run {
+impl CurriculumRun {
     /// A run that begins with a belief.
     pub fn new(seed: u64, initial: RobotModel) -> Self {
-        Run {
+        CurriculumRun {
             seed,
             model: initial.clone(),
             initial,

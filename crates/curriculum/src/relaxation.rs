@@ -1,6 +1,6 @@
 //! How the constraint is relaxed from iteration to iteration: section 5.2.2.
 
-use crate::Safety;
+use crate::constraint::Safety;
 
 /// Gives the reduction coefficient α of each iteration.
 pub trait Relaxation: Send + Sync {
@@ -146,7 +146,7 @@ impl Relaxation for ConditionRelaxation {
 /// stays at its second value however well the model predicts. The uncertainty of Φ·w over all motions, floor
 /// wrenches included where the base floats, counts each direction as much as the motions feel it.
 ///
-/// It needs an estimator that knows its covariance ([`crate::MotionLikelihood`]); with others α stays at
+/// It needs an estimator that knows its covariance ([`phiw_estimation::MotionLikelihood`]); with others α stays at
 /// α_max.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UncertaintyRelaxation {

@@ -1,7 +1,15 @@
 //! The decisions of a curriculum as tables of cases.
 
+use phiw_curriculum::IterationRecord;
+use phiw_curriculum::constraint::Safety;
+use phiw_curriculum::end::{Certain, Converged, EndCriterion, EndReason, FixedCount};
+use phiw_curriculum::growth::{rivals_to_separate, unconfirmed};
+use phiw_curriculum::planner::{NoneAllowed, Permission, permission};
+use phiw_curriculum::relaxation::{
+    ConditionRelaxation, ConstantReduction, Learnt, Maximum, Relaxation, Scale, UncertaintyRelaxation,
+};
 use phiw_curriculum::selection::Choice;
-use phiw_curriculum::*;
+use phiw_estimation::RobotModel;
 
 fn safety(reductions: &[f64]) -> Vec<Safety> {
     reductions
@@ -163,7 +171,7 @@ fn a_curriculum_stops_when_its_criterion_says_so() {
 
 #[test]
 fn the_best_motion_is_chosen_by_its_score() {
-    use selection::{Best, Scored, decide};
+    use phiw_curriculum::selection::{Best, Scored, decide};
     let (nan, infinite) = (f64::NAN, f64::INFINITY);
     // Motions and scores, which end is best, the best motion and the next.
     type Case<'a> = (&'a [(usize, f64)], Best, Option<(usize, Option<usize>)>);
@@ -187,54 +195,6 @@ fn the_best_motion_is_chosen_by_its_score() {
         let scored: Vec<Scored> = scores.iter().map(|&(motion, score)| Scored { motion, score }).collect();
         let found = decide(&scored, *best).map(|choice| (choice.motion, choice.runner_up.map(|next| next.0)));
         assert_eq!(found, *expected, "{scores:?} {best:?}");
-    }
-}
-
-#[test]
-fn as_many_effects_are_fitted_as_are_near_the_best() {
-    let settings = ScoreTestSettings { least_merit: 5.0, near: 0.6, most_near: 3, ..Default::default() };
-    let cases: &[(&[f64], usize)] = &[
-        (&[], 0),
-        (&[4.9], 0),
-        (&[5.0], 1),
-        (&[10.0, 6.0, 5.9], 2),
-        (&[10.0, 9.0, 8.0, 7.0], 3),
-        // One that is not worth its price alone is fitted all the same: its score is rough.
-        (&[6.0, 4.0], 2),
-        (&[f64::NAN], 0),
-    ];
-    for (merits, expected) in cases {
-        assert_eq!(settings.shortlist(merits), *expected, "{merits:?}");
-    }
-}
-
-#[test]
-fn the_simplest_of_those_that_explain_alike_is_believed() {
-    let settings = ScoreTestSettings { least_merit: 5.0, alike: 3.0, least_rival: 0.1, ..Default::default() };
-    // Merits and sizes, who is believed, and who is nearly as likely.
-    type Case<'a> = (&'a [(f64, usize)], Option<(usize, &'a [usize])>);
-    let cases: &[Case<'_>] = &[
-        (&[], None),
-        (&[(4.9, 1)], None),
-        (&[(f64::NAN, 1)], None),
-        (&[(f64::NEG_INFINITY, 1), (9.0, 4)], Some((1, &[]))),
-        (&[(9.0, 1)], Some((0, &[]))),
-        (&[(9.0, 1), (20.0, 3)], Some((1, &[]))),
-        // Three less, and simpler.
-        (&[(17.0, 1), (20.0, 3)], Some((0, &[1]))),
-        (&[(16.9, 1), (20.0, 3)], Some((1, &[]))),
-        // Equally simple: the likelier one; ln 10 = 2.3 less is a chance of one in ten.
-        (&[(18.0, 2), (20.0, 2)], Some((1, &[0]))),
-        (&[(17.6, 2), (20.0, 2)], Some((1, &[]))),
-        (&[(19.0, 2), (20.0, 3), (19.5, 2)], Some((2, &[1, 0]))),
-        // What is not worth its price is neither believed nor a rival.
-        (&[(4.0, 1), (6.0, 2)], Some((1, &[]))),
-    ];
-    for (contenders, expected) in cases {
-        let list: Vec<Contender> =
-            contenders.iter().map(|&(merit, size)| Contender { merit, size }).collect();
-        let expected = expected.map(|(winner, rivals)| Winner { winner, rivals: rivals.to_vec() });
-        assert_eq!(settings.contest(&list), expected, "{contenders:?}");
     }
 }
 

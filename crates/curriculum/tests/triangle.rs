@@ -1,16 +1,16 @@
 //! Small triangles against the full factor and the full singular value decomposition.
 
 use faer::linalg::solvers::DenseSolveCore;
-use phiw_curriculum::Triangle;
+use phiw_curriculum::selection::Triangle;
 use phiw_regressor::factor::Factor;
 use proptest::prelude::*;
 
 /// A factor of random rows, column k scaled by 10^(−spread·k/size), and its right-hand side.
 fn factor(size: usize, rows: usize, seed: u64, spread: f64) -> Factor {
-    let mut random = phiw_dynamics::random_tree::RandomNumbers::new(seed);
+    let mut rng = phiw_dynamics::random_tree::RandomNumbers::new(seed);
     let scale = |column: usize| 10f64.powf(-spread * column as f64 / size as f64);
     let entries: Vec<f64> =
-        (0..rows * (size + 1)).map(|index| random.uniform(-1.0, 1.0) * scale(index % (size + 1))).collect();
+        (0..rows * (size + 1)).map(|index| rng.uniform(-1.0, 1.0) * scale(index % (size + 1))).collect();
     Factor::of_rows(size + 1, &entries).unwrap()
 }
 

@@ -1,10 +1,12 @@
 //! The catalogue finds kinds of effects by name, declares them for a robot, and builds them from a model's
 //! file.
 
-use crate::{Constants, EffectKind, FittedEffect, JointProperty, Mechanisms, SignalRanges};
+use crate::{Constants, EffectKind, FittedEffect, Mechanisms, SignalRanges};
 use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Variants};
+use phiw_identification::{
+    Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, JointProperty, Variants,
+};
 
 /// Kinds of effects by name, in the order of simplicity: of two that explain alike, the earlier is preferred.
 pub struct Catalogue {
@@ -69,11 +71,6 @@ impl Catalogue {
         })
     }
 
-    /// The property of a joint that expresses an effect, if its kind is known and has one.
-    pub fn joint_property(&self, spec: &EffectSpec) -> Option<JointProperty> {
-        self.kind(&spec.kind).ok()?.joint_property()
-    }
-
     /// What in a simulator's model does what an effect does, with its fitted values; nothing for a kind that
     /// is unknown here.
     pub fn mechanisms(
@@ -134,5 +131,9 @@ impl EffectCatalogue for Catalogue {
             });
         }
         Ok(kind.build(tree, &site, &spec.constants))
+    }
+
+    fn joint_property(&self, spec: &EffectSpec) -> Option<JointProperty> {
+        self.kind(&spec.kind).ok()?.joint_property()
     }
 }

@@ -3,10 +3,10 @@
 use crate::columns::{ParameterKind, smooth_sign};
 use crate::fitted::FittedEffect;
 use crate::friction::WIDTH;
-use crate::kind::{Constants, EffectKind, JointProperty, SignalRanges, constant, product, values};
+use crate::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
 use crate::mechanism::{Mechanism, Mechanisms};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, Sample};
+use phiw_identification::{Effect, EffectParameter, EffectSpec, Entry, Evaluator, JointProperty, Sample};
 
 /// Torque at one joint from the motion of another, both ways or one way.
 ///

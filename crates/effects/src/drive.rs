@@ -2,10 +2,10 @@
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, JointProperty, Signal};
+use crate::kind::{Constants, EffectKind, Signal};
 use crate::mechanism::{Mechanism, Mechanisms};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, Needs, Sample};
+use phiw_identification::{Effect, JointProperty, Needs, Sample};
 
 /// Ia·q̈.
 pub struct RotorInertia;

@@ -2,11 +2,9 @@
 
 use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
 use crate::fitted::FittedEffect;
-use crate::kind::{
-    Constants, EffectKind, JointProperty, Signal, SignalRanges, around, constant, product, values,
-};
+use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, product, values};
 use phiw_dynamics::Tree;
-use phiw_identification::{Effect, Needs, Sample};
+use phiw_identification::{Effect, JointProperty, Needs, Sample};
 
 /// The constant of every smoothed sign: the speed over which it turns \[rad/s, m/s\].
 pub(crate) const WIDTH: &str = "sign_width";

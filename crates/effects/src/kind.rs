@@ -3,7 +3,7 @@
 use crate::FittedEffect;
 use crate::mechanism::{Mechanism, Mechanisms};
 use phiw_dynamics::Tree;
-use phiw_identification::Effect;
+use phiw_identification::{Effect, JointProperty};
 use phiw_telemetry::Survey;
 use std::collections::BTreeMap;
 
@@ -23,17 +23,6 @@ pub enum Signal {
     Torque,
     /// Time \[s\].
     Time,
-}
-
-/// A property of a joint by which simulators express an effect.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum JointProperty {
-    /// Torque against the velocity, over it \[N·m·s/rad, N·s/m\]; `damping` of a URDF.
-    Damping,
-    /// Torque against the direction of motion \[N·m, N\]; `friction` of a URDF.
-    Friction,
-    /// Inertia that the joint's own motion alone feels \[kg·m², kg\]; a URDF has no place for it.
-    Armature,
 }
 
 /// A kind of effect: where it can act, which constants to try, how to build it, and what the rest of the

@@ -18,5 +18,5 @@ mod sensing;
 pub use catalogue::Catalogue;
 pub use columns::{Formula, OwnTorque, ParameterKind, smooth_sign};
 pub use fitted::{FittedEffect, sentence};
-pub use kind::{Constants, EffectKind, JointProperty, JointRange, Signal, SignalRanges};
+pub use kind::{Constants, EffectKind, JointRange, Signal, SignalRanges};
 pub use mechanism::{Mechanism, Mechanisms};

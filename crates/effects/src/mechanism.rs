@@ -1,6 +1,6 @@
 //! How effects are expressed in the model of a simulator.
 
-use crate::JointProperty;
+use phiw_identification::JointProperty;
 
 /// A part of a simulator's model that does what an effect does. Joints are named.
 #[derive(Clone, Debug, PartialEq)]

@@ -110,6 +110,17 @@ pub trait Evaluator {
     fn evaluate(&mut self, sample: &Sample<'_>, columns: &mut [f64]);
 }
 
+/// A property of a joint by which simulators express an effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointProperty {
+    /// Torque against the velocity, over it \[N·m·s/rad, N·s/m\]; `damping` of a URDF.
+    Damping,
+    /// Torque against the direction of motion \[N·m, N\]; `friction` of a URDF.
+    Friction,
+    /// Inertia that the joint's own motion alone feels \[kg·m², kg\]; a URDF has no place for it.
+    Armature,
+}
+
 /// Builds effects by name.
 pub trait EffectCatalogue: Sync {
     /// Builds an effect.
@@ -117,6 +128,10 @@ pub trait EffectCatalogue: Sync {
     /// # Errors
     /// The kind, a joint or a constant is unknown.
     fn build(&self, spec: &EffectSpec, tree: &Tree) -> Result<Box<dyn Effect>, EffectError>;
+    /// The property of a joint that expresses an effect; none if its kind is unknown or has none.
+    fn joint_property(&self, _spec: &EffectSpec) -> Option<JointProperty> {
+        None
+    }
 }
 
 /// An effect that cannot be built.

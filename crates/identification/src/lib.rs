@@ -30,7 +30,9 @@ pub use block_source::{BlockSource, try_for_each_block};
 pub use checks::{InputError, check_excitation, check_logs, check_size_of_factors, check_size_of_robot};
 pub use covariance::{Covariance, CovarianceSource};
 pub use design::{Design, DesignScratch, RowLayout};
-pub use effect::{Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Entry, Evaluator};
+pub use effect::{
+    Effect, EffectCatalogue, EffectError, EffectParameter, EffectSpec, Entry, Evaluator, JointProperty,
+};
 pub use error::IdentificationError;
 pub use factor_rows::FactorRows;
 pub use fit::{Fit, TorqueError, fit, merge, tells_of_torques, torque_error};

@@ -3,8 +3,7 @@
 use crate::session::Session;
 use crate::traces::Traces;
 use crate::{Error, fingerprint, warnings};
-use phiw_effects::JointProperty;
-use phiw_identification::{Data, EffectSpec, Identified, Model, merge};
+use phiw_identification::{Data, EffectCatalogue, EffectSpec, Identified, JointProperty, Model, merge};
 use phiw_regressor::RegressorError;
 
 /// A residual up to this many times the noise floor is noise.

@@ -2,6 +2,7 @@
 
 use phiw_curriculum::CurriculumError;
 use phiw_dynamics::urdf::UrdfError;
+use phiw_estimation::EstimationError;
 use phiw_identification::{EffectError, IdentificationError, InputError};
 use phiw_result_folder::ResultError;
 use phiw_telemetry::LogError;
@@ -265,7 +266,7 @@ pub enum Error {
         /// The support file.
         path: PathBuf,
         /// What is wrong with it.
-        source: Box<phiw_curriculum::StanceError>,
+        source: Box<phiw_curriculum::constraint::StanceError>,
     },
     /// Every motion would topple the robot.
     #[error("{0} (--model takes one)")]
@@ -346,6 +347,12 @@ impl Error {
             | Error::IdentifiedMjcf(_)
             | Error::Json { .. } => 1,
         }
+    }
+}
+
+impl From<EstimationError> for Error {
+    fn from(error: EstimationError) -> Self {
+        CurriculumError::from(error).into()
     }
 }
 

@@ -1,7 +1,8 @@
 //! What of an identified model goes into the files that other programs read, and what does not.
 
 use crate::analysis::Analysis;
-use phiw_effects::{JointProperty, Mechanism};
+use phiw_effects::Mechanism;
+use phiw_identification::{EffectCatalogue, JointProperty};
 use phiw_mjcf::{FixedTendon, JointModel};
 
 /// How far below zero what is left of a property may be by rounding.

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::analysis::Analysis;
 use crate::exported::{LeftOut, MARK, fitted, header};
 use phiw_dynamics::urdf::{JointFriction, write_identified_urdf};
-use phiw_effects::JointProperty;
+use phiw_identification::{EffectCatalogue, JointProperty};
 
 /// Properties of a joint that URDF's `<dynamics>` has: damping and friction.
 const EXPRESSED: [JointProperty; 2] = [JointProperty::Damping, JointProperty::Friction];

@@ -11,12 +11,11 @@ use crate::console::Console;
 use crate::output::check_file;
 use crate::{Error, session};
 use estimate::Present;
+use phiw_curriculum::constraint::{Constraint, MotionMargin, Unconstrained, ZmpConstraint};
+use phiw_curriculum::planner::{Belief, MeasuredSoFar, Plan, Policy, plan};
+use phiw_curriculum::relaxation::{ConditionRelaxation, ConstantReduction, Relaxation};
 use phiw_curriculum::selection::SmallestCondition;
-use phiw_curriculum::{
-    Belief, Constraint, CurriculumError, CurriculumSettings, MeasuredSoFar, MotionMargin, Plan, Policy,
-    Relaxation, Unconstrained, ZmpConstraint, plan,
-};
-use phiw_curriculum::{ConditionRelaxation, ConstantReduction};
+use phiw_curriculum::{CurriculumError, CurriculumSettings};
 use phiw_result_folder::{Disk, Lock, ResultFile, check_inputs, replace_files};
 use standing::Standing;
 use std::path::PathBuf;

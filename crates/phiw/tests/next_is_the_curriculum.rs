@@ -5,10 +5,21 @@ mod next_scene;
 mod synthetic;
 
 use next_scene::{JOINTS, Scene, tree, urdf};
-use phiw_curriculum::selection::{Choice, SmallestCondition};
-use phiw_curriculum::*;
+use phiw_curriculum::constraint::ZmpConstraint;
+use phiw_curriculum::end::FixedCount;
+use phiw_curriculum::motion::{Motion, MotionDataset};
+use phiw_curriculum::planner::Plan;
+use phiw_curriculum::relaxation::ConditionRelaxation;
+use phiw_curriculum::selection::{Choice, MotionCandidates, SmallestCondition};
+use phiw_curriculum::{
+    Curriculum, CurriculumError, CurriculumRun, CurriculumSettings, Experiment, IterationRecord, Trial,
+};
 use phiw_dynamics::Tree;
 use phiw_effects::{Catalogue, SignalRanges};
+use phiw_estimation::{
+    BayesianLeastSquares, Estimator, Evidence, LeastSquares, LogNoise, ParameterPrior, Robot, RobotModel,
+    RowsAt,
+};
 use phiw_identification::{BlockSource, Data, LogSet, fit, identify, merge, with_masses};
 use phiw_telemetry::{ConditioningOptions, Recording, TorqueColumns};
 use phiw_zmp::{Stance, SupportPolygon};
@@ -23,7 +34,7 @@ impl Experiment for Nobody {
         _: &Robot,
         _: &RobotModel,
         _: &Motion,
-        _: &mut rand_chacha::ChaCha8Rng,
+        _: &mut dyn rand::Rng,
     ) -> Result<Trial, CurriculumError> {
         unreachable!("a plan moves nothing")
     }
@@ -36,22 +47,24 @@ const URDF_ERROR: f64 = 0.3;
 fn curriculum_plan(scene: &Scene, logs: &[&str], size: f64) -> Result<Plan, CurriculumError> {
     let fixed = tree(&urdf(), false);
     let base_link = tree(&urdf(), true).bodies()[0].inertial;
-    let robot = Robot::with_viscous_friction(fixed.clone(), base_link)?;
+    let robot = Robot::with_viscous_friction(fixed.clone(), base_link, Catalogue::default())?;
     let dataset = MotionDataset::new(JOINTS, motions(scene, &fixed))?;
     let initial = RobotModel { standard: with_masses(&fixed), ..robot.truth(&[0.0; JOINTS])? };
-    let mut run = Run::new(0, initial.clone());
+    let mut run = CurriculumRun::new(0, initial.clone());
     let candidates = if logs.is_empty() {
         // The friction of a robot that has not moved yet has columns all the same.
-        Candidates::new(&robot, robot.declared(), &dataset, &[1.0; JOINTS])?
+        MotionCandidates::new(&robot, robot.declared(), &dataset, &[1.0; JOINTS])?
     } else {
         let (noise, evidence) = measured(scene, &fixed, logs);
         let design = robot.design(robot.declared())?;
-        let estimator =
-            BayesianLeastSquares { noise, prior: Prior { model: initial.clone(), share: URDF_ERROR } };
+        let estimator = BayesianLeastSquares {
+            noise,
+            prior: ParameterPrior { model: initial.clone(), share: URDF_ERROR },
+        };
         let all = evidence.last().unwrap().clone();
         let estimate = estimator.estimate(&design, &all, &initial, &initial.parameters(&robot)?)?;
         run.model = initial.with_parameters(&robot, robot.declared(), &estimate.parameters)?;
-        let candidates = Candidates::new(&robot, robot.declared(), &dataset, &[1.0; JOINTS])?;
+        let candidates = MotionCandidates::new(&robot, robot.declared(), &dataset, &[1.0; JOINTS])?;
         for evidence in &evidence {
             run.history.push(record(candidates.measured(evidence)?.condition_number(), &run.model));
         }

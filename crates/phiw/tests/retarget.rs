@@ -237,7 +237,7 @@ fn what_retarget_writes_has_no_jumps() {
         for file in names(&path(derivatives)).iter().filter(|name| name.ends_with(".csv")) {
             let log =
                 Recording::from_csv(&path(derivatives).join(file), &joints, TorqueColumns::Absent).unwrap();
-            phiw_curriculum::Motion::from_recording(file, "", &log).unwrap();
+            phiw_curriculum::motion::Motion::from_recording(file, "", &log).unwrap();
         }
     }
 }

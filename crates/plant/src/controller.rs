@@ -121,7 +121,7 @@ impl Gains {
     /// Critically damped gains that stay stable when commands are held for `period_s` \[s\].
     ///
     /// `inertia` is what each joint feels \[kg·m², kg\], as [`apparent_inertia`] or
-    /// [`least_apparent_inertia`] tells, and `viscous` the viscous friction that damps it already
+    /// [`least_apparent_inertia`] computes it, and `viscous` the viscous friction that damps it already
     /// \[N·m·s/rad, N·s/m\]; none if empty.
     ///
     /// # Errors
@@ -284,8 +284,8 @@ mod tests {
     fn the_least_inertia_is_below_that_of_each_configuration() -> Result<(), Box<dyn std::error::Error>> {
         use phiw_dynamics::random_tree::{RandomNumbers, random_state};
         let tree = random_tree(5, &RandomTreeOptions::default())?;
-        let mut random = RandomNumbers::new(2);
-        let poses: Vec<Vec<f64>> = (0..10).map(|_| random_state(&tree, &mut random).q).collect();
+        let mut rng = RandomNumbers::new(2);
+        let poses: Vec<Vec<f64>> = (0..10).map(|_| random_state(&tree, &mut rng).q).collect();
         let least = least_apparent_inertia(&tree, &[], poses.iter().cloned())?;
         let felt = poses.iter().map(|q| apparent_inertia(&tree, &[], q)).collect::<Result<Vec<_>, _>>()?;
         for joint in 0..tree.joint_count() {

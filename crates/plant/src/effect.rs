@@ -11,7 +11,7 @@ use phiw_dynamics::Tree;
 /// in the robot's order, bodies indices in [`Tree::bodies`]. The torque is what the joint must deliver on top
 /// of the rigid body's.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Effect {
+pub enum PlantEffect {
     /// A friction of the joint's speed.
     Friction {
         /// The joint.
@@ -47,14 +47,14 @@ pub enum Effect {
         /// The torque.
         torque: f64,
     },
-    /// The actuator delivers 1/(1 + share) of what it is told, which is what the log says.
+    /// The actuator delivers 1/(1 + share) of the command; the log has the command.
     TorqueGain {
         /// The joint.
         joint: usize,
         /// ε, above −1.
         share: f64,
     },
-    /// The actuator delivers no more than this; the log has what it was told.
+    /// The actuator delivers no more than this; the log has the command.
     Saturation {
         /// The joint.
         joint: usize,
@@ -167,25 +167,25 @@ impl Coupling {
     }
 }
 
-impl Effect {
+impl PlantEffect {
     /// The name of its kind in `report.json` and `--declare`.
     pub fn kind(&self) -> &'static str {
         match self {
-            Effect::Friction { law, .. } => law.kind(),
-            Effect::Presliding { .. } => "hysteresis",
-            Effect::Mechanism { law, .. } => law.kind(),
-            Effect::RotorInertia { .. } => "rotor_inertia",
-            Effect::TorqueOffset { .. } => "torque_offset",
-            Effect::TorqueGain { .. } => "torque_gain",
-            Effect::Saturation { .. } => "actuator_saturation",
-            Effect::Coupling(_) => "transmission_coupling",
-            Effect::Flexibility { backlash, .. } if *backlash > 0.0 => "hysteresis",
-            Effect::Flexibility { .. } => "joint_elasticity",
-            Effect::Payload { .. } => "payload",
-            Effect::GravityTilt { .. } => "gravity_tilt",
-            Effect::ExternalForce { .. } => "external_force",
-            Effect::EncoderOffset { .. } => "encoder_offset",
-            Effect::TimeDelay { .. } => "time_delay",
+            PlantEffect::Friction { law, .. } => law.kind(),
+            PlantEffect::Presliding { .. } => "hysteresis",
+            PlantEffect::Mechanism { law, .. } => law.kind(),
+            PlantEffect::RotorInertia { .. } => "rotor_inertia",
+            PlantEffect::TorqueOffset { .. } => "torque_offset",
+            PlantEffect::TorqueGain { .. } => "torque_gain",
+            PlantEffect::Saturation { .. } => "actuator_saturation",
+            PlantEffect::Coupling(_) => "transmission_coupling",
+            PlantEffect::Flexibility { backlash, .. } if *backlash > 0.0 => "hysteresis",
+            PlantEffect::Flexibility { .. } => "joint_elasticity",
+            PlantEffect::Payload { .. } => "payload",
+            PlantEffect::GravityTilt { .. } => "gravity_tilt",
+            PlantEffect::ExternalForce { .. } => "external_force",
+            PlantEffect::EncoderOffset { .. } => "encoder_offset",
+            PlantEffect::TimeDelay { .. } => "time_delay",
         }
     }
 
@@ -197,19 +197,19 @@ impl Effect {
             joint.and_then(|name| tree.joint_index(name)).into_iter().collect()
         };
         match self {
-            Effect::Friction { joint, .. }
-            | Effect::Presliding { joint, .. }
-            | Effect::Mechanism { joint, .. }
-            | Effect::RotorInertia { joint, .. }
-            | Effect::TorqueOffset { joint, .. }
-            | Effect::TorqueGain { joint, .. }
-            | Effect::Saturation { joint, .. }
-            | Effect::Flexibility { joint, .. }
-            | Effect::EncoderOffset { joint, .. } => vec![*joint],
-            Effect::Coupling(coupling) => coupling.joints().to_vec(),
-            Effect::TimeDelay { joints, .. } => joints.clone(),
-            Effect::Payload { body, .. } | Effect::ExternalForce { body, .. } => of_body(*body),
-            Effect::GravityTilt { .. } => Vec::new(),
+            PlantEffect::Friction { joint, .. }
+            | PlantEffect::Presliding { joint, .. }
+            | PlantEffect::Mechanism { joint, .. }
+            | PlantEffect::RotorInertia { joint, .. }
+            | PlantEffect::TorqueOffset { joint, .. }
+            | PlantEffect::TorqueGain { joint, .. }
+            | PlantEffect::Saturation { joint, .. }
+            | PlantEffect::Flexibility { joint, .. }
+            | PlantEffect::EncoderOffset { joint, .. } => vec![*joint],
+            PlantEffect::Coupling(coupling) => coupling.joints().to_vec(),
+            PlantEffect::TimeDelay { joints, .. } => joints.clone(),
+            PlantEffect::Payload { body, .. } | PlantEffect::ExternalForce { body, .. } => of_body(*body),
+            PlantEffect::GravityTilt { .. } => Vec::new(),
         }
     }
 
@@ -219,14 +219,14 @@ impl Effect {
         let place = |what, index, count| {
             if index < count { Ok(()) } else { Err(PlantError::NoSuchPlace { kind, what, index, count }) }
         };
-        if let Effect::Payload { body, .. } | Effect::ExternalForce { body, .. } = self {
+        if let PlantEffect::Payload { body, .. } | PlantEffect::ExternalForce { body, .. } = self {
             place("body", *body, tree.bodies().len())?;
         }
         for joint in self.joints(tree) {
             place("joint", joint, tree.joint_count())?;
         }
         self.numbers().check(kind)?;
-        if let Effect::Coupling(coupling) = self {
+        if let PlantEffect::Coupling(coupling) = self {
             let [one, other] = coupling.joints();
             check_value(
                 || format!("the second joint of {kind}"),
@@ -236,7 +236,7 @@ impl Effect {
             )?;
         }
         match self {
-            Effect::ExternalForce { .. } if tree.is_floating() => Err(PlantError::ForceOnFloatingBase),
+            PlantEffect::ExternalForce { .. } if tree.is_floating() => Err(PlantError::ForceOnFloatingBase),
             _ => Ok(()),
         }
     }
@@ -244,54 +244,54 @@ impl Effect {
     fn numbers(&self) -> Numbers {
         let mut numbers = Numbers::default();
         match self {
-            Effect::Friction { law, .. } => numbers = law.numbers(),
-            Effect::Mechanism { law, .. } => numbers = law.numbers(),
-            Effect::Presliding { law: Presliding::MaxwellSlip { elements }, .. } => {
+            PlantEffect::Friction { law, .. } => numbers = law.numbers(),
+            PlantEffect::Mechanism { law, .. } => numbers = law.numbers(),
+            PlantEffect::Presliding { law: Presliding::MaxwellSlip { elements }, .. } => {
                 numbers.positive = elements
                     .iter()
                     .flat_map(|&[way, torque]| [("yield way", way), ("slip torque", torque)])
                     .collect();
             }
-            Effect::Presliding { law: Presliding::LuGre { torque, way }, .. } => {
+            PlantEffect::Presliding { law: Presliding::LuGre { torque, way }, .. } => {
                 numbers.positive = vec![("torque", *torque), ("way", *way)];
             }
-            Effect::RotorInertia { inertia, .. } => numbers.not_negative = vec![("inertia", *inertia)],
-            Effect::TorqueOffset { torque, .. } => numbers.free = vec![("torque", *torque)],
-            Effect::TorqueGain { share, .. } => numbers.positive = vec![("1 + share", 1.0 + share)],
-            Effect::Saturation { torque, .. } => numbers.positive = vec![("torque", *torque)],
-            Effect::Coupling(
+            PlantEffect::RotorInertia { inertia, .. } => numbers.not_negative = vec![("inertia", *inertia)],
+            PlantEffect::TorqueOffset { torque, .. } => numbers.free = vec![("torque", *torque)],
+            PlantEffect::TorqueGain { share, .. } => numbers.positive = vec![("1 + share", 1.0 + share)],
+            PlantEffect::Saturation { torque, .. } => numbers.positive = vec![("torque", *torque)],
+            PlantEffect::Coupling(
                 Coupling::SharedFriction { coefficient, torque, width, .. }
                 | Coupling::Driven { coefficient, torque, width, .. },
             ) => {
                 // A driven joint may feel the driver either way round; friction takes energy.
                 let sizes = vec![("coefficient", *coefficient), ("torque", *torque)];
                 match self {
-                    Effect::Coupling(Coupling::Driven { .. }) => numbers.free = sizes,
+                    PlantEffect::Coupling(Coupling::Driven { .. }) => numbers.free = sizes,
                     _ => numbers.not_negative = sizes,
                 }
                 numbers.positive = vec![("width", *width)];
             }
-            Effect::Coupling(Coupling::SharedInertia { inertia, .. }) => {
+            PlantEffect::Coupling(Coupling::SharedInertia { inertia, .. }) => {
                 numbers.free = vec![("inertia", *inertia)]
             }
-            Effect::Flexibility { stiffness, damping, backlash, .. } => {
+            PlantEffect::Flexibility { stiffness, damping, backlash, .. } => {
                 numbers.not_negative = vec![("damping", *damping), ("backlash", *backlash)];
                 numbers.positive = vec![("stiffness", *stiffness)];
             }
-            Effect::Payload { mass, center, radii, .. } => {
+            PlantEffect::Payload { mass, center, radii, .. } => {
                 numbers.free = center.map(|x| ("centre", x)).to_vec();
                 numbers.not_negative = radii.map(|x| ("radius of gyration", x)).to_vec();
                 numbers.positive = vec![("mass", *mass)];
             }
-            Effect::GravityTilt { heading, angle } => {
+            PlantEffect::GravityTilt { heading, angle } => {
                 numbers.free = vec![("heading", *heading), ("angle", *angle)]
             }
-            Effect::ExternalForce { point, force, .. } => {
+            PlantEffect::ExternalForce { point, force, .. } => {
                 numbers.free =
                     point.map(|x| ("point", x)).into_iter().chain(force.map(|x| ("force", x))).collect();
             }
-            Effect::EncoderOffset { angle, .. } => numbers.free = vec![("angle", *angle)],
-            Effect::TimeDelay { delay_s, .. } => numbers.free = vec![("delay", *delay_s)],
+            PlantEffect::EncoderOffset { angle, .. } => numbers.free = vec![("angle", *angle)],
+            PlantEffect::TimeDelay { delay_s, .. } => numbers.free = vec![("delay", *delay_s)],
         }
         numbers
     }

@@ -18,7 +18,7 @@ pub struct History {
     pub drive_angle: Vec<f64>,
     /// Speeds of the drives.
     pub drive_speed: Vec<f64>,
-    /// Torque that the actuators were told to deliver during the step \[N·m, N\].
+    /// Torque that the controller commanded for the step \[N·m, N\].
     pub command: Vec<f64>,
     /// Torque that they did deliver, noise included.
     pub delivered: Vec<f64>,
@@ -33,7 +33,7 @@ pub struct History {
     /// [`base_wrench`](phiw_dynamics::DynamicsBackend::base_wrench)).
     pub wrench: Vec<f64>,
     /// The same of each foot (see [`foot_wrench`](phiw_dynamics::SimulationBackend::foot_wrench)), 6 numbers
-    /// a foot, one foot after the other in a row; empty if the backend does not tell.
+    /// a foot, one foot after the other in a row; empty if the backend does not measure them.
     pub foot_wrenches: Vec<f64>,
 }
 

@@ -1,6 +1,6 @@
 //! The physics of one joint's drive: all torques between actuator and rigid body.
 
-use crate::{Effect, Friction, Mechanism, Presliding};
+use crate::{Friction, Mechanism, PlantEffect, Presliding};
 
 /// The effects of one joint, and what they remember.
 #[derive(Clone, Debug, Default)]
@@ -59,24 +59,26 @@ pub(crate) struct DriveStep {
 
 impl JointDrive {
     /// One drive for each joint. `motors`: inertia of each rotor behind a spring.
-    pub(crate) fn all(effects: &[Effect], motors: &[f64]) -> Vec<JointDrive> {
+    pub(crate) fn all(effects: &[PlantEffect], motors: &[f64]) -> Vec<JointDrive> {
         let mut drives =
             vec![JointDrive { gain: 1.0, saturation: f64::INFINITY, ..JointDrive::default() }; motors.len()];
         for effect in effects {
             match effect {
-                Effect::Friction { joint, law } => drives[*joint].frictions.push(law.clone()),
-                Effect::Presliding { joint, law } => {
+                PlantEffect::Friction { joint, law } => drives[*joint].frictions.push(law.clone()),
+                PlantEffect::Presliding { joint, law } => {
                     drives[*joint].preslidings.push((law.clone(), vec![0.0; law.memory_size()]));
                 }
-                Effect::Mechanism { joint, law } if law.is_stiff() => drives[*joint].stops.push(law.clone()),
-                Effect::Mechanism { joint, law } => drives[*joint].smooth.push(law.clone()),
-                Effect::TorqueOffset { joint, torque } => drives[*joint].offset += torque,
-                Effect::TorqueGain { joint, share } => drives[*joint].gain *= 1.0 + share,
-                Effect::Saturation { joint, torque } => {
+                PlantEffect::Mechanism { joint, law } if law.is_stiff() => {
+                    drives[*joint].stops.push(law.clone())
+                }
+                PlantEffect::Mechanism { joint, law } => drives[*joint].smooth.push(law.clone()),
+                PlantEffect::TorqueOffset { joint, torque } => drives[*joint].offset += torque,
+                PlantEffect::TorqueGain { joint, share } => drives[*joint].gain *= 1.0 + share,
+                PlantEffect::Saturation { joint, torque } => {
                     drives[*joint].saturation = drives[*joint].saturation.min(*torque);
                 }
-                Effect::EncoderOffset { joint, angle } => drives[*joint].encoder_offset += angle,
-                Effect::Flexibility { joint, stiffness, damping, backlash } => {
+                PlantEffect::EncoderOffset { joint, angle } => drives[*joint].encoder_offset += angle,
+                PlantEffect::Flexibility { joint, stiffness, damping, backlash } => {
                     drives[*joint].flexible = Some(Flexible {
                         stiffness: *stiffness,
                         damping: *damping,
@@ -95,7 +97,7 @@ impl JointDrive {
         self.preslidings.iter_mut().for_each(|(_, memory)| memory.fill(0.0));
     }
 
-    /// What the actuator delivers when it is told `command`.
+    /// What the actuator delivers for a command.
     pub(crate) fn delivered(&self, command: f64) -> f64 {
         (command / self.gain).clamp(-self.saturation, self.saturation)
     }

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![warn(missing_docs)]
 
+mod active_run;
 mod controller;
 mod effect;
 mod error;
@@ -8,7 +9,6 @@ mod friction;
 mod history;
 mod joint_drive;
 mod mechanism;
-mod motion;
 mod numbers;
 mod plant;
 mod presliding;
@@ -24,7 +24,7 @@ pub use controller::{
     ComputedTorque, GainSettings, Gains, RigidBodyModel, TorqueModel, apparent_inertia,
     least_apparent_inertia,
 };
-pub use effect::{Coupling, Effect};
+pub use effect::{Coupling, PlantEffect};
 pub use error::PlantError;
 pub use friction::Friction;
 pub use history::History;

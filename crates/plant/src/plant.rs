@@ -1,10 +1,10 @@
 //! The plant: controller, actuators, physics, sensors.
 
+use crate::active_run::ActiveRun;
 use crate::error::check_value;
 use crate::joint_drive::JointDrive;
-use crate::motion::Motion;
 use crate::robot_as_built::robot_as_built;
-use crate::{ComputedTorque, Coupling, Effect, PlantError, PlantRun, Reaction, Reference, Sensors};
+use crate::{ComputedTorque, Coupling, PlantEffect, PlantError, PlantRun, Reaction, Reference, Sensors};
 use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -32,7 +32,7 @@ pub struct PlantSetup {
     /// The controller.
     pub controller: ComputedTorque,
     /// Everything that the robot has beside its rigid bodies and the world's rotors, declared or not.
-    pub effects: Vec<Effect>,
+    pub effects: Vec<PlantEffect>,
     /// Standard deviation of the torque that actuators add by themselves, over the effort limit; drawn anew
     /// for every command, and never logged. 0.05 in the paper.
     pub actuator_noise: f64,
@@ -75,7 +75,7 @@ pub struct Plant {
     pub(crate) world: World,
     pub(crate) backend: Box<dyn SimulationBackend>,
     pub(crate) controller: ComputedTorque,
-    pub(crate) effects: Vec<Effect>,
+    pub(crate) effects: Vec<PlantEffect>,
     pub(crate) drives: Vec<JointDrive>,
     pub(crate) couplings: Vec<Coupling>,
     pub(crate) effort: Vec<f64>,
@@ -120,8 +120,8 @@ impl Plant {
         check_value(|| "the tilt of a fall".to_owned(), fall_tilt_rad, "> 0", |value| value > 0.0)?;
         let (tree, world, motors) = robot_as_built(tree, world, &effects)?;
         let backend = build(&tree, &world).map_err(PlantError::Build)?;
-        let coupling = |effect: &Effect| match effect {
-            Effect::Coupling(coupling) => Some(coupling.clone()),
+        let coupling = |effect: &PlantEffect| match effect {
+            PlantEffect::Coupling(coupling) => Some(coupling.clone()),
             _ => None,
         };
         Ok(Plant {
@@ -174,7 +174,7 @@ impl Plant {
     /// Puts the robot at rest into the reference's first posture, lets it settle, and follows the reference.
     ///
     /// The first row of the log is that of the motion's start. The reference should start at rest: what it
-    /// asks for at time 0 sets in at once. The same `random` gives the same run; what sensors draw does not
+    /// asks for at time 0 sets in at once. The same random numbers give the same run; what sensors draw does not
     /// change the motion, unless the controller sees it. On a fall the run ends, which is no error.
     ///
     /// # Errors
@@ -183,19 +183,19 @@ impl Plant {
         &mut self,
         reference: &dyn Reference,
         duration_s: f64,
-        random: &mut impl Rng,
+        rng: &mut (impl Rng + ?Sized),
     ) -> Result<PlantRun, PlantError> {
         check_value(|| "the duration".to_owned(), duration_s, "> 0", |value| value > 0.0)?;
-        let seed: u64 = random.random();
+        let seed: u64 = rng.random();
         let stream = |number| {
             let mut stream = ChaCha8Rng::seed_from_u64(seed);
             stream.set_stream(number);
             stream
         };
-        let mut motion = Motion::begin(self, reference, [stream(0), stream(1)])?;
+        let mut active = ActiveRun::begin(self, reference, [stream(0), stream(1)])?;
         let end_s = duration_s + self.sensors.margin_s(&self.effects);
-        let fell_at_s = motion.follow(self, reference, [duration_s, end_s])?;
-        let Motion { history, tracking_error, .. } = motion;
+        let fell_at_s = active.follow(self, reference, [duration_s, end_s])?;
+        let ActiveRun { history, tracking_error, .. } = active;
         let origin_s = self.clock_s + self.timing.settle_s;
         self.clock_s = origin_s + duration_s.min(history.end_s());
         let (recording, windows) =

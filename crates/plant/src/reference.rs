@@ -52,7 +52,7 @@ impl MultiSine {
         duration_s: f64,
         highest_hz: f64,
         [reach, speed]: [f64; 2],
-        random: &mut impl Rng,
+        rng: &mut impl Rng,
     ) -> Self {
         let joints = (0..tree.joint_count()).map(|joint| {
             let limits = tree.joint(joint).limits;
@@ -62,10 +62,10 @@ impl MultiSine {
             let mut sines = FadedSines { center: 0.0, shift: 0.0, terms: vec![[0.0; 3]; SINES] };
             for (number, term) in sines.terms.iter_mut().enumerate() {
                 let frequency =
-                    highest_hz * (number as f64 + 1.0 + random.random_range(-0.4..0.4)) / SINES as f64;
+                    highest_hz * (number as f64 + 1.0 + rng.random_range(-0.4..0.4)) / SINES as f64;
                 // Slow sines reach far, fast ones give acceleration.
-                let amplitude = random.random_range(0.4..1.0) / (number as f64 + 1.0).powf(0.8);
-                *term = [amplitude, TAU * frequency, random.random_range(0.0..TAU)];
+                let amplitude = rng.random_range(0.4..1.0) / (number as f64 + 1.0).powf(0.8);
+                *term = [amplitude, TAU * frequency, rng.random_range(0.0..TAU)];
             }
             let (mut lowest, mut highest, mut fastest) = (0.0_f64, 0.0_f64, 0.0_f64);
             for sample in 0..=(100.0 * duration_s) as usize {
@@ -77,7 +77,7 @@ impl MultiSine {
             sines.terms.iter_mut().for_each(|term| term[0] *= scale);
             let margin = 0.5 * (1.0 - reach) * (upper - lower);
             let (first, last) = (lower + margin - scale * lowest, upper - margin - scale * highest);
-            sines.center = first + (last - first) * random.random::<f64>();
+            sines.center = first + (last - first) * rng.random::<f64>();
             sines
         });
         MultiSine { duration_s, joints: joints.collect() }

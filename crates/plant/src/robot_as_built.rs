@@ -1,7 +1,7 @@
 //! The robot as it is built, which is not always as it is declared: payloads, a base that is not level, other
 //! rotors.
 
-use crate::{Effect, PlantError};
+use crate::{PlantEffect, PlantError};
 use phiw_dynamics::{Inertia, Mat3, PARAMETERS_PER_BODY, Tree, Vec3, World};
 
 /// The tree and the world with all effects that change them. Rotors behind springs are taken out of the world
@@ -9,7 +9,7 @@ use phiw_dynamics::{Inertia, Mat3, PARAMETERS_PER_BODY, Tree, Vec3, World};
 pub(crate) fn robot_as_built(
     tree: &Tree,
     world: &World,
-    effects: &[Effect],
+    effects: &[PlantEffect],
 ) -> Result<(Tree, World, Vec<f64>), PlantError> {
     let (mut tree, mut world) = (tree.clone(), world.clone());
     let joints = tree.joint_count();
@@ -18,17 +18,19 @@ pub(crate) fn robot_as_built(
     }
     for effect in effects {
         match effect {
-            Effect::Payload { body, mass, center, radii } => {
+            PlantEffect::Payload { body, mass, center, radii } => {
                 attach(&mut tree, *body, *mass, *center, *radii)?
             }
-            Effect::GravityTilt { heading, angle } => tree.gravity = turned(tree.gravity, *heading, *angle),
-            Effect::RotorInertia { joint, inertia } => world.rotor_inertia[*joint] += inertia,
+            PlantEffect::GravityTilt { heading, angle } => {
+                tree.gravity = turned(tree.gravity, *heading, *angle)
+            }
+            PlantEffect::RotorInertia { joint, inertia } => world.rotor_inertia[*joint] += inertia,
             _ => {}
         }
     }
     let mut motors = vec![0.0; joints];
     for effect in effects {
-        if let Effect::Flexibility { joint, .. } = effect {
+        if let PlantEffect::Flexibility { joint, .. } = effect {
             let name = || tree.joint(*joint).joint.clone();
             if motors[*joint] > 0.0 {
                 return Err(PlantError::TwiceFlexible { joint: name() });

@@ -1,7 +1,7 @@
 //! From what the plant did to what its log says: sampling, noise, quanta, delays, jitter.
 
 use crate::error::check_value;
-use crate::{Effect, History, PlantError};
+use crate::{History, PlantEffect, PlantError};
 use phiw_dynamics::{Tree, check_size};
 use phiw_telemetry::Recording;
 use rand::{Rng, RngExt};
@@ -22,7 +22,7 @@ pub enum Clock {
 /// Which velocities and accelerations a log has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Derivatives {
-    /// None: encoders tell positions alone.
+    /// None: encoders measure positions alone.
     #[default]
     Unlogged,
     /// The drives' own, as a simulator knows them: without noise, the acceleration a mean over the torque's
@@ -45,8 +45,8 @@ pub struct Sensors {
     /// Standard deviation of the torques' white noise \[N·m, N\].
     pub torque_noise: Vec<f64>,
     /// The logged torque is a mean over this time around the stamp \[s\]; 0 is the present value. A sampled
-    /// controller's torque jumps when it is told to, so the present value would be half a control period
-    /// ahead of the motion it makes.
+    /// controller's torque jumps with each command, so the present value would be half a control period ahead
+    /// of the motion it makes.
     pub torque_window_s: f64,
     /// All logged torques are this old \[s\].
     pub torque_delay_s: f64,
@@ -117,9 +117,9 @@ impl Sensors {
     }
 
     /// What an encoder says of a true angle.
-    pub(crate) fn encode(&self, joint: usize, angle: f64, random: &mut impl Rng) -> f64 {
+    pub(crate) fn encode(&self, joint: usize, angle: f64, rng: &mut impl Rng) -> f64 {
         let noise = self.angle_noise.get(joint).copied().unwrap_or(0.0);
-        let seen = if noise > 0.0 { angle + noise * normal(random) } else { angle };
+        let seen = if noise > 0.0 { angle + noise * normal(rng) } else { angle };
         match self.angle_quantum.get(joint) {
             Some(&quantum) if quantum > 0.0 => (seen / quantum).round() * quantum,
             _ => seen,
@@ -127,9 +127,9 @@ impl Sensors {
     }
 
     /// How long after the end of a motion the plant must still be known \[s\].
-    pub(crate) fn margin_s(&self, effects: &[Effect]) -> f64 {
+    pub(crate) fn margin_s(&self, effects: &[PlantEffect]) -> f64 {
         let delays = effects.iter().filter_map(|effect| match effect {
-            Effect::TimeDelay { delay_s, .. } => Some(*delay_s),
+            PlantEffect::TimeDelay { delay_s, .. } => Some(*delay_s),
             _ => None,
         });
         // A negative delay is a torque ahead of its stamp.
@@ -143,18 +143,18 @@ impl Sensors {
         &self,
         tree: &Tree,
         history: &History,
-        effects: &[Effect],
+        effects: &[PlantEffect],
         [origin_s, end_s]: [f64; 2],
-        random: &mut impl Rng,
+        rng: &mut impl Rng,
     ) -> (Recording, Vec<[f64; 2]>) {
         let joints = history.joints;
         let (mut delays, mut offsets) = (vec![self.torque_delay_s; joints], vec![0.0; joints]);
         for effect in effects {
             match effect {
-                Effect::TimeDelay { joints, delay_s } => {
+                PlantEffect::TimeDelay { joints, delay_s } => {
                     joints.iter().for_each(|&joint| delays[joint] += delay_s)
                 }
-                Effect::EncoderOffset { joint, angle } => offsets[*joint] += angle,
+                PlantEffect::EncoderOffset { joint, angle } => offsets[*joint] += angle,
                 _ => {}
             }
         }
@@ -169,10 +169,10 @@ impl Sensors {
             let [taken, stamp] = match self.clock {
                 Clock::Even => [even, even],
                 Clock::StampedJitter(share) => {
-                    [even + share * self.period_s * random.random_range(-1.0..=1.0); 2]
+                    [even + share * self.period_s * rng.random_range(-1.0..=1.0); 2]
                 }
                 Clock::HiddenJitter(share) => {
-                    [even + share * self.period_s * random.random_range(-1.0..=1.0), even]
+                    [even + share * self.period_s * rng.random_range(-1.0..=1.0), even]
                 }
             };
             if taken + half > history.end_s() + 0.5 * history.step_s {
@@ -182,11 +182,11 @@ impl Sensors {
             windows.push([taken - half, taken + half]);
             for joint in 0..joints {
                 let angle = history.drive_angle_at(joint, taken) - offsets[joint];
-                recording.q.push(self.encode(joint, angle, random));
+                recording.q.push(self.encode(joint, angle, rng));
                 let [from, to] = [-half, half].map(|shift| taken - delays[joint] + shift);
                 let noise = self.torque_noise.get(joint).copied().unwrap_or(0.0);
                 let torque = history.mean(&history.command, joints, joint, from, to);
-                recording.tau.push(if noise > 0.0 { torque + noise * normal(random) } else { torque });
+                recording.tau.push(if noise > 0.0 { torque + noise * normal(rng) } else { torque });
                 if self.derivatives == Derivatives::Exact {
                     let reach = half.max(history.step_s);
                     let [before, after] =
@@ -220,6 +220,6 @@ fn slopes(stamps: &[f64], values: &[f64], joints: usize) -> Vec<f64> {
 }
 
 /// A draw from the standard normal distribution.
-pub(crate) fn normal(random: &mut impl Rng) -> f64 {
-    StandardNormal.sample(random)
+pub(crate) fn normal(rng: &mut impl Rng) -> f64 {
+    StandardNormal.sample(rng)
 }

@@ -266,9 +266,9 @@ mod tests {
 
     #[test]
     fn inverse_times_matrix_is_one() {
-        let mut random = RandomNumbers::new(5);
+        let mut rng = RandomNumbers::new(5);
         for (size, first) in [(1, 0), (7, 0), (12, 5), (24, 6)] {
-            let root: Vec<f64> = (0..size * size).map(|_| random.uniform(-1.0, 1.0)).collect();
+            let root: Vec<f64> = (0..size * size).map(|_| rng.uniform(-1.0, 1.0)).collect();
             let element = |row: usize, column: usize| -> f64 {
                 let product: f64 = (0..size).map(|k| root[row * size + k] * root[column * size + k]).sum();
                 product + if row == column { 0.1 } else { 0.0 }

@@ -5,7 +5,7 @@
 mod plants;
 
 use phiw_dynamics::{Placement, Tree, Vec3, Workspace, World};
-use phiw_plant::{Coupling, Effect, Friction, Mechanism, PlantRun, Presliding, Sensors};
+use phiw_plant::{Coupling, Friction, Mechanism, PlantEffect, PlantRun, Presliding, Sensors};
 use plants::{TrueStep, model, rms, rotors, run, setup, true_steps};
 
 /// What an effect adds to a joint's torque, step by step.
@@ -14,7 +14,7 @@ type Formula<'a> = &'a dyn Fn(&Tree, &[TrueStep], usize) -> Vec<f64>;
 /// Runs `name` with the effect and compares each joint's torque beyond the declared rigid body with the
 /// formula: RMS of the difference over RMS of the largest joint's formula stays below `tolerance`, and the
 /// motion is tracked poorly.
-fn check(name: &str, effect: Effect, tolerance: f64, formula: Formula) {
+fn check(name: &str, effect: PlantEffect, tolerance: f64, formula: Formula) {
     let tree = model(name, false);
     let world = rotors(&tree);
     let kind = effect.kind();
@@ -55,7 +55,7 @@ fn on(joint: usize, formula: impl Fn(&TrueStep) -> f64) -> impl Fn(&Tree, &[True
 #[test]
 fn frictions_of_the_present_speed() {
     let check = |law: Friction, formula: &dyn Fn(f64) -> f64| {
-        check("puma560", Effect::Friction { joint: 1, law }, 1e-4, &on(1, |step| formula(step.v[1])));
+        check("puma560", PlantEffect::Friction { joint: 1, law }, 1e-4, &on(1, |step| formula(step.v[1])));
     };
     check(Friction::Viscous { coefficient: 9.0 }, &|v| 9.0 * v);
     check(Friction::Quadratic { coefficient: 20.0 }, &|v| 20.0 * v * v.abs());
@@ -76,7 +76,7 @@ fn frictions_of_load_and_time() {
     let rotor = rotors(&model("puma560", false)).rotor_inertia[1];
     check(
         "puma560",
-        Effect::Friction { joint: 1, law: Friction::LoadDependent { coefficient: 0.2, width: 0.02 } },
+        PlantEffect::Friction { joint: 1, law: Friction::LoadDependent { coefficient: 0.2, width: 0.02 } },
         5e-3,
         &on(1, |step| 0.2 * (step.rigid[1] - rotor * step.a[1]).abs() * (step.v[1] / 0.02).tanh()),
     );
@@ -84,7 +84,7 @@ fn frictions_of_load_and_time() {
     let law = Friction::Thermal { coefficient: 6.0, torque: 5.0, time_constant_s: 3.0, width: 0.02 };
     check(
         "puma560",
-        Effect::Friction { joint: 1, law },
+        PlantEffect::Friction { joint: 1, law },
         1e-3,
         &on(1, |step| {
             (-(step.end_s + 1.0) / 3.0).exp() * (6.0 * step.v[1] + 5.0 * (step.v[1] / 0.02).tanh())
@@ -101,7 +101,7 @@ fn every_joint_of_a_humanoid_may_stick() {
         let law = Friction::Coulomb { torque, width: 0.002 };
         check(
             "upper_body18",
-            Effect::Friction { joint, law },
+            PlantEffect::Friction { joint, law },
             0.03,
             &on(joint, |step| torque * (step.v[joint] / 0.002).tanh()),
         );
@@ -126,7 +126,7 @@ fn presliding_follows_the_way_since_the_reversal() {
             .collect()
     };
     let law = Presliding::MaxwellSlip { elements: elements.to_vec() };
-    check("puma560", Effect::Presliding { joint: 1, law }, 5e-3, &maxwell);
+    check("puma560", PlantEffect::Presliding { joint: 1, law }, 5e-3, &maxwell);
     let lugre = |_: &Tree, steps: &[TrueStep], joint: usize| -> Vec<f64> {
         let (mut bent, mut last) = (0.0, steps[0].q[1]);
         steps
@@ -139,13 +139,18 @@ fn presliding_follows_the_way_since_the_reversal() {
             .collect()
     };
     let law = Presliding::LuGre { torque: 7.0, way: 0.004 };
-    check("puma560", Effect::Presliding { joint: 1, law }, 5e-3, &lugre);
+    check("puma560", PlantEffect::Presliding { joint: 1, law }, 5e-3, &lugre);
 }
 
 #[test]
 fn torques_of_the_angle() {
     let check = |law: Mechanism, tolerance: f64, formula: &dyn Fn(f64) -> f64| {
-        check("puma560", Effect::Mechanism { joint: 2, law }, tolerance, &on(2, |step| formula(step.q[2])));
+        check(
+            "puma560",
+            PlantEffect::Mechanism { joint: 2, law },
+            tolerance,
+            &on(2, |step| formula(step.q[2])),
+        );
     };
     check(Mechanism::Spring { stiffness: 5.0, rest: 0.3 }, 1e-5, &|q| 5.0 * (q - 0.3));
     check(Mechanism::Ripple { torque: 2.0, cycles: 30.0, phase: 0.4 }, 1e-3, &|q| {
@@ -174,11 +179,21 @@ fn torques_of_the_angle() {
 
 #[test]
 fn actuators_and_rotors() {
-    let torque_offset = Effect::TorqueOffset { joint: 1, torque: -4.0 };
+    let torque_offset = PlantEffect::TorqueOffset { joint: 1, torque: -4.0 };
     check("puma560", torque_offset, 1e-5, &on(1, |_| -4.0));
-    check("puma560", Effect::RotorInertia { joint: 2, inertia: 0.5 }, 1e-5, &on(2, |step| 0.5 * step.a[2]));
+    check(
+        "puma560",
+        PlantEffect::RotorInertia { joint: 2, inertia: 0.5 },
+        1e-5,
+        &on(2, |step| 0.5 * step.a[2]),
+    );
     // What is logged is 1.2 times what the rigid body gets.
-    check("puma560", Effect::TorqueGain { joint: 1, share: 0.2 }, 1e-5, &on(1, |step| 0.2 * step.rigid[1]));
+    check(
+        "puma560",
+        PlantEffect::TorqueGain { joint: 1, share: 0.2 },
+        1e-5,
+        &on(1, |step| 0.2 * step.rigid[1]),
+    );
 }
 
 /// A formula of (step, the joint itself, the other) on each of two joints.
@@ -205,12 +220,12 @@ fn couplings() {
         let sum = step.v[one] + step.v[other];
         3.0 * sum + 2.0 * (sum / 0.01).tanh()
     };
-    check("puma560", Effect::Coupling(shared), 1e-3, &both(&friction));
+    check("puma560", PlantEffect::Coupling(shared), 1e-3, &both(&friction));
     let shared = Coupling::SharedInertia { joints, inertia: 0.15 };
-    check("puma560", Effect::Coupling(shared), 2e-3, &both(&|step, _, other| 0.15 * step.a[other]));
+    check("puma560", PlantEffect::Coupling(shared), 2e-3, &both(&|step, _, other| 0.15 * step.a[other]));
     let driven = Coupling::Driven { driven: 1, driver: 2, coefficient: -4.0, torque: 2.0, width: 0.01 };
     let felt = on(1, |step| -4.0 * step.v[2] + 2.0 * (step.v[2] / 0.01).tanh());
-    check("puma560", Effect::Coupling(driven), 1e-3, &felt);
+    check("puma560", PlantEffect::Coupling(driven), 1e-3, &felt);
 }
 
 /// Torque of inverse dynamics that a change of the tree makes.
@@ -239,7 +254,7 @@ fn difference(changed: Tree) -> impl Fn(&Tree, &[TrueStep], usize) -> Vec<f64> {
 fn payload_and_tilt_change_the_rigid_body() {
     let tree = model("puma560", false);
     let (mass, [x, y, z], [rx, ry, rz]) = (1.5, [0.03, -0.02, 0.08], [0.03, 0.04, 0.05]);
-    let payload = Effect::Payload { body: 5, mass, center: [x, y, z], radii: [rx, ry, rz] };
+    let payload = PlantEffect::Payload { body: 5, mass, center: [x, y, z], radii: [rx, ry, rz] };
     let mut loaded = tree.clone();
     let mut parameters = loaded.inertial_parameters();
     let added = [
@@ -260,7 +275,7 @@ fn payload_and_tilt_change_the_rigid_body() {
     let mut tilted = tree.clone();
     // Turned about x by 0.1 rad.
     tilted.gravity = [0.0, 9.81 * 0.1_f64.sin(), -9.81 * 0.1_f64.cos()];
-    check("puma560", Effect::GravityTilt { heading: 0.0, angle: 0.1 }, 1e-5, &difference(tilted));
+    check("puma560", PlantEffect::GravityTilt { heading: 0.0, angle: 0.1 }, 1e-5, &difference(tilted));
 }
 
 #[test]
@@ -282,15 +297,19 @@ fn an_external_force_pulls_at_its_point() {
         };
         steps.iter().map(&mut work).collect()
     };
-    check("puma560", Effect::ExternalForce { body, point, force }, 1e-3, &felt);
+    check("puma560", PlantEffect::ExternalForce { body, point, force }, 1e-3, &felt);
 }
 
 #[test]
 fn an_encoder_offset_is_believed_by_log_and_controller() {
     let tree = model("puma560", false);
     let world = rotors(&tree);
-    let run =
-        run(&tree, &world, setup(&tree, &world, vec![Effect::EncoderOffset { joint: 1, angle: 0.2 }]), 3);
+    let run = run(
+        &tree,
+        &world,
+        setup(&tree, &world, vec![PlantEffect::EncoderOffset { joint: 1, angle: 0.2 }]),
+        3,
+    );
     for (row, &stamp) in run.recording.t.iter().enumerate() {
         for joint in 0..6 {
             let truth = run.history.drive_angle_at(joint, stamp - run.recording.t[0]);
@@ -305,7 +324,7 @@ fn an_encoder_offset_is_believed_by_log_and_controller() {
 #[test]
 fn a_delay_makes_logged_torques_old() {
     let tree = model("puma560", false);
-    let delay = Effect::TimeDelay { joints: vec![0, 2], delay_s: 0.02 };
+    let delay = PlantEffect::TimeDelay { joints: vec![0, 2], delay_s: 0.02 };
     let [plain, delayed] = [vec![], vec![delay]]
         .map(|effects| run(&tree, &World::default(), setup(&tree, &World::default(), effects), 3).recording);
     assert_eq!(plain.q, delayed.q);
@@ -322,7 +341,7 @@ fn a_saturated_actuator_delivers_less_than_it_is_told() {
     let tree = model("puma560", false);
     let world = rotors(&tree);
     let run =
-        run(&tree, &world, setup(&tree, &world, vec![Effect::Saturation { joint: 1, torque: 25.0 }]), 3);
+        run(&tree, &world, setup(&tree, &world, vec![PlantEffect::Saturation { joint: 1, torque: 25.0 }]), 3);
     let steps = true_steps(&run.history, &tree, &world);
     let mut clipped = 0;
     for (k, step) in steps.iter().enumerate() {
@@ -339,8 +358,8 @@ fn check_flexible(stiffness: f64, damping: f64, backlash: f64, tolerance: f64) {
     let motor_inertia = [0.3, 0.08];
     let world = World { rotor_inertia: motor_inertia.to_vec(), ..World::default() };
     let effects = vec![
-        Effect::Flexibility { joint: 0, stiffness, damping, backlash },
-        Effect::Friction { joint: 0, law: Friction::Coulomb { torque: 3.0, width: 0.01 } },
+        PlantEffect::Flexibility { joint: 0, stiffness, damping, backlash },
+        PlantEffect::Friction { joint: 0, law: Friction::Coulomb { torque: 3.0, width: 0.01 } },
     ];
     let run = run(&tree, &world, setup(&tree, &world, effects), 3);
     // The link's torque does not hold the rotor, which turns by itself.

@@ -7,7 +7,7 @@ use phiw_dynamics::{
     BackendError, DimensionError, DynamicsBackend, Foot, Placement, SimulationBackend, Tree, World,
 };
 use phiw_plant::{
-    Clock, ComputedTorque, Coupling, Derivatives, Effect, Friction, Gains, Mechanism, Plant, PlantError,
+    Clock, ComputedTorque, Coupling, Derivatives, Friction, Gains, Mechanism, Plant, PlantEffect, PlantError,
     PlantRun, PlantSetup, Sensors, Timing, TorqueModel,
 };
 use plants::{analytic, model, motion, poor_controller, random, rms, rotors, run, setup, true_steps};
@@ -146,7 +146,7 @@ fn the_same_seed_gives_the_same_run() {
         let law = Friction::Coulomb { torque: 3.0, width: 0.005 };
         let sensors =
             Sensors { angle_noise: vec![1e-4; 7], torque_noise: vec![0.1; 7], ..Sensors::default() };
-        let effects = vec![Effect::Friction { joint: 3, law }];
+        let effects = vec![PlantEffect::Friction { joint: 3, law }];
         run(
             &tree,
             &world,
@@ -163,10 +163,10 @@ fn logs_of_one_plant_go_on_in_time() {
     let tree = model("planar2", false);
     let world = rotors(&tree);
     let mut plant = Plant::new(&tree, &world, setup(&tree, &world, vec![]), analytic).unwrap();
-    let mut random = random(2);
-    let first = plant.run(&motion(&tree, 2.0, 1), 2.0, &mut random).unwrap().recording;
+    let mut rng = random(2);
+    let first = plant.run(&motion(&tree, 2.0, 1), 2.0, &mut rng).unwrap().recording;
     plant.rest(10.0);
-    let second = plant.run(&motion(&tree, 2.0, 1), 2.0, &mut random).unwrap().recording;
+    let second = plant.run(&motion(&tree, 2.0, 1), 2.0, &mut rng).unwrap().recording;
     assert_eq!(first.t[0], 1.0);
     assert!((first.t[200] - 3.0).abs() < 1e-9 && first.len() == 201);
     assert!((second.t[0] - 14.0).abs() < 1e-9);
@@ -184,17 +184,17 @@ impl TorqueModel for Limp {
     }
 }
 
-fn limp(joints: usize, effects: Vec<Effect>) -> PlantSetup {
+fn limp(joints: usize, effects: Vec<PlantEffect>) -> PlantSetup {
     let gains = Gains { position: vec![0.0; joints], velocity: vec![0.0; joints] };
     let timing = Timing { settle_s: 0.0, ..Timing::default() };
     PlantSetup { effects, timing, ..PlantSetup::new(ComputedTorque::new(Limp, gains)) }
 }
 
 /// A double pendulum swings from level: its energy, springs and motors included, at all steps.
-fn energies(effects: Vec<Effect>, stored: &dyn Fn(&PlantRun, usize) -> f64) -> Vec<f64> {
+fn energies(effects: Vec<PlantEffect>, stored: &dyn Fn(&PlantRun, usize) -> f64) -> Vec<f64> {
     let tree = model("planar2", false);
     let world = World { rotor_inertia: vec![0.05, 0.02], ..World::default() };
-    let flexible = effects.iter().any(|effect| matches!(effect, Effect::Flexibility { .. }));
+    let flexible = effects.iter().any(|effect| matches!(effect, PlantEffect::Flexibility { .. }));
     let mut plant = Plant::new(&tree, &world, limp(2, effects), analytic).unwrap();
     let level = |_: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
         q.copy_from_slice(&[0.0, 0.3]);
@@ -225,21 +225,21 @@ fn at(values: &[f64], row: usize, joint: usize) -> f64 {
 
 #[test]
 fn what_stores_energy_keeps_it_and_what_rubs_takes_it() {
-    let check_kept = |effects: Vec<Effect>, stored: &dyn Fn(&PlantRun, usize) -> f64| {
+    let check_kept = |effects: Vec<PlantEffect>, stored: &dyn Fn(&PlantRun, usize) -> f64| {
         let energies = energies(effects, stored);
         let drift = energies.iter().map(|energy| (energy - energies[0]).abs()).fold(0.0, f64::max);
         assert!(drift < 0.02, "{drift} J of some 60 J exchanged");
     };
     check_kept(vec![], &|_, _| 0.0);
-    let spring = Effect::Mechanism { joint: 1, law: Mechanism::Spring { stiffness: 20.0, rest: 0.5 } };
+    let spring = PlantEffect::Mechanism { joint: 1, law: Mechanism::Spring { stiffness: 20.0, rest: 0.5 } };
     check_kept(vec![spring], &|run, row| 10.0 * (at(&run.history.link_angle, row, 1) - 0.5).powi(2));
-    let elastic = Effect::Flexibility { joint: 1, stiffness: 400.0, damping: 0.0, backlash: 0.0 };
+    let elastic = PlantEffect::Flexibility { joint: 1, stiffness: 400.0, damping: 0.0, backlash: 0.0 };
     check_kept(vec![elastic], &|run, row| {
         let twist = at(&run.history.drive_angle, row, 1) - at(&run.history.link_angle, row, 1);
         200.0 * twist * twist
     });
     let law = Friction::Coulomb { torque: 2.0, width: 0.002 };
-    let rubbed = energies(vec![Effect::Friction { joint: 0, law }], &|_, _| 0.0);
+    let rubbed = energies(vec![PlantEffect::Friction { joint: 0, law }], &|_, _| 0.0);
     assert!(rubbed.windows(2).all(|pair| pair[1] < pair[0] + 1e-5));
     assert!(rubbed[0] - rubbed[rubbed.len() - 1] > 2.0);
 }
@@ -249,7 +249,7 @@ fn what_stores_energy_keeps_it_and_what_rubs_takes_it() {
 fn a_joint_that_friction_holds_stays() {
     let tree = model("planar2", false);
     let law = Friction::Coulomb { torque: 60.0, width: 1e-4 };
-    let effects = (0..2).map(|joint| Effect::Friction { joint, law: law.clone() }).collect();
+    let effects = (0..2).map(|joint| PlantEffect::Friction { joint, law: law.clone() }).collect();
     let mut plant = Plant::new(&tree, &World::default(), limp(2, effects), analytic).unwrap();
     let level =
         |_: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| [q, v, a].into_iter().for_each(|x| x.fill(0.0));
@@ -363,17 +363,18 @@ fn nonsense_is_refused() {
         let error = Plant::new(&tree, &world, setup, analytic).err().unwrap();
         assert!(error.to_string().contains(expected), "{error}");
     };
-    let viscous = |joint, coefficient| Effect::Friction { joint, law: Friction::Viscous { coefficient } };
+    let viscous =
+        |joint, coefficient| PlantEffect::Friction { joint, law: Friction::Viscous { coefficient } };
     check(&|setup| setup.effects = vec![viscous(2, 1.0)], "viscous_friction acts on joint 2");
     check(&|setup| setup.effects = vec![viscous(0, -1.0)], "coefficient of viscous_friction is -1");
     check(&|setup| setup.effects = vec![viscous(0, f64::NAN)], "NaN");
     let coulomb = Friction::Coulomb { torque: 1.0, width: 0.0 };
-    check(&|setup| setup.effects = vec![Effect::Friction { joint: 0, law: coulomb.clone() }], "> 0");
-    let payload = Effect::Payload { body: 7, mass: 1.0, center: [0.0; 3], radii: [0.0; 3] };
+    check(&|setup| setup.effects = vec![PlantEffect::Friction { joint: 0, law: coulomb.clone() }], "> 0");
+    let payload = PlantEffect::Payload { body: 7, mass: 1.0, center: [0.0; 3], radii: [0.0; 3] };
     check(&|setup| setup.effects = vec![payload.clone()], "payload acts on body 7");
     let same = Coupling::SharedInertia { joints: [1, 1], inertia: 0.1 };
-    check(&|setup| setup.effects = vec![Effect::Coupling(same.clone())], "second joint");
-    let flexible = Effect::Flexibility { joint: 0, stiffness: 100.0, damping: 0.0, backlash: 0.0 };
+    check(&|setup| setup.effects = vec![PlantEffect::Coupling(same.clone())], "second joint");
+    let flexible = PlantEffect::Flexibility { joint: 0, stiffness: 100.0, damping: 0.0, backlash: 0.0 };
     check(&|setup| setup.effects = vec![flexible.clone()], "rotor inertia > 0");
     check(&|setup| setup.timing.control_period_s = 0.0, "control period");
     check(&|setup| setup.actuator_noise = -0.1, "noise");
@@ -390,7 +391,7 @@ fn nonsense_is_refused() {
     let refused = Plant::new(&tree, &world, setup(&tree, &world, vec![]), analytic).err().unwrap();
     assert!(matches!(refused, PlantError::Build(BackendError::Backend { .. })));
     let floating = model("planar2", true);
-    let force = Effect::ExternalForce { body: 1, point: [0.0; 3], force: [1.0, 0.0, 0.0] };
+    let force = PlantEffect::ExternalForce { body: 1, point: [0.0; 3], force: [1.0, 0.0, 0.0] };
     let refused =
         Plant::new(&floating, &World::default(), setup(&floating, &World::default(), vec![force]), analytic);
     assert_eq!(refused.err().unwrap(), PlantError::ForceOnFloatingBase);

@@ -1,9 +1,9 @@
 //! From a belief to the controller that follows a motion: equation (13).
 
-use phiw_curriculum::{CurriculumError, Robot, RobotModel};
+use phiw_curriculum::CurriculumError;
 use phiw_dynamics::DimensionError;
-use phiw_effects::JointProperty;
-use phiw_identification::Design;
+use phiw_estimation::{Robot, RobotModel};
+use phiw_identification::{Design, JointProperty};
 use phiw_plant::{ComputedTorque, Gains, RigidBodyModel, TorqueModel};
 use phiw_telemetry::Block;
 

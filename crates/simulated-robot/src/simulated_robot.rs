@@ -1,11 +1,13 @@
 //! A simulated robot that tries motions, over any backend.
 
 use crate::Controller;
-use phiw_curriculum::{CurriculumError, Experiment, KnownEffect, Measured, Motion, Robot, RobotModel, Trial};
+use phiw_curriculum::motion::Motion;
+use phiw_curriculum::{CurriculumError, Experiment, Trial};
 use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
-use phiw_effects::JointProperty;
-use phiw_plant::{Effect, Friction, History, Plant, PlantRun, PlantSetup, Sensors, Timing};
-use rand_chacha::ChaCha8Rng;
+use phiw_estimation::{KnownEffect, MotionLog, Robot, RobotModel};
+use phiw_identification::JointProperty;
+use phiw_plant::{Friction, History, Plant, PlantEffect, PlantRun, PlantSetup, Sensors, Timing};
+use rand::Rng;
 
 /// Makes a backend of the robot as it is built.
 pub type BuildBackend =
@@ -21,7 +23,7 @@ pub struct SimulatedRobot {
     /// Its world.
     pub world: World,
     /// What it has beside its rigid bodies, declared or not.
-    pub effects: Vec<Effect>,
+    pub effects: Vec<PlantEffect>,
     /// Who makes the torques.
     pub controller: Box<dyn Controller>,
     /// Standard deviation of δf over the torque limit: 0.05 in the paper.
@@ -42,7 +44,7 @@ pub struct SimulatedRobot {
 /// When a base or a foot counts as still: rows in which it moves are no rows of a robot that stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stillness {
-    /// Turning rate of a base \[rad/s\]. Default: 0.01, what a gyroscope tells from its own noise.
+    /// Turning rate of a base \[rad/s\]. Default: 0.01, what a gyroscope can distinguish from its own noise.
     pub base_turning: f64,
     /// Time around a movement of the base that does not count either, since it lands before it rests \[s\].
     /// Default: 0.1.
@@ -58,6 +60,15 @@ impl Default for Stillness {
     fn default() -> Self {
         Stillness { base_turning: 0.01, settles_s: 0.1, foot_speed: 5e-3, foot_turning: 5e-2 }
     }
+}
+
+/// An effect of a model that has no counterpart in a plant.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "no plant is built with {kind} from a model: leave it out there, and add it to the effects of the simulated robot"
+)]
+struct NotSimulated {
+    kind: String,
 }
 
 impl SimulatedRobot {
@@ -101,13 +112,13 @@ impl SimulatedRobot {
         (0..self.tree.joint_count()).map(noise).collect()
     }
 
-    /// Lets a plant of its own follow a motion of its motors.
+    /// Builds a plant and has it follow a motion of the motors.
     pub(crate) fn run(
         &self,
         robot: &Robot,
         model: &RobotModel,
         motion: &Motion,
-        random: &mut ChaCha8Rng,
+        rng: &mut dyn Rng,
     ) -> Result<PlantRun, CurriculumError> {
         let period_s = self.sensors.period_s;
         if (period_s / self.timing.control_period_s - 1.0).abs() > 1e-9 {
@@ -126,11 +137,11 @@ impl SimulatedRobot {
         let mut plant = Plant::new(&self.tree, &self.world, setup, |tree, world| (self.build)(tree, world))
             .map_err(CurriculumError::of_experiment)?;
         let reference = |t_s: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| motion.at(t_s, q, v, a);
-        plant.run(&reference, motion.duration_s(), random).map_err(CurriculumError::of_experiment)
+        plant.run(&reference, motion.duration_s(), rng).map_err(CurriculumError::of_experiment)
     }
 
-    /// For each row of the log, whether the base stood still until the next, as a gyroscope in it would tell;
-    /// empty on a fixed base.
+    /// For each row of the log, whether the base stood still until the next, as a gyroscope in it would
+    /// measure; empty on a fixed base.
     fn still(&self, history: &History) -> Vec<bool> {
         let period_s = self.timing.control_period_s;
         let row = |t_s: f64| ((t_s - history.start_s) / history.step_s).round() as usize;
@@ -158,17 +169,17 @@ impl Experiment for SimulatedRobot {
         robot: &Robot,
         model: &RobotModel,
         motion: &Motion,
-        random: &mut ChaCha8Rng,
+        rng: &mut dyn Rng,
     ) -> Result<Trial, CurriculumError> {
-        let run = self.run(robot, model, motion, random)?;
+        let run = self.run(robot, model, motion, rng)?;
         // A robot that falls at once has no log.
         let measured = match run.recording.len() {
-            0 | 1 => Measured {
+            0 | 1 => MotionLog {
                 joints: motion.joints(),
                 period_s: self.timing.control_period_s,
-                ..Measured::default()
+                ..MotionLog::default()
             },
-            _ => Measured { still: self.still(&run.history), ..Measured::from_recording(&run.recording)? },
+            _ => MotionLog { still: self.still(&run.history), ..MotionLog::from_recording(&run.recording)? },
         };
         Ok(Trial { measured, fell_at_s: run.fell_at_s, tracking_error: run.tracking_error })
     }
@@ -179,23 +190,23 @@ impl Experiment for SimulatedRobot {
 }
 
 /// The effects of a model as a plant has them: those that simulators express as a property of a joint.
-fn plant_effects(robot: &Robot, model: &RobotModel) -> Result<Vec<Effect>, CurriculumError> {
+fn plant_effects(robot: &Robot, model: &RobotModel) -> Result<Vec<PlantEffect>, CurriculumError> {
     robot.design(&model.specs())?;
     let effect = |known: &KnownEffect| {
         let property = robot.catalogue().joint_property(&known.spec);
         let joint = known.spec.joints.first().and_then(|joint| robot.tree().joint_index(joint));
         let (Some(property), Some(joint), &[value]) = (property, joint, known.parameters.as_slice()) else {
-            return Err(CurriculumError::NotSimulated { kind: known.spec.kind.clone() });
+            return Err(CurriculumError::of_experiment(NotSimulated { kind: known.spec.kind.clone() }));
         };
         let width = known.spec.constants.get("sign_width").copied().unwrap_or(0.0);
         Ok(match property {
             JointProperty::Damping => {
-                Effect::Friction { joint, law: Friction::Viscous { coefficient: value } }
+                PlantEffect::Friction { joint, law: Friction::Viscous { coefficient: value } }
             }
             JointProperty::Friction => {
-                Effect::Friction { joint, law: Friction::Coulomb { torque: value, width } }
+                PlantEffect::Friction { joint, law: Friction::Coulomb { torque: value, width } }
             }
-            JointProperty::Armature => Effect::RotorInertia { joint, inertia: value },
+            JointProperty::Armature => PlantEffect::RotorInertia { joint, inertia: value },
         })
     };
     model.effects.iter().map(effect).collect()

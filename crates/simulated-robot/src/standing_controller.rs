@@ -1,10 +1,11 @@
 //! Equation (13) for a robot on its feet.
 
 use crate::Controller;
+use phiw_curriculum::CurriculumError;
 use phiw_curriculum::standing::{Feet, VIRTUAL_JOINTS};
-use phiw_curriculum::{CurriculumError, Robot, RobotModel};
 use phiw_dynamics::{DimensionError, Tree, Workspace, check_size};
-use phiw_effects::JointProperty;
+use phiw_estimation::{Robot, RobotModel};
+use phiw_identification::JointProperty;
 use phiw_plant::{ComputedTorque, Gains, TorqueModel};
 
 /// The joints of a virtual base come first.

@@ -1,12 +1,15 @@
 //! A simulated robot on its feet, and what is measured of it.
 
 use crate::SimulatedRobot;
+use phiw_curriculum::motion::Motion;
 use phiw_curriculum::standing::{Feet, VIRTUAL_JOINTS, base_coordinates};
-use phiw_curriculum::{CurriculumError, Experiment, Measured, Motion, Robot, RobotModel, Trial};
+use phiw_curriculum::{CurriculumError, Experiment, Trial};
+use phiw_estimation::{MotionLog, Robot, RobotModel};
 use phiw_plant::{History, Sensors};
-use rand::{RngExt, SeedableRng};
+use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use std::ops::Range;
 
 const BASE: usize = VIRTUAL_JOINTS.len();
 
@@ -55,14 +58,14 @@ impl Experiment for StandingRobot {
         robot: &Robot,
         model: &RobotModel,
         motion: &Motion,
-        random: &mut ChaCha8Rng,
+        rng: &mut dyn Rng,
     ) -> Result<Trial, CurriculumError> {
         if self.plant.sensors != Sensors::exact(self.plant.timing.control_period_s) {
             let problem = "motors and base of a robot on its feet are measured exactly: leave its sensors at Sensors::exact, and set wrench_noise".to_owned();
             return Err(CurriculumError::Motion { name: "as measured".to_owned(), problem });
         }
-        let run = self.plant.run(robot, model, &of_motors(motion)?, random)?;
-        let mut noise = ChaCha8Rng::seed_from_u64(random.random());
+        let run = self.plant.run(robot, model, &of_motors(motion)?, rng)?;
+        let mut noise = ChaCha8Rng::seed_from_u64(rng.random());
         Ok(Trial {
             measured: self.measured(&run.history, motion.duration_s(), &mut noise)?,
             fell_at_s: run.fell_at_s,
@@ -91,8 +94,8 @@ fn of_motors(motion: &Motion) -> Result<Motion, CurriculumError> {
 /// velocities belong to the middles between its positions. Taken for those of one instant they do harm where
 /// noise moves the robot: the mean velocity over a period then follows the noise of the period by more than
 /// half of what the noise does to the velocity, and the estimate takes the difference for negative friction
-/// (−1.6 N·m·s/rad in a waist that has 1.3, from 4 N·m of noise and periods of two steps). The history tells
-/// λ.
+/// (−1.6 N·m·s/rad in a waist that has 1.3, from 4 N·m of noise and periods of two steps). λ is computed from
+/// the history.
 fn position_lead_s(history: &History) -> f64 {
     let (mut along, mut square) = (0.0, 0.0);
     let next = history.link_speed.iter().zip(&history.link_angle).skip(history.joints);
@@ -105,76 +108,69 @@ fn position_lead_s(history: &History) -> f64 {
     (0.5 - lambda) * history.step_s
 }
 
+/// The steps of a history that are rows of a log.
+struct Rows {
+    /// The step at which each row begins.
+    starts: Vec<usize>,
+    /// Steps over which one command is held.
+    steps: usize,
+}
+
 impl StandingRobot {
     /// The log of a history from the motion's start to `end_s`.
     fn measured(
         &self,
         history: &History,
         end_s: f64,
-        random: &mut ChaCha8Rng,
-    ) -> Result<Measured, CurriculumError> {
+        rng: &mut ChaCha8Rng,
+    ) -> Result<MotionLog, CurriculumError> {
         let period_s = self.plant.timing.control_period_s;
-        let (joints, feet) = (history.joints + BASE, self.feet.all().len());
-        let told = 6 * feet * history.steps();
-        if history.foot_wrenches.len() != told {
+        if history.foot_wrenches.len() != 6 * self.feet.all().len() * history.steps() {
             let problem = "the engine does not tell what the floor gives to each foot".to_owned();
             return Err(CurriculumError::Motion { name: "as measured".to_owned(), problem });
         }
         let steps = (period_s / history.step_s).round().max(1.0) as usize;
         let first = (-history.start_s / history.step_s).round().max(0.0) as usize;
         let last = history.steps().min(first + (end_s / history.step_s).round() as usize);
-        let mut measured = Measured { joints, period_s, ..Measured::default() };
-        let lead_s = position_lead_s(history);
-        let boundaries: Vec<usize> = (first..=last).step_by(steps).collect();
-        for &row in &boundaries {
-            let (base, velocity) = (&history.base[7 * row..], &history.base_velocity[6 * row..]);
-            let base: [f64; 7] = std::array::from_fn(|k| base[k]);
-            let velocity: [f64; 6] = std::array::from_fn(|k| velocity[k]);
-            let [position, speed] = base_coordinates(&base, &velocity);
-            let own = row * history.joints..(row + 1) * history.joints;
-            let positions = position.iter().chain(&history.link_angle[own.clone()]);
-            let speeds = || speed.iter().chain(&history.link_speed[own.clone()]);
-            measured.q.extend(positions.zip(speeds()).map(|(position, speed)| position - lead_s * speed));
-            measured.qd.extend(speeds());
+        let rows = Rows { starts: (first..=last).step_by(steps).collect(), steps };
+        let joints = history.joints + BASE;
+        let mut measured = MotionLog { joints, period_s, ..MotionLog::default() };
+        [measured.q, measured.qd] = motion(history, &rows);
+        measured.still = self.still(&measured)?;
+        measured.tau = self.forces(history, &rows, &measured, rng)?;
+        Ok(measured)
+    }
+
+    /// For each row, whether no foot moves in it and in the next.
+    fn still(&self, measured: &MotionLog) -> Result<Vec<bool>, CurriculumError> {
+        let stillness = &self.plant.stillness;
+        let limits = [stillness.foot_speed, stillness.foot_turning];
+        let joints = measured.joints;
+        let mut rest = Vec::with_capacity(measured.rows());
+        for (q, qd) in measured.q.chunks_exact(joints).zip(measured.qd.chunks_exact(joints)) {
+            let speeds = self.feet.speeds(q, qd)?;
+            rest.push(speeds.iter().zip(limits).all(|(speed, limit)| *speed <= limit));
         }
-        let mut rest = Vec::with_capacity(boundaries.len());
-        for index in 0..boundaries.len() {
-            let own = index * joints..(index + 1) * joints;
-            let speeds = self.feet.speeds(&measured.q[own.clone()], &measured.qd[own])?;
-            rest.push(
-                speeds
-                    .iter()
-                    .zip([self.plant.stillness.foot_speed, self.plant.stillness.foot_turning])
-                    .all(|(speed, still)| *speed <= still),
-            );
-        }
-        measured.still =
-            (0..rest.len()).map(|row| rest[row] && rest.get(row + 1).copied().unwrap_or(true)).collect();
+        Ok((0..rest.len()).map(|row| rest[row] && rest.get(row + 1).copied().unwrap_or(true)).collect())
+    }
+
+    /// The generalised forces of all rows, `[row × joint]`: the commands, and what the floor gives to the
+    /// feet in the middle of a period.
+    fn forces(
+        &self,
+        history: &History,
+        rows: &Rows,
+        measured: &MotionLog,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Vec<f64>, CurriculumError> {
+        let (joints, period_s) = (measured.joints, measured.period_s);
         let (mut middle, mut force) = (vec![0.0; joints], vec![0.0; joints]);
-        let mut wrenches = vec![[0.0; 6]; feet];
-        let mut normal = |deviation: f64| -> f64 {
-            let draw: f64 = StandardNormal.sample(&mut *random);
-            deviation * draw
-        };
-        for (index, &row) in boundaries.iter().enumerate() {
-            if index + 1 == boundaries.len() {
-                // Nothing is held after the last row.
-                measured.tau.extend_from_within(measured.tau.len().saturating_sub(joints)..);
-                break;
-            }
-            for (foot, wrench) in wrenches.iter_mut().enumerate() {
-                let mean = |axis: usize| {
-                    let values =
-                        (row..row + steps).map(|step| history.foot_wrenches[6 * (feet * step + foot) + axis]);
-                    values.sum::<f64>() / steps as f64
-                };
-                let standing = &self.feet.all()[foot];
-                let [x, y, z] = standing.placement.point(standing.sole).0;
-                let [fx, fy, fz] = [0; 3].map(|_| normal(self.wrench_noise.force_n));
-                let [mx, my, mz] = [0; 3].map(|_| normal(self.wrench_noise.moment_nm));
-                let noise = [fx, fy, fz, mx + y * fz - z * fy, my + z * fx - x * fz, mz + x * fy - y * fx];
-                *wrench = std::array::from_fn(|axis| mean(axis) + noise[axis]);
-            }
+        let mut forces = Vec::with_capacity(rows.starts.len() * joints);
+        let periods = rows.starts.len().saturating_sub(1);
+        for (index, &start) in rows.starts.iter().take(periods).enumerate() {
+            let wrenches: Vec<[f64; 6]> = (0..self.feet.all().len())
+                .map(|foot| self.wrench(history, start..start + rows.steps, foot, rng))
+                .collect();
             let (now, next) = (index * joints, (index + 1) * joints);
             for (joint, middle) in middle.iter_mut().enumerate() {
                 let [q0, q1] = [now, next].map(|at| measured.q[at + joint]);
@@ -182,12 +178,56 @@ impl StandingRobot {
                 *middle = 0.5 * (q0 + q1) - 0.125 * period_s * (v1 - v0);
             }
             force[..BASE].fill(0.0);
-            force[BASE..].copy_from_slice(&history.command[row * history.joints..(row + 1) * history.joints]);
+            let command = start * history.joints..(start + 1) * history.joints;
+            force[BASE..].copy_from_slice(&history.command[command]);
             self.feet.add_load(&middle, &wrenches, &mut force)?;
-            measured.tau.extend_from_slice(&force);
+            forces.extend_from_slice(&force);
         }
-        Ok(measured)
+        // Nothing is held after the last row.
+        if !rows.starts.is_empty() {
+            forces.extend_from_within(forces.len().saturating_sub(joints)..);
+        }
+        Ok(forces)
     }
+
+    /// What the sensor under a foot measures over some steps: the mean of force \[N\] and moment about the
+    /// world's origin \[N·m\], with its noise.
+    fn wrench(&self, history: &History, steps: Range<usize>, foot: usize, rng: &mut ChaCha8Rng) -> [f64; 6] {
+        let feet = self.feet.all().len();
+        let count = steps.len() as f64;
+        let mean = |axis: usize| {
+            let values = steps.clone().map(|step| history.foot_wrenches[6 * (feet * step + foot) + axis]);
+            values.sum::<f64>() / count
+        };
+        let mut normal = |deviation: f64| -> f64 {
+            let draw: f64 = StandardNormal.sample(&mut *rng);
+            deviation * draw
+        };
+        let standing = &self.feet.all()[foot];
+        let [x, y, z] = standing.placement.point(standing.sole).0;
+        let [fx, fy, fz] = [0; 3].map(|_| normal(self.wrench_noise.force_n));
+        let [mx, my, mz] = [0; 3].map(|_| normal(self.wrench_noise.moment_nm));
+        let noise = [fx, fy, fz, mx + y * fz - z * fy, my + z * fx - x * fz, mz + x * fy - y * fx];
+        std::array::from_fn(|axis| mean(axis) + noise[axis])
+    }
+}
+
+/// Positions and velocities of base and motors at the rows, `[row × joint]`.
+fn motion(history: &History, rows: &Rows) -> [Vec<f64>; 2] {
+    let lead_s = position_lead_s(history);
+    let (mut q, mut qd) = (Vec::new(), Vec::new());
+    for &row in &rows.starts {
+        let (base, velocity) = (&history.base[7 * row..], &history.base_velocity[6 * row..]);
+        let base: [f64; 7] = std::array::from_fn(|k| base[k]);
+        let velocity: [f64; 6] = std::array::from_fn(|k| velocity[k]);
+        let [position, speed] = base_coordinates(&base, &velocity);
+        let own = row * history.joints..(row + 1) * history.joints;
+        let positions = position.iter().chain(&history.link_angle[own.clone()]);
+        let speeds = || speed.iter().chain(&history.link_speed[own.clone()]);
+        q.extend(positions.zip(speeds()).map(|(position, speed)| position - lead_s * speed));
+        qd.extend(speeds());
+    }
+    [q, qd]
 }
 
 #[cfg(test)]

@@ -3,7 +3,11 @@
 mod arm;
 
 use arm::Arm;
-use phiw_curriculum::*;
+use phiw_curriculum::{Experiment, unreliable_model};
+use phiw_estimation::{
+    Estimate, Estimator, Evidence, LeastSquares, MotionLikelihood, MotionLog, NewtonSettings, ParameterPrior,
+    RowsAt, WeightedLeastSquares,
+};
 use phiw_identification::Design;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -13,9 +17,9 @@ fn measure(arm: &Arm, rows_at: RowsAt, motions: usize) -> (Design, Evidence) {
     let design = arm.robot.design(arm.robot.declared()).unwrap();
     let mut evidence = Evidence::none(&design, rows_at).unwrap();
     let experiment = arm.experiment();
-    let mut random = ChaCha8Rng::seed_from_u64(11);
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
     for motion in &arm.dataset.motions()[..motions] {
-        let trial = experiment.perform(&arm.robot, &arm.truth, motion, &mut random).unwrap();
+        let trial = experiment.perform(&arm.robot, &arm.truth, motion, &mut rng).unwrap();
         evidence.add(&design, &trial.measured).unwrap();
     }
     (design, evidence)
@@ -97,7 +101,7 @@ fn what_rows_do_not_determine_keeps_its_present_value() {
     let mut workspace = phiw_dynamics::Workspace::new(&arm.tree);
     arm.tree.inverse_dynamics(&q, &rest, &rest, &mut workspace, &mut tau).unwrap();
     let rows = 40;
-    let measured = Measured {
+    let measured = MotionLog {
         joints,
         period_s: 0.01,
         q: q.repeat(rows),
@@ -141,7 +145,7 @@ fn a_prior_decides_what_logs_do_not() {
     for seed in 20..25 {
         let initial = unreliable_model(&noisy.truth, seed);
         let first = initial.parameters(&noisy.robot).unwrap();
-        let believing = |arm: &Arm| arm.estimator().believing(Prior::unreliable(initial.clone()));
+        let believing = |arm: &Arm| arm.estimator().believing(ParameterPrior::unreliable(initial.clone()));
         let nothing = Evidence::none(&design, RowsAt::Periods).unwrap();
         let present = unreliable_model(&noisy.truth, seed + 100);
         let w = present.parameters(&noisy.robot).unwrap();
@@ -168,7 +172,7 @@ fn a_prior_that_is_never_wrong_is_an_error_that_says_so() {
     let arm = Arm::new(0.05);
     let (design, evidence) = measure(&arm, RowsAt::Periods, 1);
     let w = arm.truth.parameters(&arm.robot).unwrap();
-    let certain = arm.estimator().believing(Prior { model: arm.truth.clone(), share: 0.0 });
+    let certain = arm.estimator().believing(ParameterPrior { model: arm.truth.clone(), share: 0.0 });
     let error = certain.estimate(&design, &evidence, &arm.truth, &w).unwrap_err().to_string();
     assert!(error.contains("a prior may be wrong is 0: it must be finite and > 0"), "{error}");
 }
@@ -190,7 +194,7 @@ fn a_standing_noise_of_nothing_is_an_error_that_says_so() {
     let arm = Arm::new(0.05);
     let (design, evidence) = measure(&arm, RowsAt::Periods, 1);
     let w = arm.truth.parameters(&arm.robot).unwrap();
-    let silent = MotionLikelihood::new(vec![0.0; 7]);
-    let error = silent.estimate(&design, &evidence, &arm.truth, &w).unwrap_err().to_string();
+    let noiseless = MotionLikelihood::new(vec![0.0; 7]);
+    let error = noiseless.estimate(&design, &evidence, &arm.truth, &w).unwrap_err().to_string();
     assert!(error.contains("must be finite and > 0"), "{error}");
 }

@@ -4,9 +4,15 @@
 mod arm;
 
 use arm::Arm;
-use phiw_curriculum::*;
+use phiw_curriculum::end::FixedCount;
+use phiw_curriculum::growth::{Growth, Rivalry};
+use phiw_curriculum::motion::{Motion, MotionDataset};
+use phiw_curriculum::selection::MotionCandidates;
+use phiw_curriculum::{Curriculum, CurriculumError, CurriculumRun, Experiment, unreliable_model};
+use phiw_estimation::{Evidence, KnownEffect, RobotModel, RowsAt};
+use phiw_growth::TraceResidual;
 use phiw_identification::EffectSpec;
-use phiw_plant::{Effect, Friction, Mechanism};
+use phiw_plant::{Friction, Mechanism, PlantEffect};
 
 /// Iterations of 3 s each; the tracer begins with the second.
 const ITERATIONS: usize = 3;
@@ -16,12 +22,12 @@ fn trace_residual() -> TraceResidual {
 }
 
 /// Runs a curriculum over a plant with a secret, with or without growth.
-fn run(arm: &Arm, secret: Option<&Effect>, growth: Option<&dyn Growth>, seed: u64) -> Run {
+fn run(arm: &Arm, secret: Option<&PlantEffect>, growth: Option<&dyn Growth>, seed: u64) -> CurriculumRun {
     let mut experiment = arm.experiment();
     experiment.effects.extend(secret.cloned());
     let (estimator, end) = (arm.estimator(), FixedCount(ITERATIONS));
     let curriculum = Curriculum { growth, ..arm.curriculum(&experiment, &estimator, &end) };
-    let mut run = Run::new(seed, unreliable_model(&arm.truth, seed));
+    let mut run = CurriculumRun::new(seed, unreliable_model(&arm.truth, seed));
     curriculum.run::<CurriculumError>(&mut run, |_| Ok(())).unwrap();
     run
 }
@@ -39,12 +45,12 @@ fn found<'a>(arm: &Arm, model: &'a RobotModel) -> Vec<(&'a str, Vec<&'a str>)> {
 
 /// RMS torque error of a belief on a motion that no run had, of the plant with its secret, which moves
 /// without noise.
-fn torque_error(arm: &Arm, secret: &Effect, model: &RobotModel) -> f64 {
+fn torque_error(arm: &Arm, secret: &PlantEffect, model: &RobotModel) -> f64 {
     let mut experiment = Arm::new(0.0).experiment();
     experiment.effects.push(secret.clone());
     let motion = arm::motions(&arm.tree, 9).pop().unwrap();
-    let mut random = rand::SeedableRng::seed_from_u64(99);
-    let measured = experiment.perform(&arm.robot, &arm.truth, &motion, &mut random).unwrap().measured;
+    let mut rng = <rand_chacha::ChaCha8Rng as rand::SeedableRng>::seed_from_u64(99);
+    let measured = experiment.perform(&arm.robot, &arm.truth, &motion, &mut rng).unwrap().measured;
     let design = arm.robot.design_of(model).unwrap();
     let mut evidence = Evidence::none(&design, RowsAt::Periods).unwrap();
     evidence.add(&design, &measured).unwrap();
@@ -61,8 +67,8 @@ fn what_nobody_declared_is_found_where_it_is() {
     let coulomb = Friction::Coulomb { torque: 0.02 * effort(3), width: 0.01 };
     let spring = Mechanism::Spring { stiffness: 0.3 * effort(5), rest: 0.2 };
     for (secret, kind, joint) in [
-        (Effect::Friction { joint: 3, law: coulomb }, "coulomb_friction", 3),
-        (Effect::Mechanism { joint: 5, law: spring }, "joint_spring", 5),
+        (PlantEffect::Friction { joint: 3, law: coulomb }, "coulomb_friction", 3),
+        (PlantEffect::Mechanism { joint: 5, law: spring }, "joint_spring", 5),
     ] {
         let open = run(&arm, Some(&secret), None, 1);
         let closed = run(&arm, Some(&secret), Some(&trace_residual()), 1);
@@ -95,13 +101,13 @@ fn a_right_model_does_not_grow() {
 fn a_growing_run_is_the_same_however_it_is_interrupted() {
     let arm = Arm::new(0.01);
     let torque = 0.02 * arm.tree.joint(3).limits.effort;
-    let secret = Effect::Friction { joint: 3, law: Friction::Coulomb { torque, width: 0.01 } };
+    let secret = PlantEffect::Friction { joint: 3, law: Friction::Coulomb { torque, width: 0.01 } };
     let mut experiment = arm.experiment();
     experiment.effects.push(secret);
     let (estimator, end, growth) = (arm.estimator(), FixedCount(3), trace_residual());
     let curriculum = Curriculum { growth: Some(&growth), ..arm.curriculum(&experiment, &estimator, &end) };
-    let text = |run: &Run| serde_json::to_string(run).unwrap();
-    let mut undisturbed = Run::new(5, unreliable_model(&arm.truth, 5));
+    let text = |run: &CurriculumRun| serde_json::to_string(run).unwrap();
+    let mut undisturbed = CurriculumRun::new(5, unreliable_model(&arm.truth, 5));
     let mut saved = vec![text(&undisturbed)];
     curriculum
         .run::<CurriculumError>(&mut undisturbed, |run| {
@@ -111,7 +117,7 @@ fn a_growing_run_is_the_same_however_it_is_interrupted() {
         .unwrap();
     assert!(undisturbed.model.effects.len() > arm.robot.declared().len(), "it did not grow");
     for (killed_after, saved) in saved.iter().enumerate().take(3) {
-        let mut resumed: Run = serde_json::from_str(saved).unwrap();
+        let mut resumed: CurriculumRun = serde_json::from_str(saved).unwrap();
         curriculum.run::<CurriculumError>(&mut resumed, |_| Ok(())).unwrap();
         assert_eq!(text(&resumed), text(&undisturbed), "killed after {killed_after}");
     }
@@ -164,13 +170,14 @@ fn rivals_are_told_apart_by_the_motion_on_which_they_differ() {
     }
     let (experiment, estimator, end) = (arm.experiment(), arm.estimator(), FixedCount(1));
     let dataset = MotionDataset::new(joints, motions).unwrap();
-    let candidates = Candidates::new(&arm.robot, arm.robot.declared(), &dataset, &vec![1.0; joints]).unwrap();
+    let candidates =
+        MotionCandidates::new(&arm.robot, arm.robot.declared(), &dataset, &vec![1.0; joints]).unwrap();
     let curriculum = Curriculum {
         dataset: &dataset,
         candidates: &candidates,
         ..arm.curriculum(&experiment, &estimator, &end)
     };
-    let mut run = Run::new(1, arm.truth.clone());
+    let mut run = CurriculumRun::new(1, arm.truth.clone());
     run.rivals.push(rivalry);
     let plan = curriculum.plan(&run).unwrap().unwrap();
     assert_eq!(plan.choice.motion, moved);

@@ -3,8 +3,16 @@
 mod arm;
 
 use arm::{Arm, tree};
-use phiw_curriculum::*;
+use phiw_curriculum::constraint::Safety;
+use phiw_curriculum::end::{Certain, Converged, EndCriterion, EndReason, FixedCount};
+use phiw_curriculum::motion::{Motion, MotionDataset};
+use phiw_curriculum::relaxation::{
+    ConditionRelaxation, Learnt, Maximum, Relaxation, Scale, UncertaintyRelaxation,
+};
+use phiw_curriculum::{CurriculumError, Experiment, IterationRecord, unreliable_model};
 use phiw_dynamics::Workspace;
+use phiw_effects::Catalogue;
+use phiw_estimation::{Robot, RobotModel};
 use phiw_identification::EffectSpec;
 use phiw_simulated_robot::*;
 use phiw_telemetry::Recording;
@@ -127,7 +135,7 @@ proptest! {
     #[test]
     fn base_parameters_survive_the_way_through_standard_ones(seed in 0..50_u64, other in 50..100_u64) {
         let tree = tree();
-        let robot = Robot::with_viscous_friction(tree.clone(), [0.0; 10]).unwrap();
+        let robot = Robot::with_viscous_friction(tree.clone(), [0.0; 10], Catalogue::default()).unwrap();
         let truth = robot.truth(&[0.5; 7]).unwrap();
         let (belief, measured) = (unreliable_model(&truth, seed), unreliable_model(&truth, other));
         let w = measured.parameters(&robot).unwrap();
@@ -207,7 +215,7 @@ fn the_controller_s_torque_is_that_of_the_model() {
     let mut specs: Vec<EffectSpec> =
         joints.iter().map(|joint| EffectSpec::new("viscous_friction", &[joint])).collect();
     specs.push(EffectSpec::new("coulomb_friction", &[&joints[2]]).with("width", 0.01));
-    let robot = Robot::new(tree.clone(), [0.0; 10], specs, Default::default()).unwrap();
+    let robot = Robot::new(tree.clone(), [0.0; 10], specs, Catalogue::default()).unwrap();
     let mut values = vec![0.4; 7];
     values.push(3.0);
     let model = robot.truth(&values).unwrap();
@@ -228,8 +236,8 @@ fn the_controller_s_torque_is_that_of_the_model() {
         }),
     };
     let motion = arm::motions(&tree, 1).remove(0);
-    let mut random = <rand_chacha::ChaCha8Rng as rand::SeedableRng>::seed_from_u64(1);
-    let trial = experiment.perform(&robot, &model, &motion, &mut random).unwrap();
+    let mut rng = <rand_chacha::ChaCha8Rng as rand::SeedableRng>::seed_from_u64(1);
+    let trial = experiment.perform(&robot, &model, &motion, &mut rng).unwrap();
     let mut workspace = Workspace::new(&tree);
     for sample in [0, 100, 200] {
         let [q, v, a] = motion.sample(sample);

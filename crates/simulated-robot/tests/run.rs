@@ -3,17 +3,22 @@
 mod arm;
 
 use arm::Arm;
-use phiw_curriculum::selection::{Choice, Question};
-use phiw_curriculum::*;
+use phiw_curriculum::constraint::{Constraint, Safety};
+use phiw_curriculum::end::{EndReason, FixedCount};
+use phiw_curriculum::motion::Motion;
+use phiw_curriculum::relaxation::{ConditionRelaxation, Learnt, Maximum, Relaxation};
+use phiw_curriculum::selection::{Choice, Question, Selection};
+use phiw_curriculum::{Curriculum, CurriculumError, CurriculumRun, Experiment, Trial, unreliable_model};
+use phiw_estimation::{Robot, RobotModel};
 use phiw_simulated_robot::*;
-use rand_chacha::ChaCha8Rng;
+use rand::Rng;
 
 fn rms(left: &[f64], right: &[f64]) -> f64 {
     let sum: f64 = left.iter().zip(right).map(|(a, b)| (a - b).powi(2)).sum();
     (sum / left.len() as f64).sqrt()
 }
 
-fn text(run: &Run) -> String {
+fn text(run: &CurriculumRun) -> String {
     serde_json::to_string(run).unwrap()
 }
 
@@ -23,7 +28,7 @@ fn a_bad_model_becomes_a_good_one() {
     let (experiment, estimator, end) = (arm.experiment(), arm.estimator(), FixedCount(4));
     let curriculum = arm.curriculum(&experiment, &estimator, &end);
     let truth = arm.truth.parameters(&arm.robot).unwrap();
-    let mut run = Run::new(1, unreliable_model(&arm.truth, 1));
+    let mut run = CurriculumRun::new(1, unreliable_model(&arm.truth, 1));
     let error = |model: &RobotModel| rms(&model.parameters(&arm.robot).unwrap(), &truth);
     let before = error(&run.initial);
     curriculum.run::<CurriculumError>(&mut run, |_| Ok(())).unwrap();
@@ -47,14 +52,14 @@ fn a_run_is_the_same_however_it_is_interrupted() {
     let arm = Arm::new(0.05);
     let (experiment, estimator, end) = (arm.experiment(), arm.estimator(), FixedCount(3));
     let curriculum = arm.curriculum(&experiment, &estimator, &end);
-    let start = || Run::new(7, unreliable_model(&arm.truth, 7));
+    let start = || CurriculumRun::new(7, unreliable_model(&arm.truth, 7));
     let mut undisturbed = start();
     curriculum.run::<CurriculumError>(&mut undisturbed, |_| Ok(())).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
     for killed_after in 0..3 {
         let mut run = start();
         (0..killed_after).for_each(|_| curriculum.step(&mut run).unwrap());
-        let mut resumed: Run = serde_json::from_str(&text(&run)).unwrap();
+        let mut resumed: CurriculumRun = serde_json::from_str(&text(&run)).unwrap();
         pool.install(|| curriculum.run::<CurriculumError>(&mut resumed, |_| Ok(()))).unwrap();
         assert_eq!(text(&resumed), text(&undisturbed), "killed after {killed_after}");
     }
@@ -66,7 +71,7 @@ fn another_seed_is_another_run() {
     let (experiment, estimator, end) = (arm.experiment(), arm.estimator(), FixedCount(1));
     let curriculum = arm.curriculum(&experiment, &estimator, &end);
     let initial = unreliable_model(&arm.truth, 1);
-    let mut runs = [Run::new(1, initial.clone()), Run::new(2, initial)];
+    let mut runs = [CurriculumRun::new(1, initial.clone()), CurriculumRun::new(2, initial)];
     runs.iter_mut().for_each(|run| curriculum.step(run).unwrap());
     assert_ne!(runs[0].model, runs[1].model);
 }
@@ -83,9 +88,9 @@ impl Experiment for Clumsy {
         robot: &Robot,
         model: &RobotModel,
         motion: &Motion,
-        random: &mut ChaCha8Rng,
+        rng: &mut dyn Rng,
     ) -> Result<Trial, CurriculumError> {
-        let trial = self.robot.perform(robot, model, motion, random)?;
+        let trial = self.robot.perform(robot, model, motion, rng)?;
         Ok(Trial { fell_at_s: (motion.name != self.safe).then_some(1.0), ..trial })
     }
 }
@@ -96,7 +101,7 @@ fn a_fall_teaches_nothing_and_is_not_repeated() {
     let (estimator, end) = (arm.estimator(), FixedCount(6));
     let experiment = Clumsy { safe: "sine_0", robot: arm.experiment() };
     let curriculum = arm.curriculum(&experiment, &estimator, &end);
-    let mut run = Run::new(3, unreliable_model(&arm.truth, 3));
+    let mut run = CurriculumRun::new(3, unreliable_model(&arm.truth, 3));
     curriculum.run::<CurriculumError>(&mut run, |_| Ok(())).unwrap();
     let fell = run.history.iter().filter(|record| record.fell_at_s.is_some());
     let mut names: Vec<&str> = fell.map(|record| record.motion.as_str()).collect();
@@ -117,7 +122,7 @@ impl Selection for First {
     fn name(&self) -> &'static str {
         "first"
     }
-    fn choose(&self, question: &Question<'_>, _: &mut ChaCha8Rng) -> Choice {
+    fn choose(&self, question: &Question<'_>, _: &mut dyn Rng) -> Choice {
         Choice { motion: question.allowed[0], merit: None, runner_up: None }
     }
 }
@@ -144,7 +149,7 @@ fn the_constraint_lets_more_in_as_it_is_relaxed() {
         constraint: &Numbered,
         ..arm.curriculum(&experiment, &estimator, &end)
     };
-    let mut run = Run::new(3, unreliable_model(&arm.truth, 3));
+    let mut run = CurriculumRun::new(3, unreliable_model(&arm.truth, 3));
     // One of six motions is 5 %, rounded up: the one that may be reduced most.
     let plan = curriculum.plan(&run).unwrap().unwrap();
     assert_eq!((plan.allowed, plan.alpha), (vec![5], 0.1 * 5.0 + 1e-9));
@@ -173,7 +178,7 @@ fn where_nothing_is_allowed_the_safest_is_taken_and_it_is_said() {
         relaxation: &strict,
         ..arm.curriculum(&experiment, &estimator, &end)
     };
-    let mut run = Run::new(3, unreliable_model(&arm.truth, 3));
+    let mut run = CurriculumRun::new(3, unreliable_model(&arm.truth, 3));
     curriculum.step(&mut run).unwrap();
     let record = &run.history[0];
     assert_eq!((record.motion.as_str(), record.allowed, record.forced), ("sine_5", 0, true));

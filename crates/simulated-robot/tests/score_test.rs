@@ -3,20 +3,24 @@
 mod arm;
 
 use arm::Arm;
-use phiw_curriculum::*;
+use phiw_curriculum::end::FixedCount;
+use phiw_curriculum::growth::Growth;
+use phiw_curriculum::{Curriculum, CurriculumError, CurriculumRun, Experiment, unreliable_model};
+use phiw_estimation::{Estimator, Evidence, MotionLog, RobotModel, RowsAt};
+use phiw_growth::{ScoreTest, ScoreTestSettings};
 use phiw_identification::EffectSpec;
-use phiw_plant::{Effect, Friction, Mechanism};
+use phiw_plant::{Friction, Mechanism, PlantEffect};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 /// The paper's noise: more than the torque of any secret here.
 const NOISE: f64 = 0.05;
 
-fn logs(arm: &Arm, secret: Option<&Effect>, seed: u64) -> Vec<Measured> {
+fn logs(arm: &Arm, secret: Option<&PlantEffect>, seed: u64) -> Vec<MotionLog> {
     let mut experiment = arm.experiment();
     experiment.effects.extend(secret.cloned());
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let trial = |motion| experiment.perform(&arm.robot, &arm.truth, motion, &mut random).unwrap().measured;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let trial = |motion| experiment.perform(&arm.robot, &arm.truth, motion, &mut rng).unwrap().measured;
     arm.dataset.motions().iter().map(trial).collect()
 }
 
@@ -24,23 +28,26 @@ fn test_of(arm: &Arm) -> ScoreTest {
     ScoreTest::new(arm.estimator())
 }
 
-fn secrets(arm: &Arm) -> [(Effect, &'static str, usize); 3] {
+fn secrets(arm: &Arm) -> [(PlantEffect, &'static str, usize); 3] {
     let effort = |joint: usize| arm.tree.joint(joint).limits.effort;
     let coulomb = Friction::Coulomb { torque: 0.035 * effort(1), width: 0.01 };
     let spring = Mechanism::Spring { stiffness: 0.1 * effort(5), rest: 0.2 };
     [
-        (Effect::Friction { joint: 1, law: coulomb }, "coulomb_friction", 1),
-        (Effect::Mechanism { joint: 5, law: spring }, "joint_spring", 5),
-        (Effect::RotorInertia { joint: 4, inertia: 0.008 }, "rotor_inertia", 4),
+        (PlantEffect::Friction { joint: 1, law: coulomb }, "coulomb_friction", 1),
+        (PlantEffect::Mechanism { joint: 5, law: spring }, "joint_spring", 5),
+        (PlantEffect::RotorInertia { joint: 4, inertia: 0.008 }, "rotor_inertia", 4),
     ]
 }
 
 /// −log L of a model fitted to the logs.
-fn misfit(arm: &Arm, model: &RobotModel, logs: &[Measured]) -> f64 {
+fn negative_log_likelihood(arm: &Arm, model: &RobotModel, logs: &[MotionLog]) -> f64 {
     let design = arm.robot.design_of(model).unwrap();
     let mut evidence = Evidence::none(&design, RowsAt::Periods).unwrap();
     logs.iter().for_each(|log| evidence.add(&design, log).unwrap());
-    arm.estimator().misfit(&design, &evidence, &model.parameters(&arm.robot).unwrap()).unwrap().unwrap()
+    arm.estimator()
+        .negative_log_likelihood(&design, &evidence, &model.parameters(&arm.robot).unwrap())
+        .unwrap()
+        .unwrap()
 }
 
 #[test]
@@ -55,7 +62,8 @@ fn what_it_foretells_is_what_a_fit_saves() {
         let gains = arm.estimator().gains(&arm.robot, &declared, &logs, std::slice::from_ref(&spec)).unwrap();
         let foretold = gains[0].clone().unwrap();
         let grown = test.fitted(&arm.robot, &declared, &[spec], &logs).unwrap();
-        let saved = misfit(&arm, &declared, &logs) - misfit(&arm, &grown, &logs);
+        let saved =
+            negative_log_likelihood(&arm, &declared, &logs) - negative_log_likelihood(&arm, &grown, &logs);
         assert!(
             (foretold.gain / saved - 1.0).abs() < 0.25,
             "{kind}: {} foretold, {saved} saved",
@@ -85,8 +93,8 @@ fn an_effect_far_below_the_noise_of_a_row_is_found_in_many() {
         let is_it = |spec: &EffectSpec| spec.kind == kind && spec.joints == [name];
         let [effect] = found.effects.as_slice() else { panic!("{kind}: {found:?}, {best:?}") };
         assert_eq!(effect.joints, [name], "{kind}: {best:?}");
-        let told = is_it(effect) || ranked.iter().take(2).any(|gain| is_it(&gain.effect));
-        assert!(told, "{kind}: {best:?}");
+        let named = is_it(effect) || ranked.iter().take(2).any(|gain| is_it(&gain.effect));
+        assert!(named, "{kind}: {best:?}");
     }
 }
 
@@ -129,7 +137,7 @@ fn an_effect_that_was_found_does_not_change_what_cond_is_of() {
     let growth =
         ScoreTest { settings: ScoreTestSettings { least_s: 5.0, ..Default::default() }, ..test_of(&arm) };
     let curriculum = Curriculum { growth: Some(&growth), ..arm.curriculum(&experiment, &estimator, &end) };
-    let mut run = Run::new(1, unreliable_model(&arm.truth, 1));
+    let mut run = CurriculumRun::new(1, unreliable_model(&arm.truth, 1));
     curriculum.run::<CurriculumError>(&mut run, |_| Ok(())).unwrap();
     let found = &run.model.effects[arm.robot.declared().len()..];
     let name = arm.tree.joint_names().nth(joint).unwrap();

@@ -3,10 +3,13 @@
 mod arm;
 
 use arm::{motions, tree};
+use phiw_curriculum::motion::MotionDataset;
 use phiw_curriculum::selection::{
-    AOptimal, DOptimal, Question, RandomMotion, Selection, SmallestCondition, TorqueOptimal,
+    AOptimal, DOptimal, MotionCandidates, Question, RandomMotion, Selection, SmallestCondition,
+    TorqueOptimal, Triangle,
 };
-use phiw_curriculum::{Candidates, MotionDataset, Robot, Triangle};
+use phiw_effects::Catalogue;
+use phiw_estimation::Robot;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -14,10 +17,10 @@ fn dataset(count: usize) -> MotionDataset {
     MotionDataset::new(7, motions(&tree(), count)).unwrap()
 }
 
-fn candidates(count: usize) -> Candidates {
+fn candidates(count: usize) -> MotionCandidates {
     let tree = tree();
-    let robot = Robot::with_viscous_friction(tree, [0.0; 10]).unwrap();
-    Candidates::new(&robot, robot.declared(), &dataset(count), &[1.0; 7]).unwrap()
+    let robot = Robot::with_viscous_friction(tree, [0.0; 10], Catalogue::default()).unwrap();
+    MotionCandidates::new(&robot, robot.declared(), &dataset(count), &[1.0; 7]).unwrap()
 }
 
 fn random() -> ChaCha8Rng {
@@ -25,7 +28,7 @@ fn random() -> ChaCha8Rng {
 }
 
 /// The allowed motions by cond of the stack, each merged and decomposed in full.
-fn ranked(candidates: &Candidates, allowed: &[usize], measured: Option<&Triangle>) -> Vec<usize> {
+fn ranked(candidates: &MotionCandidates, allowed: &[usize], measured: Option<&Triangle>) -> Vec<usize> {
     let cond = |motion: usize| {
         let mut rows = Vec::new();
         let parts = [Some(&candidates.all()[motion].triangle), measured];
@@ -114,9 +117,9 @@ fn random_choice_takes_all_that_is_allowed_and_nothing_else() {
         measured: None,
         history: &[],
     };
-    let mut random = random();
+    let mut rng = random();
     let mut seen = [0; 6];
-    (0..300).for_each(|_| seen[RandomMotion.choose(&question, &mut random).motion] += 1);
+    (0..300).for_each(|_| seen[RandomMotion.choose(&question, &mut rng).motion] += 1);
     assert_eq!([seen[0], seen[2], seen[3]], [0; 3]);
     assert!([1, 4, 5].iter().all(|&motion| seen[motion] > 60), "{seen:?}");
 }

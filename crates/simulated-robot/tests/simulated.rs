@@ -6,11 +6,15 @@ use arm::Arm;
 use phiw_bspline_retarget::embedded::embedded_motions;
 use phiw_bspline_retarget::human::MarkerMap;
 use phiw_bspline_retarget::{RetargetOptions, Retargeter};
-use phiw_curriculum::*;
+use phiw_curriculum::end::FixedCount;
+use phiw_curriculum::motion::Motion;
+use phiw_curriculum::{CurriculumError, CurriculumRun, Experiment, unreliable_model};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{AnalyticBackend, BackendError, SimulationBackend, Tree, World};
+use phiw_effects::Catalogue;
+use phiw_estimation::{MotionLikelihood, Robot};
 use phiw_identification::EffectSpec;
-use phiw_plant::{Derivatives, Effect, Friction, Gains, Sensors, Timing};
+use phiw_plant::{Derivatives, Friction, Gains, PlantEffect, Sensors, Timing};
 use phiw_simulated_robot::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -33,13 +37,13 @@ fn bodies_and_frictions_are_those_of_the_truth() {
         EffectSpec::new("coulomb_friction", &[joints[2]]).with("sign_width", 0.02),
         EffectSpec::new("rotor_inertia", &[joints[4]]),
     ];
-    let robot = Robot::new(tree.clone(), [0.0; 10], specs, Default::default()).unwrap();
+    let robot = Robot::new(tree.clone(), [0.0; 10], specs, Catalogue::default()).unwrap();
     let mut truth = robot.truth(&[3.0, 0.4]).unwrap();
     truth.standard[0] *= 1.5;
     let simulated = SimulatedRobot::new(&robot, &truth, no_gains(), analytic).unwrap();
     assert_eq!(simulated.tree.inertial_parameters(), truth.standard);
-    let coulomb = Effect::Friction { joint: 2, law: Friction::Coulomb { torque: 3.0, width: 0.02 } };
-    assert_eq!(simulated.effects, [coulomb, Effect::RotorInertia { joint: 4, inertia: 0.4 }]);
+    let coulomb = PlantEffect::Friction { joint: 2, law: Friction::Coulomb { torque: 3.0, width: 0.02 } };
+    assert_eq!(simulated.effects, [coulomb, PlantEffect::RotorInertia { joint: 4, inertia: 0.4 }]);
     assert_eq!(simulated.sensors, Sensors::exact(simulated.timing.control_period_s));
 }
 
@@ -48,7 +52,7 @@ fn an_effect_that_no_plant_has_is_named() {
     let tree = arm::tree();
     let joint = tree.joint_names().next().unwrap().to_owned();
     let spec = EffectSpec::new("torque_gain", &[&joint]);
-    let robot = Robot::new(tree, [0.0; 10], vec![spec], Default::default()).unwrap();
+    let robot = Robot::new(tree, [0.0; 10], vec![spec], Catalogue::default()).unwrap();
     let truth = robot.truth(&[0.1]).unwrap();
     let error = SimulatedRobot::new(&robot, &truth, no_gains(), analytic).err().unwrap();
     assert!(error.to_string().contains("torque_gain"), "{error}");
@@ -65,7 +69,7 @@ fn an_estimator_that_counts_on_another_noise_is_refused() {
         let noise = experiment.torque_noise().iter().map(|noise| share * noise).collect();
         let (estimator, end) = (MotionLikelihood::new(noise), FixedCount(1));
         let curriculum = arm.curriculum(&experiment, &estimator, &end);
-        let mut run = Run::new(1, unreliable_model(&arm.truth, 1));
+        let mut run = CurriculumRun::new(1, unreliable_model(&arm.truth, 1));
         curriculum.run::<CurriculumError>(&mut run, |_| Ok(()))
     };
     check(1.0).unwrap();
@@ -93,8 +97,8 @@ fn encoders_are_as_coarse_as_they_are_told() {
     let arm = Arm::new(0.0);
     let perform = |sensors: Sensors| {
         let experiment = SimulatedRobot { sensors, ..arm.experiment() };
-        let mut random = ChaCha8Rng::seed_from_u64(1);
-        experiment.perform(&arm.robot, &arm.truth, &arm.dataset.motions()[0], &mut random)
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        experiment.perform(&arm.robot, &arm.truth, &arm.dataset.motions()[0], &mut rng)
     };
     let exact = perform(Sensors::exact(0.01)).unwrap().measured;
     let coarse = perform(Sensors::exact(0.01).with_encoder_bits(12, 7)).unwrap().measured;

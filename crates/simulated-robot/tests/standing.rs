@@ -1,9 +1,12 @@
 //! The humanoid on its feet, in both engines: what is measured of it is what its model says.
 
+use phiw_curriculum::Experiment;
+use phiw_curriculum::motion::Motion;
 use phiw_curriculum::standing::*;
-use phiw_curriculum::*;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{BackendError, Foot, SimulationBackend, Tree, Workspace, World};
+use phiw_effects::Catalogue;
+use phiw_estimation::{Evidence, Robot, RowsAt};
 use phiw_plant::{Gains, Timing};
 use phiw_regressor::BaseParameters;
 use phiw_simulated_robot::*;
@@ -223,20 +226,25 @@ fn feet_carry_the_base() {
 fn the_model_says_what_is_measured() {
     let humanoid = Humanoid::new();
     let motion = humanoid.motion(1.5, 1.0);
-    let robot =
-        Robot::with_base(humanoid.chain.clone(), humanoid.base(), [0.0; 10], Vec::new(), Default::default())
-            .unwrap();
+    let robot = Robot::with_base(
+        humanoid.chain.clone(),
+        humanoid.base(),
+        [0.0; 10],
+        Vec::new(),
+        Catalogue::default(),
+    )
+    .unwrap();
     let truth = robot.truth(&[]).unwrap();
     let design = robot.design_of(&truth).unwrap();
     let parameters = truth.parameters(&robot).unwrap();
     for (name, build) in [("mujoco", mujoco as fn(&Tree, &World) -> _), ("rapier", rapier)] {
         let experiment = humanoid.experiment(Box::new(build));
-        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
         if name == "mujoco" && phiw_sim_mujoco::find_library().is_err() {
             println!("skipped: MuJoCo is not there");
             continue;
         }
-        let trial = experiment.perform(&robot, &truth, &motion, &mut random).unwrap();
+        let trial = experiment.perform(&robot, &truth, &motion, &mut rng).unwrap();
         assert_eq!(trial.fell_at_s, None, "{name}");
         assert!(
             trial.tracking_error[..12].iter().all(|error| *error < 0.02),
@@ -271,9 +279,14 @@ fn the_model_says_what_is_measured() {
 fn positions_and_velocities_are_of_one_instant() {
     let humanoid = Humanoid::new();
     let motion = humanoid.motion(0.2, 0.2);
-    let robot =
-        Robot::with_base(humanoid.chain.clone(), humanoid.base(), [0.0; 10], Vec::new(), Default::default())
-            .unwrap();
+    let robot = Robot::with_base(
+        humanoid.chain.clone(),
+        humanoid.base(),
+        [0.0; 10],
+        Vec::new(),
+        Catalogue::default(),
+    )
+    .unwrap();
     let truth = robot.truth(&[]).unwrap();
     for (name, build) in [("mujoco", mujoco as fn(&Tree, &World) -> _), ("rapier", rapier)] {
         if name == "mujoco" && phiw_sim_mujoco::find_library().is_err() {
@@ -282,8 +295,8 @@ fn positions_and_velocities_are_of_one_instant() {
         }
         let mut experiment = humanoid.experiment(Box::new(build));
         experiment.plant.actuator_noise = 0.02;
-        let mut random = ChaCha8Rng::seed_from_u64(4);
-        let log = experiment.perform(&robot, &truth, &motion, &mut random).unwrap().measured;
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let log = experiment.perform(&robot, &truth, &motion, &mut rng).unwrap().measured;
         let (mut along, mut square) = (0.0, 0.0);
         for index in 0..log.q.len() - log.joints {
             let next = index + log.joints;

@@ -57,7 +57,7 @@ pub struct WorstZmp {
 }
 
 impl WorstZmp {
-    /// Of no sample.
+    /// Before the first sample.
     pub const NONE: WorstZmp =
         WorstZmp { margin: f64::INFINITY, sample: 0, zmp: None, largest_reduction: 1.0 };
 
@@ -92,7 +92,7 @@ pub struct MotionBalance {
 }
 
 impl MotionBalance {
-    /// Of no sample.
+    /// Before the first sample.
     pub const NONE: MotionBalance = MotionBalance {
         point_mass: WorstZmp::NONE,
         multi_body: WorstZmp::NONE,

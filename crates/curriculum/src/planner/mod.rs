@@ -4,13 +4,14 @@ mod permission;
 
 pub use permission::{NoneAllowed, Permission, permission};
 
+use crate::constraint::{Constraint, Safety};
+use crate::growth::Rivalry;
+use crate::motion::MotionDataset;
 use crate::random::{Purpose, random};
-use crate::selection::{Best, Choice, Question, Scored, decide};
-use crate::triangle::Triangle;
-use crate::{
-    Candidates, Constraint, CurriculumError, IterationRecord, Learnt, MotionDataset, Relaxation, Rivalry,
-    Robot, RobotModel, Safety, Selection,
-};
+use crate::relaxation::{Learnt, Relaxation};
+use crate::selection::{Best, Choice, MotionCandidates, Question, Scored, Selection, Triangle, decide};
+use crate::{CurriculumError, IterationRecord};
+use phiw_estimation::{Robot, RobotModel};
 
 /// What is believed of a robot, and the motions that it may do.
 #[derive(Clone, Copy)]
@@ -20,12 +21,12 @@ pub struct Belief<'a> {
     /// The motions to choose from.
     pub dataset: &'a MotionDataset,
     /// Their factors, in the columns by which motions are compared.
-    pub candidates: &'a Candidates,
+    pub candidates: &'a MotionCandidates,
     /// What is believed now. The constraint judges motions by it.
     pub model: &'a RobotModel,
     /// What was believed before anything was measured. α of the first iteration follows from it.
     pub initial: &'a RobotModel,
-    /// Two beliefs that the motion has to tell apart; none if it has to tell the parameters.
+    /// Two beliefs that the motion has to distinguish; none if it is chosen for the parameters.
     pub rivalry: Option<&'a Rivalry>,
 }
 
@@ -69,8 +70,7 @@ pub struct Policy<'a> {
 pub struct Plan {
     /// The motion, and why.
     pub choice: Choice,
-    /// The two beliefs that it is to tell apart, in words; none if it is chosen for what it tells of the
-    /// parameters.
+    /// The two beliefs that it is to tell apart, in words; none if it is chosen for the parameters.
     pub separates: Option<[String; 2]>,
     /// The motions that could be chosen, ascending.
     pub allowed: Vec<usize>,
@@ -122,8 +122,8 @@ pub fn plan(
                 measured: measured.triangle,
                 history: measured.history,
             };
-            let mut random = random(policy.seed, measured.condition_numbers.len(), Purpose::Selection);
-            (policy.selection.choose(&question, &mut random), None)
+            let mut rng = random(policy.seed, measured.condition_numbers.len(), Purpose::Selection);
+            (policy.selection.choose(&question, &mut rng), None)
         }
     };
     let safety = safety[choice.motion];

@@ -1,6 +1,6 @@
 //! Which motions may be chosen: the decision by the constraint, and what happens where it allows none.
 
-use crate::Safety;
+use crate::constraint::Safety;
 use serde::{Deserialize, Serialize};
 
 /// What to do where the constraint allows no motion.
@@ -23,7 +23,8 @@ pub enum Permission {
     Allowed(Vec<usize>),
     /// The constraint allows none, and this one is the safest.
     Forced(usize),
-    /// None. The safest motion that the robot has not fallen on is told; none where it has fallen on all.
+    /// No motion may be chosen. This is the safest one that the robot has not fallen on; none if it has
+    /// fallen on all.
     Refused(Option<usize>),
 }
 

@@ -1,16 +1,20 @@
 //! Which motion next: the optimisation (11), and what it is compared with.
 
+mod candidates;
 mod optimal;
 mod random;
 mod smallest_condition;
+mod triangle;
 
+pub use candidates::{MotionCandidate, MotionCandidates};
 pub use optimal::{AOptimal, DOptimal, TorqueOptimal};
 pub use random::RandomMotion;
 pub use smallest_condition::SmallestCondition;
+pub use triangle::Triangle;
 
-use crate::triangle::Triangle;
-use crate::{Candidates, IterationRecord, MotionDataset};
-use rand_chacha::ChaCha8Rng;
+use crate::IterationRecord;
+use crate::motion::MotionDataset;
+use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 /// What a selection chooses from.
@@ -18,8 +22,8 @@ use serde::{Deserialize, Serialize};
 pub struct Question<'a> {
     /// All motions: their names, tasks and durations.
     pub dataset: &'a MotionDataset,
-    /// What each would tell, in the same order.
-    pub candidates: &'a Candidates,
+    /// The factor of each, in the same order.
+    pub candidates: &'a MotionCandidates,
     /// Those that the constraint allows, as indices; never empty.
     pub allowed: &'a [usize],
     /// R of all that has been measured; none in the first iteration.
@@ -45,7 +49,7 @@ pub trait Selection: Send + Sync {
     fn name(&self) -> &'static str;
 
     /// Chooses one of the allowed motions.
-    fn choose(&self, question: &Question<'_>, random: &mut ChaCha8Rng) -> Choice;
+    fn choose(&self, question: &Question<'_>, rng: &mut dyn Rng) -> Choice;
 }
 
 impl Question<'_> {

@@ -1,7 +1,7 @@
 //! Optimal experiments in the classical sense, for comparison with cond.
 
 use super::{Choice, Question, Selection, smallest};
-use rand_chacha::ChaCha8Rng;
+use rand::Rng;
 
 /// The largest determinant of ΦᵀΦ: the smallest volume of the parameters' uncertainty.
 #[derive(Clone, Copy, Debug, Default)]
@@ -13,7 +13,7 @@ impl Selection for DOptimal {
     }
 
     /// The merit is −log det(ΦᵀΦ).
-    fn choose(&self, question: &Question<'_>, _: &mut ChaCha8Rng) -> Choice {
+    fn choose(&self, question: &Question<'_>, _: &mut dyn Rng) -> Choice {
         smallest(question.allowed, |motion| -question.stack(motion).log_determinant())
     }
 }
@@ -28,7 +28,7 @@ impl Selection for AOptimal {
         "a_optimal"
     }
 
-    fn choose(&self, question: &Question<'_>, _: &mut ChaCha8Rng) -> Choice {
+    fn choose(&self, question: &Question<'_>, _: &mut dyn Rng) -> Choice {
         smallest(question.allowed, |motion| question.stack(motion).inverse_trace())
     }
 }
@@ -37,7 +37,7 @@ impl Selection for AOptimal {
 /// dataset: what the torque error (19) measures.
 ///
 /// The paper's cond does not change when Φ is done again, so that where one motion keeps it small it is
-/// chosen again and again, though another sample of it tells little. The variance of the predictions counts
+/// chosen again and again, though another sample of it adds little. The variance of the predictions counts
 /// both: each direction of w as much as the motions feel it, and how often it was seen. It is the I- or
 /// V-optimality of the design of experiments (Atkinson, Donev and Tobias, Optimum Experimental Designs, 2007,
 /// §10.6), over a finite set of motions.
@@ -50,7 +50,7 @@ impl Selection for TorqueOptimal {
     }
 
     /// The merit is trace(Φ_all·(ΦᵀΦ)⁻¹·Φ_allᵀ), with the rows weighted like the candidates.
-    fn choose(&self, question: &Question<'_>, _: &mut ChaCha8Rng) -> Choice {
+    fn choose(&self, question: &Question<'_>, _: &mut dyn Rng) -> Choice {
         let everything = question.candidates.everything();
         smallest(question.allowed, |motion| question.stack(motion).variance_along(everything))
     }

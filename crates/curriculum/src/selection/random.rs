@@ -1,8 +1,7 @@
 //! Any motion: the non-curriculum approach of section 5.1.
 
 use super::{Choice, Question, Selection};
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use rand::{Rng, RngExt};
 
 /// Picks any allowed motion, all alike likely.
 #[derive(Clone, Copy, Debug, Default)]
@@ -13,8 +12,8 @@ impl Selection for RandomMotion {
         "random"
     }
 
-    fn choose(&self, question: &Question<'_>, random: &mut ChaCha8Rng) -> Choice {
-        let place = random.random_range(0..question.allowed.len().max(1));
+    fn choose(&self, question: &Question<'_>, rng: &mut dyn Rng) -> Choice {
+        let place = rng.random_range(0..question.allowed.len().max(1));
         Choice {
             motion: question.allowed.get(place).copied().unwrap_or_default(),
             merit: None,

@@ -1,10 +1,9 @@
 //! Equation (11): the motion that makes cond of the stack smallest.
 
-use super::{Choice, Question, Selection, smallest};
-use crate::triangle::Triangle;
+use super::{Choice, Question, Selection, Triangle, smallest};
 use faer::{Mat, Side};
 use phiw_dynamics::dense::dot;
-use rand_chacha::ChaCha8Rng;
+use rand::Rng;
 
 /// Right singular vectors of what has been measured that bound a candidate's cond from below.
 const PROBES: usize = 16;
@@ -25,7 +24,7 @@ impl Selection for SmallestCondition {
         "smallest_condition"
     }
 
-    fn choose(&self, question: &Question<'_>, _: &mut ChaCha8Rng) -> Choice {
+    fn choose(&self, question: &Question<'_>, _: &mut dyn Rng) -> Choice {
         let all = question.candidates.all();
         let Some(measured) = question.measured else {
             return smallest(question.allowed, |motion| all[motion].condition_number);
@@ -38,7 +37,7 @@ impl Selection for SmallestCondition {
         bounds.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut best: [Option<(f64, usize)>; 2] = [None, None];
         for (bound, motion) in bounds {
-            // The runner-up is told too, so it must be certain as well.
+            // The runner-up is reported too, so it must be exact as well.
             if best[1].is_some_and(|(second, _)| bound > second) {
                 break;
             }

@@ -252,18 +252,3 @@ impl Feet {
         Ok(())
     }
 }
-
-/// An orthonormal basis of the velocities at `q` that do not move `bodies`, as columns.
-pub(crate) fn free_directions(tree: &Tree, bodies: &[usize], q: &[f64]) -> Result<Mat<f64>, DimensionError> {
-    let feet = bodies.iter().map(|&body| Foot { body, sole: vec![[0.0; 3]] }).collect::<Vec<_>>();
-    let feet = Feet::new(tree, &feet, q)?;
-    let placements: Vec<Placement<f64>> = {
-        let mut placements = vec![Placement::identity(); tree.bodies().len()];
-        tree.forward_kinematics(q, &mut placements)?;
-        placements
-    };
-    let jacobian = feet.jacobian(&placements, &(0..bodies.len()).collect::<Vec<_>>())?;
-    let basis = jacobian.transpose().qr().compute_Q();
-    let held = jacobian.nrows().min(basis.ncols());
-    Ok(Mat::from_fn(basis.nrows(), basis.ncols() - held, |row, column| basis[(row, held + column)]))
-}

@@ -1,7 +1,8 @@
-//! Legs that follow: base and upper body move as they are told, and the legs keep the feet where they are.
+//! Legs that follow: the motion of base and upper body is given, and the legs keep the feet where they are.
 
 use super::{Feet, VIRTUAL_JOINTS};
-use crate::{CurriculumError, Motion};
+use crate::CurriculumError;
+use crate::motion::Motion;
 use phiw_dynamics::{Foot, JointType, Tree, Vec3, check_size};
 use phiw_regressor::BaseParameters;
 use rand::{RngExt, SeedableRng};
@@ -22,7 +23,7 @@ pub struct Legs {
     joints: Vec<usize>,
 }
 
-/// Random states with the feet on the floor, in which is sought what motions can tell apart.
+/// Random states with the feet on the floor, from which the base parameters are computed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StandingStates {
     /// How many: each gives a row for each joint, so 200 are many times the columns of a humanoid.
@@ -170,13 +171,13 @@ impl Legs {
     /// The legs can reach too few of the states.
     pub fn base_parameters(&self, states: &StandingStates) -> Result<BaseParameters, CurriculumError> {
         let all: Vec<usize> = (0..self.feet.all().len()).collect();
-        let mut random = ChaCha8Rng::seed_from_u64(states.seed);
+        let mut rng = ChaCha8Rng::seed_from_u64(states.seed);
         let mut reached: Vec<[Vec<f64>; 3]> = Vec::with_capacity(states.count);
         for _ in 0..states.tries * states.count {
             if reached.len() == states.count {
                 break;
             }
-            let mut state = self.random_state(states, &mut random);
+            let mut state = self.random_state(states, &mut rng);
             let [q, v, a] = &mut state;
             if self.feet.close(&self.joints, &all, [q, v, a]).is_ok() {
                 reached.push(state);
@@ -196,17 +197,17 @@ impl Legs {
 
     /// Base and upper body anywhere within their reach; the legs as in the stance, from where they are to
     /// follow.
-    fn random_state(&self, states: &StandingStates, random: &mut ChaCha8Rng) -> [Vec<f64>; 3] {
+    fn random_state(&self, states: &StandingStates, rng: &mut ChaCha8Rng) -> [Vec<f64>; 3] {
         let tree = self.feet.tree();
         let joints = tree.joint_count();
         let mut state = [self.stance.clone(), vec![0.0; joints], vec![0.0; joints]];
         for joint in (0..joints).filter(|joint| !self.joints.contains(joint)) {
             state[0][joint] = match states.reach.get(joint) {
-                Some(reach) => self.stance[joint] + reach * random.random_range(-1.0..1.0),
-                None => random_position(tree, joint, random),
+                Some(reach) => self.stance[joint] + reach * rng.random_range(-1.0..1.0),
+                None => random_position(tree, joint, rng),
             };
-            state[1][joint] = states.velocity * random.random_range(-1.0..1.0);
-            state[2][joint] = states.acceleration * random.random_range(-1.0..1.0);
+            state[1][joint] = states.velocity * rng.random_range(-1.0..1.0);
+            state[2][joint] = states.acceleration * rng.random_range(-1.0..1.0);
         }
         state[0][2] -= states.lowered_m;
         state
@@ -215,15 +216,15 @@ impl Legs {
 
 /// Anywhere between the limits \[rad, m\]; for a joint without them, half a turn or half a metre to both
 /// sides.
-fn random_position(tree: &Tree, joint: usize, random: &mut ChaCha8Rng) -> f64 {
+fn random_position(tree: &Tree, joint: usize, rng: &mut ChaCha8Rng) -> f64 {
     let body = tree.joint(joint);
     let most = if body.joint_type == JointType::Prismatic { 0.5 } else { PI };
     let (lower, upper) = (body.limits.lower, body.limits.upper);
     match (lower.is_finite(), upper.is_finite()) {
-        (true, true) if lower < upper => random.random_range(lower..upper),
+        (true, true) if lower < upper => rng.random_range(lower..upper),
         (true, true) => lower,
-        (true, false) => lower + random.random_range(0.0..2.0 * most),
-        (false, true) => upper - random.random_range(0.0..2.0 * most),
-        (false, false) => random.random_range(-most..most),
+        (true, false) => lower + rng.random_range(0.0..2.0 * most),
+        (false, true) => upper - rng.random_range(0.0..2.0 * most),
+        (false, false) => rng.random_range(-most..most),
     }
 }

@@ -5,7 +5,6 @@ mod feet;
 mod legs;
 mod virtual_base;
 
-pub(crate) use feet::free_directions;
 pub use feet::{Feet, StandingFoot};
 pub use legs::{Legs, StandingStates};
 pub use virtual_base::{VIRTUAL_JOINTS, base_coordinates, with_virtual_base};

@@ -76,9 +76,9 @@ mod tests {
         assert_eq!(chain.joint_count(), floating.joint_count() + 6);
         assert!(chain.joint_names().skip(6).eq(floating.joint_names()));
         assert!(with_virtual_base(&text, "pelvis").is_none());
-        let mut random = RandomNumbers::new(3);
+        let mut rng = RandomNumbers::new(3);
         for _ in 0..20 {
-            let state = random_state(&floating, &mut random);
+            let state = random_state(&floating, &mut rng);
             let base: [f64; 7] = std::array::from_fn(|k| state.q[k]);
             let velocity: [f64; 6] = std::array::from_fn(|k| state.v[k]);
             let [q_base, v_base] = base_coordinates(&base, &velocity);

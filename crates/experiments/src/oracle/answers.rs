@@ -36,13 +36,13 @@ impl States {
     /// # Errors
     /// None for a tree that was read.
     pub fn random(tree: &Tree, count: usize, seed: u64) -> Result<Self, DimensionError> {
-        let random = &mut RandomNumbers::new(seed);
+        let rng = &mut RandomNumbers::new(seed);
         let mut workspace = Workspace::new(tree);
         let mut force = vec![0.0; tree.velocity_size()];
         let mut states = States { count, q: Vec::new(), v: Vec::new(), a: Vec::new(), force: Vec::new() };
         for _ in 0..count {
-            let state = random_state(tree, random);
-            let other = random_state(tree, random);
+            let state = random_state(tree, rng);
+            let other = random_state(tree, rng);
             tree.inverse_dynamics(&state.q, &state.v, &other.a, &mut workspace, &mut force)?;
             states.q.extend(state.q);
             states.v.extend(state.v);

@@ -1,9 +1,11 @@
 //! What is compared: the arms of the experiment.
 
-use phiw_curriculum::selection::{Choice, Question, RandomMotion, SmallestCondition, TorqueOptimal};
-use phiw_curriculum::{Constraint, MotionDataset, Selection, Unconstrained};
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use phiw_curriculum::constraint::{Constraint, Unconstrained};
+use phiw_curriculum::motion::MotionDataset;
+use phiw_curriculum::selection::{
+    Choice, Question, RandomMotion, Selection, SmallestCondition, TorqueOptimal,
+};
+use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
 /// One way to choose motions.
@@ -96,10 +98,10 @@ impl Selection for OfTask {
         "of_task"
     }
 
-    fn choose(&self, question: &Question<'_>, random: &mut ChaCha8Rng) -> Choice {
+    fn choose(&self, question: &Question<'_>, rng: &mut dyn Rng) -> Choice {
         let open: Vec<usize> =
             question.allowed.iter().copied().filter(|motion| self.members.contains(motion)).collect();
         let from = if open.is_empty() { question.allowed } else { &open };
-        Choice { motion: from[random.random_range(0..from.len())], merit: None, runner_up: None }
+        Choice { motion: from[rng.random_range(0..from.len())], merit: None, runner_up: None }
     }
 }

@@ -4,7 +4,7 @@ use super::arm::Arm;
 use super::run_file::RunFile;
 use super::secrets::is_secret;
 use super::setup::Setup;
-use phiw_curriculum::Gain;
+use phiw_estimation::Gain;
 use phiw_identification::EffectSpec;
 use serde::{Deserialize, Serialize};
 

@@ -5,7 +5,7 @@
 use super::arm::Arm;
 use super::report::Results;
 use super::run_file::RunFile;
-use phiw_curriculum::{Certain, Converged, EndCriterion, EndReason};
+use phiw_curriculum::end::{Certain, Converged, EndCriterion, EndReason};
 use phiw_report::statistics::median;
 
 /// Iterations after which a run would have ended by a criterion; all of them if it would not.

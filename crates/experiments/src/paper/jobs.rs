@@ -7,10 +7,11 @@ use super::setup::{Setup, Validation};
 use super::subject::SubjectName;
 use crate::plant::engine::Engine;
 use crate::plant::secret::SecretKind;
-use phiw_curriculum::{
-    Curriculum, CurriculumSettings, FixedCount, NoneAllowed, RowsAt, Run, unreliable_model,
-};
-use phiw_plant::Effect;
+use phiw_curriculum::end::FixedCount;
+use phiw_curriculum::planner::NoneAllowed;
+use phiw_curriculum::{Curriculum, CurriculumRun, CurriculumSettings, unreliable_model};
+use phiw_estimation::RowsAt;
+use phiw_plant::PlantEffect;
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -105,7 +106,7 @@ impl Job {
     fn run(
         &self,
         setup: &Setup,
-        secret: Option<&Effect>,
+        secret: Option<&PlantEffect>,
         validation: &Validation,
         out: &Path,
         left: &AtomicUsize,
@@ -166,7 +167,7 @@ impl Job {
         Ok(Outcome::Done)
     }
 
-    fn begin(&self, setup: &Setup, secret: Option<&Effect>) -> anyhow::Result<RunFile> {
+    fn begin(&self, setup: &Setup, secret: Option<&PlantEffect>) -> anyhow::Result<RunFile> {
         let initial = match setup.settings.initial {
             Initial::One => unreliable_model(&setup.truth, 0),
             Initial::Each => unreliable_model(&setup.truth, self.seed),
@@ -180,7 +181,7 @@ impl Job {
             secret: self.secret,
             secret_joints: joints.iter().map(name).collect(),
             scores: Vec::new(),
-            run: Run::new(self.seed, initial),
+            run: CurriculumRun::new(self.seed, initial),
             details: Vec::new(),
             detection: None,
         })

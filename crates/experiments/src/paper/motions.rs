@@ -6,7 +6,7 @@ use crate::retarget::database::{c3d_files, embedded, two_handed};
 use anyhow::{Context, ensure};
 use phiw::arguments::{Derivatives, RetargetArguments};
 use phiw::console::Console;
-use phiw_curriculum::Motion;
+use phiw_curriculum::motion::Motion;
 use phiw_telemetry::{Recording, TorqueColumns};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};

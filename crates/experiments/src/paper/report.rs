@@ -1,14 +1,12 @@
 //! The runs of a folder, and the page that is made of them.
 
 use super::arm::{Arm, Footing};
-use super::figures;
-use super::numbers;
 use super::page::Page;
 use super::run_file::{self, RunFile};
 use super::score::Score;
-use super::secrets;
 use super::setup::Settings;
 use super::subject::SubjectName;
+use super::{figures, numbers, secrets};
 use anyhow::{Context, ensure};
 use phiw_curriculum::IterationRecord;
 use std::path::Path;

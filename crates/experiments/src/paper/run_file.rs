@@ -6,7 +6,7 @@ use super::jobs::Job;
 use super::score::{Detail, Score};
 use crate::plant::secret::SecretKind;
 use anyhow::Context;
-use phiw_curriculum::Run;
+use phiw_curriculum::CurriculumRun;
 use phiw_result_folder::{Disk, replace_file};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ pub struct RunFile {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub secret_joints: Vec<String>,
     /// All that is needed to go on.
-    pub run: Run,
+    pub run: CurriculumRun,
     /// Scores of the initial model, then after each iteration.
     pub scores: Vec<Score>,
     /// More, of the run that stands for all.

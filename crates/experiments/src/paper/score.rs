@@ -2,9 +2,9 @@
 
 use super::setup::{Setup, Validation};
 use phiw_curriculum::selection::Question;
-use phiw_curriculum::{
-    Curriculum, CurriculumError, Estimator, Evidence, LeastSquares, Measured, RobotModel, RowsAt, Run,
-    WeightedLeastSquares,
+use phiw_curriculum::{Curriculum, CurriculumRun};
+use phiw_estimation::{
+    EstimationError, Estimator, Evidence, LeastSquares, MotionLog, RobotModel, RowsAt, WeightedLeastSquares,
 };
 use phiw_identification::accuracy::{parameter_rmse, torque_rmse};
 use phiw_identification::{TorqueError, torque_error};
@@ -47,7 +47,7 @@ impl Setup {
     ///
     /// # Errors
     /// The belief is not of this robot.
-    pub fn torque_error(&self, model: &RobotModel, logs: &[Measured]) -> anyhow::Result<TorqueError> {
+    pub fn torque_error(&self, model: &RobotModel, logs: &[MotionLog]) -> anyhow::Result<TorqueError> {
         let design = self.robot.design_of(model)?;
         let mut evidence = Evidence::none(&design, RowsAt::Periods)?.without_noise();
         for log in logs {
@@ -81,7 +81,7 @@ impl Setup {
             };
             // Rows that count can be few, where the base rocks: then least squares has no answer.
             match estimator.estimate(&design, evidence, model, &parameters) {
-                Err(CurriculumError::Regressor(RegressorError::RankDeficient { .. })) => Ok(None),
+                Err(EstimationError::Regressor(RegressorError::RankDeficient { .. })) => Ok(None),
                 estimate => Ok(Some(parameter_rmse(&estimate?.parameters, &truth))),
             }
         };
@@ -98,7 +98,7 @@ impl Setup {
     ///
     /// # Errors
     /// The run is not of this robot.
-    pub fn detail(&self, curriculum: &Curriculum<'_>, run: &Run) -> anyhow::Result<Option<Detail>> {
+    pub fn detail(&self, curriculum: &Curriculum<'_>, run: &CurriculumRun) -> anyhow::Result<Option<Detail>> {
         let Some(plan) = curriculum.plan(run)? else { return Ok(None) };
         let measured = curriculum.measured(run)?;
         let question = Question {

@@ -11,14 +11,20 @@ use crate::plant::engine::Engine;
 use crate::plant::secret::SecretKind;
 use anyhow::{Context, ensure};
 use phiw::console::Console;
-use phiw_curriculum::{
-    Candidates, ConditionRelaxation, Estimator, Evidence, Experiment, Growth, LeastSquares, Measured, Motion,
-    MotionDataset, MotionLikelihood, Prior, Relaxation, Robot, RobotModel, RowsAt, ScoreTest, TraceResidual,
-    UncertaintyRelaxation, WeightedLeastSquares, ZmpConstraint,
-};
+use phiw_curriculum::Experiment;
+use phiw_curriculum::constraint::ZmpConstraint;
+use phiw_curriculum::growth::Growth;
+use phiw_curriculum::motion::{Motion, MotionDataset};
+use phiw_curriculum::relaxation::{ConditionRelaxation, Relaxation, UncertaintyRelaxation};
+use phiw_curriculum::selection::MotionCandidates;
 use phiw_dynamics::{PARAMETERS_PER_BODY, Workspace, World};
+use phiw_estimation::{
+    Estimator, Evidence, LeastSquares, MotionLikelihood, MotionLog, ParameterPrior, Robot, RobotModel,
+    RowsAt, WeightedLeastSquares,
+};
+use phiw_growth::{ScoreTest, TraceResidual};
 use phiw_identification::{parameter_name, standard_unit};
-use phiw_plant::{Effect, Sensors, Timing};
+use phiw_plant::{PlantEffect, Sensors, Timing};
 use phiw_regressor::factor::Factor;
 use phiw_simulated_robot::{FeedForward, SimulatedRobot};
 use rand::SeedableRng;
@@ -40,7 +46,7 @@ pub struct Setup {
     /// Motions to choose from.
     pub dataset: MotionDataset,
     /// Their factors.
-    pub candidates: Candidates,
+    pub candidates: MotionCandidates,
     /// The constraint (12).
     pub constraint: ZmpConstraint,
     /// Equation (20), or what stands for it.
@@ -54,7 +60,7 @@ pub struct Setup {
 /// Logs of held-out motions, and what they are under the declared columns.
 pub struct Validation {
     /// The logs, without noise.
-    pub logs: Vec<Measured>,
+    pub logs: Vec<MotionLog>,
     /// R of [Φ f], and the number of samples T.
     pub declared: (Factor, f64),
 }
@@ -133,7 +139,7 @@ const VALIDATION_SEED: u64 = u64::MAX;
 /// The stream of the secrets of a seed.
 const SECRET_STREAM: u64 = 1;
 /// What stands for rounding where there is no noise, over the torque limit.
-const SILENT: f64 = 1e-3;
+const NOISELESS: f64 = 1e-3;
 
 impl Setup {
     /// Reads robot and motions, retargets what is not there, and measures the validation motions. `console`
@@ -161,8 +167,8 @@ impl Setup {
             }
         };
         let dataset = MotionDataset::new(subject.tree.joint_count(), motions.identification)?;
-        let weights = subject.row_weights(if arguments.noise > 0.0 { arguments.noise } else { SILENT });
-        let candidates = Candidates::new(&robot, robot.declared(), &dataset, &weights)?;
+        let weights = subject.row_weights(if arguments.noise > 0.0 { arguments.noise } else { NOISELESS });
+        let candidates = MotionCandidates::new(&robot, robot.declared(), &dataset, &weights)?;
         let (prior, relaxation) = method(arguments, &subject);
         let relaxation_of_alpha: Box<dyn Relaxation> = match relaxation {
             RelaxationName::Condition => Box::new(ConditionRelaxation::default()),
@@ -218,7 +224,7 @@ impl Setup {
     ///
     /// # Errors
     /// The robot can not be run.
-    pub fn validation(&self, backend: Engine, secret: Option<&Effect>) -> anyhow::Result<Validation> {
+    pub fn validation(&self, backend: Engine, secret: Option<&PlantEffect>) -> anyhow::Result<Validation> {
         let logs = self.validation_logs(backend, secret)?;
         let declared = self.validation_of(&self.truth, &logs)?;
         Ok(Validation { logs, declared })
@@ -231,7 +237,7 @@ impl Setup {
         backend: Engine,
         standing: bool,
         noise: f64,
-        secret: Option<&Effect>,
+        secret: Option<&PlantEffect>,
     ) -> Box<dyn Experiment> {
         let mut experiment = self.experiment(backend, standing, noise);
         experiment.effects.extend(secret.cloned());
@@ -270,7 +276,7 @@ impl Setup {
                 let likelihood = self.likelihood();
                 Box::new(match self.settings.prior {
                     PriorName::None => likelihood,
-                    PriorName::Initial => likelihood.believing(Prior::unreliable(initial.clone())),
+                    PriorName::Initial => likelihood.believing(ParameterPrior::unreliable(initial.clone())),
                 })
             }
         }
@@ -279,7 +285,7 @@ impl Setup {
     /// The likelihood of motions under the noise of the plant.
     pub fn likelihood(&self) -> MotionLikelihood {
         // Without noise there is no likelihood.
-        let share = if self.settings.noise > 0.0 { self.settings.noise } else { SILENT };
+        let share = if self.settings.noise > 0.0 { self.settings.noise } else { NOISELESS };
         let standing_on = self.subject.standing.as_ref().map(Standing::foot_bodies);
         MotionLikelihood::new(self.subject.torque_noise(share)).standing_on(standing_on.unwrap_or_default())
     }
@@ -302,12 +308,16 @@ impl Setup {
     ///
     /// # Errors
     /// The robot can not be run.
-    pub fn validation_logs(&self, backend: Engine, secret: Option<&Effect>) -> anyhow::Result<Vec<Measured>> {
+    pub fn validation_logs(
+        &self,
+        backend: Engine,
+        secret: Option<&PlantEffect>,
+    ) -> anyhow::Result<Vec<MotionLog>> {
         let experiment = self.trial_ground(backend, false, 0.0, secret);
-        let measure = |(index, motion): (usize, &Motion)| -> anyhow::Result<Measured> {
-            let mut random = ChaCha8Rng::seed_from_u64(VALIDATION_SEED);
-            random.set_stream(index as u64);
-            Ok(experiment.perform(&self.robot, &self.truth, motion, &mut random)?.measured)
+        let measure = |(index, motion): (usize, &Motion)| -> anyhow::Result<MotionLog> {
+            let mut rng = ChaCha8Rng::seed_from_u64(VALIDATION_SEED);
+            rng.set_stream(index as u64);
+            Ok(experiment.perform(&self.robot, &self.truth, motion, &mut rng)?.measured)
         };
         self.held_out.par_iter().enumerate().map(measure).collect()
     }
@@ -316,7 +326,7 @@ impl Setup {
     ///
     /// # Errors
     /// The belief is not of this robot.
-    pub fn validation_of(&self, model: &RobotModel, logs: &[Measured]) -> anyhow::Result<(Factor, f64)> {
+    pub fn validation_of(&self, model: &RobotModel, logs: &[MotionLog]) -> anyhow::Result<(Factor, f64)> {
         let design = self.robot.design_of(model)?;
         let mut evidence = Evidence::none(&design, RowsAt::Periods)?.without_noise();
         for log in logs {
@@ -331,7 +341,7 @@ impl Setup {
     ///
     /// # Errors
     /// None that a robot that was read can cause.
-    pub fn secret(&self, kind: SecretKind, seed: u64) -> anyhow::Result<Effect> {
+    pub fn secret(&self, kind: SecretKind, seed: u64) -> anyhow::Result<PlantEffect> {
         let tree = &self.subject.tree;
         let joints = tree.joint_count();
         let world = World { rotor_inertia: vec![0.0; joints], ..World::default() };
@@ -351,9 +361,9 @@ impl Setup {
                 samples.push(case::Sample { t_s: index as f64 * motion.period_s(), q, v, a, torque });
             }
         }
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        random.set_stream(SECRET_STREAM);
-        Ok(kind.draw(&robot, &samples, &mut random))
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(SECRET_STREAM);
+        Ok(kind.draw(&robot, &samples, &mut rng))
     }
 }
 

@@ -3,12 +3,12 @@
 use super::whole_body::{self, Standing};
 use crate::environment;
 use anyhow::Context;
-use phiw_curriculum::{Robot, RobotModel};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
 use phiw_dynamics::{Foot, InertialParameters, Tree, World};
-use phiw_plant::{Effect, Friction, GainSettings, Gains, apparent_inertia};
-use phiw_zmp::feet_from_toml;
-use phiw_zmp::{Stance, SupportPolygon};
+use phiw_effects::Catalogue;
+use phiw_estimation::{Robot, RobotModel};
+use phiw_plant::{Friction, GainSettings, Gains, PlantEffect, apparent_inertia};
+use phiw_zmp::{Stance, SupportPolygon, feet_from_toml};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -120,7 +120,9 @@ impl Subject {
     pub fn robot(&self) -> anyhow::Result<Robot> {
         match &self.standing {
             Some(standing) => standing.robot(),
-            None => Ok(Robot::with_viscous_friction(self.tree.clone(), self.base_link)?),
+            None => {
+                Ok(Robot::with_viscous_friction(self.tree.clone(), self.base_link, Catalogue::default())?)
+            }
         }
     }
 
@@ -133,8 +135,8 @@ impl Subject {
     }
 
     /// The frictions, in the plant.
-    pub fn frictions(&self) -> Vec<Effect> {
-        let friction = |(joint, &coefficient): (usize, &f64)| Effect::Friction {
+    pub fn frictions(&self) -> Vec<PlantEffect> {
+        let friction = |(joint, &coefficient): (usize, &f64)| PlantEffect::Friction {
             joint,
             law: Friction::Viscous { coefficient },
         };

@@ -1,8 +1,10 @@
 //! The two tasks of the task-specific models.
 
-use phiw_curriculum::{
-    Constraint, CurriculumError, MotionDataset, Relaxation, Robot, RobotModel, unreliable_model,
-};
+use phiw_curriculum::constraint::Constraint;
+use phiw_curriculum::motion::MotionDataset;
+use phiw_curriculum::relaxation::Relaxation;
+use phiw_curriculum::{CurriculumError, unreliable_model};
+use phiw_estimation::{Robot, RobotModel};
 use std::collections::BTreeMap;
 
 /// Initial models that are asked.

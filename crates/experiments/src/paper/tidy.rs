@@ -5,7 +5,7 @@ use super::report::Results;
 use super::run_file::replace;
 use super::{numbers, reliability, secrets};
 use crate::plant::secret::SecretKind;
-use phiw_curriculum::Converged;
+use phiw_curriculum::end::Converged;
 use phiw_identification::accuracy::ReliabilityCriterion;
 use std::collections::BTreeSet;
 use std::fmt::Write;

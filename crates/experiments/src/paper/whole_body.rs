@@ -12,18 +12,18 @@ use crate::environment;
 use crate::plant::engine::Engine;
 use anyhow::Context;
 use pelvis::PelvisMotion;
+use phiw_curriculum::motion::Motion;
 use phiw_curriculum::standing::{Legs, StandingStates, VIRTUAL_JOINTS, with_virtual_base};
-use phiw_curriculum::{Motion, Robot};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{BackendError, Foot, PARAMETERS_PER_BODY, SimulationBackend, Tree, World};
 use phiw_effects::Catalogue;
+use phiw_estimation::Robot;
 use phiw_identification::EffectSpec;
-use phiw_plant::{Effect, Sensors, Timing};
+use phiw_plant::{PlantEffect, Sensors, Timing};
 use phiw_regressor::BaseParameters;
 use phiw_sim_mujoco::{Integrator, MujocoBackend};
 use phiw_simulated_robot::{SimulatedRobot, StandingFeedForward, StandingRobot, WrenchNoise};
-use phiw_zmp::feet_from_toml;
-use phiw_zmp::{Stance, SupportPolygon};
+use phiw_zmp::{Stance, SupportPolygon, feet_from_toml};
 
 /// Joints without motors.
 const BASE: usize = VIRTUAL_JOINTS.len();
@@ -165,9 +165,9 @@ impl Subject {
         standing: &Standing,
         backend: Engine,
         noise: f64,
-        effects: Vec<Effect>,
+        effects: Vec<PlantEffect>,
     ) -> StandingRobot {
-        let silent = WrenchNoise { force_n: 0.0, moment_nm: 0.0 };
+        let noiseless = WrenchNoise { force_n: 0.0, moment_nm: 0.0 };
         let plant = SimulatedRobot {
             tree: self.floating.clone(),
             world: self.floor(),
@@ -188,7 +188,7 @@ impl Subject {
             stillness: Default::default(),
             build: Box::new(move |tree, world| build(backend, tree, world)),
         };
-        let wrench_noise = if noise > 0.0 { WRENCH_NOISE } else { silent };
+        let wrench_noise = if noise > 0.0 { WRENCH_NOISE } else { noiseless };
         StandingRobot { plant, feet: standing.legs.feet().clone(), wrench_noise }
     }
 }

@@ -11,7 +11,7 @@ use phiw_dynamics::random_tree::{RandomNumbers, random_state};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Tree, Workspace, World};
 use phiw_plant::{
-    ComputedTorque, Effect, Friction, GainSettings, Gains, MultiSine, Plant, PlantSetup, Reference,
+    ComputedTorque, Friction, GainSettings, Gains, MultiSine, Plant, PlantEffect, PlantSetup, Reference,
     RigidBodyModel, Sensors, Timing, least_apparent_inertia,
 };
 use rand::{RngExt, SeedableRng};
@@ -91,8 +91,8 @@ impl Robot {
 
     /// Small gains, critically damped, that stay stable when commands are held for `period_s`.
     fn gains(&self, rotor_inertia: &[f64], period_s: f64) -> anyhow::Result<Gains> {
-        let mut random = RandomNumbers::new(1);
-        let poses = (0..POSES).map(|_| random_state(&self.tree, &mut random).q);
+        let mut rng = RandomNumbers::new(1);
+        let poses = (0..POSES).map(|_| random_state(&self.tree, &mut rng).q);
         let inertia = least_apparent_inertia(&self.tree, rotor_inertia, poses)?;
         Ok(Gains::held(&self.tree, &inertia, &[], period_s, &GAINS)?)
     }
@@ -151,15 +151,15 @@ impl Case {
             None => temporary.path().join(&name),
         };
         std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
-        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         let motions: Vec<MultiSine> = (0..3)
-            .map(|_| MultiSine::random(&robot.tree, arguments.duration, HIGHEST_HZ, USED, &mut random))
+            .map(|_| MultiSine::random(&robot.tree, arguments.duration, HIGHEST_HZ, USED, &mut rng))
             .collect();
         let mut samples = Vec::new();
         for motion in &motions {
             samples.extend(robot.samples(motion)?);
         }
-        let secret = self.kind.draw(robot, &samples, &mut random);
+        let secret = self.kind.draw(robot, &samples, &mut rng);
         let secret_joints: Vec<String> =
             secret.joints(&robot.tree).iter().map(|&joint| robot.tree.joint(joint).joint.clone()).collect();
         if let Some(keep) = &arguments.keep {
@@ -169,11 +169,9 @@ impl Case {
         }
         write(&folder, "robot.urdf", robot.urdf)?;
         let start = Instant::now();
-        let mut tracking =
-            self.log(robot, Some(secret), &motions, &TRAINED, &folder, arguments, &mut random)?;
+        let mut tracking = self.log(robot, Some(secret), &motions, &TRAINED, &folder, arguments, &mut rng)?;
         if self.kind.needs_held_model() {
-            tracking =
-                tracking.max(self.log(robot, None, &motions, &CLEAN, &folder, arguments, &mut random)?);
+            tracking = tracking.max(self.log(robot, None, &motions, &CLEAN, &folder, arguments, &mut rng)?);
         }
         let simulated_s = start.elapsed().as_secs_f64();
         let start = Instant::now();
@@ -188,23 +186,23 @@ impl Case {
     fn log(
         &self,
         robot: &Robot,
-        secret: Option<Effect>,
+        secret: Option<PlantEffect>,
         motions: &[MultiSine],
         names: &[&str],
         folder: &Path,
         arguments: &Arguments,
-        random: &mut ChaCha8Rng,
+        rng: &mut ChaCha8Rng,
     ) -> anyhow::Result<f64> {
         let joints = robot.tree.joint_count();
         // A kind that is sought is no joint's by nature, or it would not be one joint's secret.
         let natural = |law: &Friction| law.kind() != self.kind.name();
-        let mut effects: Vec<Effect> = (0..joints)
+        let mut effects: Vec<PlantEffect> = (0..joints)
             .flat_map(|joint| {
                 robot
                     .frictions(joint)
                     .into_iter()
                     .filter(natural)
-                    .map(move |law| Effect::Friction { joint, law })
+                    .map(move |law| PlantEffect::Friction { joint, law })
             })
             .collect();
         effects.extend(secret);
@@ -216,7 +214,7 @@ impl Case {
         let parameters: Vec<f64> = wrong
             .inertial_parameters()
             .iter()
-            .map(|parameter| parameter * random.random_range(1.0 - WRONG..1.0 + WRONG))
+            .map(|parameter| parameter * rng.random_range(1.0 - WRONG..1.0 + WRONG))
             .collect();
         wrong.set_inertial_parameters(&parameters)?;
         let gains = robot.gains(&world.rotor_inertia, arguments.period)?;
@@ -240,7 +238,7 @@ impl Case {
         let mut plant = Plant::new(&robot.tree, &world, setup, |tree, world| self.engine.build(tree, world))?;
         let mut tracking: f64 = 0.0;
         for (motion, name) in motions.iter().zip(names) {
-            let run = plant.run(motion, arguments.duration, random)?;
+            let run = plant.run(motion, arguments.duration, rng)?;
             plant.rest(PAUSE_S);
             tracking = run.tracking_error.iter().copied().fold(tracking, f64::max);
             run.recording.write_csv(&folder.join(name))?;

@@ -3,7 +3,7 @@
 use super::case::{Robot, Sample};
 use clap::ValueEnum;
 use phiw_dynamics::{Placement, Vec3};
-use phiw_plant::{Coupling, Effect, Friction, Mechanism, Presliding};
+use phiw_plant::{Coupling, Friction, Mechanism, PlantEffect, Presliding};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -90,8 +90,8 @@ impl SecretKind {
 
     /// Draws an effect for motions that go through `samples` (`[q, v, a, torque]` of all joints, from the
     /// references).
-    pub fn draw(self, robot: &Robot, samples: &[Sample], random: &mut ChaCha8Rng) -> Effect {
-        let place = Place::draw(robot, samples, random);
+    pub fn draw(self, robot: &Robot, samples: &[Sample], rng: &mut ChaCha8Rng) -> PlantEffect {
+        let place = Place::draw(robot, samples, rng);
         match self {
             SecretKind::CoulombFriction
             | SecretKind::AsymmetricFriction
@@ -99,31 +99,31 @@ impl SecretKind {
             | SecretKind::QuadraticFriction
             | SecretKind::LoadDependentFriction
             | SecretKind::ThermalDrift => {
-                Effect::Friction { joint: place.joint, law: self.friction(&place, random) }
+                PlantEffect::Friction { joint: place.joint, law: self.friction(&place, rng) }
             }
             SecretKind::JointSpring
             | SecretKind::TorqueRipple
             | SecretKind::GravityBalancer
             | SecretKind::EndStop => {
-                Effect::Mechanism { joint: place.joint, law: self.mechanism(&place, random) }
+                PlantEffect::Mechanism { joint: place.joint, law: self.mechanism(&place, rng) }
             }
             SecretKind::Hysteresis
             | SecretKind::RotorInertia
             | SecretKind::TransmissionCoupling
             | SecretKind::JointElasticity
-            | SecretKind::TimeDelay => self.drive(&place, random),
+            | SecretKind::TimeDelay => self.drive(&place, rng),
             SecretKind::ExternalForce | SecretKind::Payload | SecretKind::GravityTilt => {
-                self.load(&place, random)
+                self.load(&place, rng)
             }
         }
     }
 
     /// A law of friction, of the wanted size.
-    fn friction(self, place: &Place<'_>, random: &mut ChaCha8Rng) -> Friction {
+    fn friction(self, place: &Place<'_>, rng: &mut ChaCha8Rng) -> Friction {
         let (speed, width) = (place.speed(), place.robot.sign_width);
         match self {
             SecretKind::AsymmetricFriction => {
-                let positive = random.random_bool(0.5);
+                let positive = rng.random_bool(0.5);
                 let law = |size: f64| Friction::Asymmetric {
                     positive,
                     coefficient: size / speed,
@@ -133,7 +133,7 @@ impl SecretKind {
                 law(place.friction_scale(&law(1.0)))
             }
             SecretKind::StribeckFriction => {
-                let fall = (speed * random.random_range(0.1..0.3)).max(2.0 * width);
+                let fall = (speed * rng.random_range(0.1..0.3)).max(2.0 * width);
                 let law = |torque: f64| Friction::Stribeck { torque, speed: fall, exponent: 1.5, width };
                 law(place.friction_scale(&law(1.0)))
             }
@@ -146,7 +146,7 @@ impl SecretKind {
                 law(place.friction_scale(&law(1.0)))
             }
             SecretKind::ThermalDrift => {
-                let time_constant_s = random.random_range(15.0..40.0);
+                let time_constant_s = rng.random_range(15.0..40.0);
                 let law = |size: f64| Friction::Thermal {
                     coefficient: size / speed,
                     torque: size,
@@ -163,59 +163,62 @@ impl SecretKind {
     }
 
     /// What pulls at a joint by its angle, of the wanted size.
-    fn mechanism(self, place: &Place<'_>, random: &mut ChaCha8Rng) -> Mechanism {
+    fn mechanism(self, place: &Place<'_>, rng: &mut ChaCha8Rng) -> Mechanism {
         let joint = place.joint;
         let [lowest, highest] = place.range();
         match self {
             SecretKind::TorqueRipple => {
                 // At least two periods in the range, at most 6 Hz at usual speed.
                 let (fewest, most) = (2.0 * TAU / (highest - lowest), (6.0 * TAU / place.speed()).min(40.0));
-                let cycles = (fewest + (most - fewest).max(0.0) * random.random::<f64>()).ceil();
+                let cycles = (fewest + (most - fewest).max(0.0) * rng.random::<f64>()).ceil();
                 let torque = place.wanted() * 2.0_f64.sqrt();
-                Mechanism::Ripple { torque, cycles, phase: random.random_range(0.0..TAU) }
+                Mechanism::Ripple { torque, cycles, phase: rng.random_range(0.0..TAU) }
             }
             SecretKind::GravityBalancer => {
-                let zero = random.random_range(-3.0..3.0);
+                let zero = rng.random_range(-3.0..3.0);
                 let law = |torque: f64| Mechanism::Balancer { torque, zero, arm: 0.35, rest: 0.25 };
                 law(place.scale(&|sample| law(1.0).torque(sample.q[joint])))
             }
             SecretKind::EndStop => {
-                let upper = random.random_bool(0.5);
+                let upper = rng.random_bool(0.5);
                 let depth = 0.15 * (highest - lowest);
                 let threshold = if upper { highest - depth } else { lowest + depth };
                 let law = |torque: f64| Mechanism::EndStop { threshold, upper, torque, depth, exponent: 1.0 };
                 law(place.scale(&|sample| law(1.0).torque(sample.q[joint])))
             }
             _ => {
-                let rest = random.random_range(lowest..highest);
+                let rest = rng.random_range(lowest..highest);
                 Mechanism::Spring { stiffness: place.scale(&|sample| sample.q[joint] - rest), rest }
             }
         }
     }
 
     /// What is in the drive of a joint, or of two.
-    fn drive(self, place: &Place<'_>, random: &mut ChaCha8Rng) -> Effect {
+    fn drive(self, place: &Place<'_>, rng: &mut ChaCha8Rng) -> PlantEffect {
         let (robot, joint) = (place.robot, place.joint);
         match self {
             SecretKind::Hysteresis => {
                 let ([lowest, highest], wanted) = (place.range(), place.wanted());
-                let way = random.random_range(0.05..0.2) * (highest - lowest);
+                let way = rng.random_range(0.05..0.2) * (highest - lowest);
                 let elements = [[0.3 * way, 0.4 * wanted], [way, 0.6 * wanted]];
-                Effect::Presliding { joint, law: Presliding::MaxwellSlip { elements: elements.to_vec() } }
+                PlantEffect::Presliding {
+                    joint,
+                    law: Presliding::MaxwellSlip { elements: elements.to_vec() },
+                }
             }
             SecretKind::RotorInertia => {
-                Effect::RotorInertia { joint, inertia: place.scale(&|sample| sample.a[joint]) }
+                PlantEffect::RotorInertia { joint, inertia: place.scale(&|sample| sample.a[joint]) }
             }
             SecretKind::TransmissionCoupling => {
                 let pairs: Vec<[usize; 2]> = (1..robot.tree.joint_count())
                     .filter_map(|joint| robot.parent(joint).map(|parent| [parent, joint]))
                     .collect();
-                let pair = pairs[random.random_range(0..pairs.len())];
+                let pair = pairs[rng.random_range(0..pairs.len())];
                 let torque = pair.map(|joint| place.rms(&|sample| sample.torque[joint]));
                 let sum = place.rms(&|sample| sample.v[pair[0]] + sample.v[pair[1]]);
                 // As large as the smaller of both torques bears.
                 let size = place.share * torque[0].min(torque[1]);
-                Effect::Coupling(Coupling::SharedFriction {
+                PlantEffect::Coupling(Coupling::SharedFriction {
                     joints: pair,
                     coefficient: 0.6 * size / sum,
                     torque: 0.6 * size,
@@ -224,42 +227,42 @@ impl SecretKind {
             }
             SecretKind::JointElasticity => {
                 // The spring turns by some hundredths of a radian under the joint's torque.
-                let twist = random.random_range(0.02..0.06);
+                let twist = rng.random_range(0.02..0.06);
                 let stiffness = place.rms(&|sample| sample.torque[joint]) / twist;
                 let inertia = robot.world.rotor_inertia[joint];
                 let damping = 0.1 * (stiffness * inertia).sqrt();
-                Effect::Flexibility { joint, stiffness, damping, backlash: 0.0 }
+                PlantEffect::Flexibility { joint, stiffness, damping, backlash: 0.0 }
             }
-            _ => Effect::TimeDelay { joints: vec![joint], delay_s: random.random_range(0.006..0.015) },
+            _ => PlantEffect::TimeDelay { joints: vec![joint], delay_s: rng.random_range(0.006..0.015) },
         }
     }
 
     /// What pulls at the bodies.
-    fn load(self, place: &Place<'_>, random: &mut ChaCha8Rng) -> Effect {
+    fn load(self, place: &Place<'_>, rng: &mut ChaCha8Rng) -> PlantEffect {
         let robot = place.robot;
         let joints = robot.tree.joint_count();
         match self {
             SecretKind::ExternalForce => {
                 // Not on the first link, where it is a balancer as well.
-                let body = random.random_range(1..joints);
-                let (heading, rise) = (random.random_range(0.0..TAU), random.random_range(-0.6..0.6_f64));
+                let body = rng.random_range(1..joints);
+                let (heading, rise) = (rng.random_range(0.0..TAU), rng.random_range(-0.6..0.6_f64));
                 let direction = [heading.cos() * rise.cos(), heading.sin() * rise.cos(), rise.sin()];
-                let point = [0; 3].map(|_| random.random_range(-0.1..0.1));
+                let point = [0; 3].map(|_| rng.random_range(-0.1..0.1));
                 let felt = |sample: &Sample| moment(robot, body, point, direction, &sample.q);
                 let force =
                     place.share * place.rms(&|sample| sample.torque[body]) / place.rms(&felt).max(1e-3);
-                Effect::ExternalForce { body, point, force: direction.map(|x| x * force) }
+                PlantEffect::ExternalForce { body, point, force: direction.map(|x| x * force) }
             }
             SecretKind::Payload => {
-                let body = random.random_range(1..joints);
+                let body = rng.random_range(1..joints);
                 let own = robot.tree.bodies()[body].inertial[0];
-                let center = [0; 3].map(|_| random.random_range(-0.08..0.08));
-                let mass = own * random.random_range(0.2..0.5);
-                Effect::Payload { body, mass, center, radii: [0.03, 0.035, 0.04] }
+                let center = [0; 3].map(|_| rng.random_range(-0.08..0.08));
+                let mass = own * rng.random_range(0.2..0.5);
+                PlantEffect::Payload { body, mass, center, radii: [0.03, 0.035, 0.04] }
             }
-            _ => Effect::GravityTilt {
-                heading: random.random_range(0.0..TAU),
-                angle: random.random_range(0.03..0.1),
+            _ => PlantEffect::GravityTilt {
+                heading: rng.random_range(0.0..TAU),
+                angle: rng.random_range(0.03..0.1),
             },
         }
     }
@@ -275,9 +278,9 @@ struct Place<'a> {
 }
 
 impl<'a> Place<'a> {
-    fn draw(robot: &'a Robot, samples: &'a [Sample], random: &mut ChaCha8Rng) -> Self {
-        let joint = random.random_range(0..robot.tree.joint_count());
-        Place { robot, samples, joint, share: random.random_range(SIZES[0]..SIZES[1]) }
+    fn draw(robot: &'a Robot, samples: &'a [Sample], rng: &mut ChaCha8Rng) -> Self {
+        let joint = rng.random_range(0..robot.tree.joint_count());
+        Place { robot, samples, joint, share: rng.random_range(SIZES[0]..SIZES[1]) }
     }
 
     fn rms(&self, value: &dyn Fn(&Sample) -> f64) -> f64 {

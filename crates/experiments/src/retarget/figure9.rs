@@ -62,11 +62,11 @@ pub fn measure(scene: &Scene, starts: usize, seed: u64, page: &mut Page) -> anyh
         iterations: Iterations { hard_limits: false, ..options.iterations },
     };
     let mut measured = Measured::default();
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
     for start in 0..starts {
         let shift: Vec<f64> = (0..splines.coordinates())
             .map(|_| {
-                let draw: f64 = StandardNormal.sample(&mut random);
+                let draw: f64 = StandardNormal.sample(&mut rng);
                 SPREAD * draw
             })
             .collect();

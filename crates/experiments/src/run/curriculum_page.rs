@@ -2,11 +2,11 @@
 
 use super::curriculum::Outcome;
 use crate::paper::{RunFile, Score, balance, choices};
-use phiw_curriculum::RobotModel;
 use phiw_dynamics::Tree;
 use phiw_effects::sentence;
+use phiw_estimation::RobotModel;
 use phiw_identification::TorqueError;
-use phiw_plant::{Effect, Friction};
+use phiw_plant::{Friction, PlantEffect};
 use phiw_report::number::{percent, significant};
 use phiw_report::page::{ExperimentPage, Picture, Section, Table};
 use phiw_report::plot::{BarGroup, IterationLine, Iterations, JointBars, iterations, joint_bars};
@@ -185,7 +185,7 @@ fn curves(label: &str, closed: &[f64], open: &[f64], first: usize) -> Picture {
 /// Kinds and joints of the effects beside those declared.
 fn names(outcome: &Outcome, model: &RobotModel) -> String {
     let effects = model.effects.iter().skip(outcome.setup.robot.declared().len());
-    let name = |effect: &phiw_curriculum::KnownEffect| {
+    let name = |effect: &phiw_estimation::KnownEffect| {
         format!("{} of {}", effect.spec.kind.replace('_', " "), effect.spec.joints.join(" and "))
     };
     effects.map(name).collect::<Vec<_>>().join("; ")
@@ -270,11 +270,11 @@ fn effect(outcome: &Outcome, found: &[String]) -> Section {
 }
 
 /// What the plant has, in words.
-fn truth(secret: &Effect, tree: &Tree) -> String {
+fn truth(secret: &PlantEffect, tree: &Tree) -> String {
     let names: Vec<&str> = tree.joint_names().collect();
     let joints: Vec<&str> = secret.joints(tree).into_iter().map(|joint| names[joint]).collect();
     let size = match secret {
-        Effect::Friction { law: Friction::Coulomb { torque, .. }, .. } => {
+        PlantEffect::Friction { law: Friction::Coulomb { torque, .. }, .. } => {
             format!(" of {} N·m", significant(*torque, 3))
         }
         _ => String::new(),

@@ -78,12 +78,12 @@ impl Plant {
         let names: Vec<String> = self.tree.joint_names().map(str::to_owned).collect();
         let columns = LogColumns { torque: true, ..LogColumns::default() };
         let mut writer = LogWriter::create(path, &names, columns)?;
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let sines: Vec<Sines> = self.joints.iter().map(|joint| joint.motion(&mut random)).collect();
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let sines: Vec<Sines> = self.joints.iter().map(|joint| joint.motion(&mut rng)).collect();
         let count = self.joints.len();
         let mut workspace = Workspace::new(&self.tree);
         let [mut q, mut v, mut a, mut tau] = [(); 4].map(|()| vec![0.0; count]);
-        let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
+        let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
         for row in 0..rows {
             let t = row as f64 / rate;
             for (joint, sines) in sines.iter().enumerate() {
@@ -135,14 +135,10 @@ impl Joint {
     }
 
     /// A random motion that uses the range, or the speed, as far as it may.
-    fn motion(&self, random: &mut ChaCha8Rng) -> Sines {
+    fn motion(&self, rng: &mut ChaCha8Rng) -> Sines {
         let mut sines: Sines = std::array::from_fn(|harmonic| {
-            let frequency = FREQUENCY * ((harmonic + 1) as f64 + random.random_range(-0.3..0.3));
-            [
-                random.random_range(0.3..1.0) / (harmonic + 1) as f64,
-                TAU * frequency,
-                random.random_range(0.0..TAU),
-            ]
+            let frequency = FREQUENCY * ((harmonic + 1) as f64 + rng.random_range(-0.3..0.3));
+            [rng.random_range(0.3..1.0) / (harmonic + 1) as f64, TAU * frequency, rng.random_range(0.0..TAU)]
         });
         let way: f64 = sines.iter().map(|[amplitude, ..]| amplitude).sum();
         let speed: f64 = sines.iter().map(|[amplitude, omega, _]| amplitude * omega).sum();

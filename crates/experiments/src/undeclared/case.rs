@@ -1,15 +1,15 @@
 //! One case: a robot, its motions, its secrets and its sensors, all from one seed.
 
-use super::dice::{Dice, Stream};
 use super::draw::{Survey, catalogue, outside};
 use super::friction::Sign;
 use super::kind::{Kind, Name};
 use super::plant::{Ordinary, Record, States, record, rigid_torque};
+use super::rng::{CaseRng, Stream};
 use super::robot::Robot;
 use super::secret::{Form, Secret};
 use super::sensors::Sensors;
 use super::suite::{Spec, Suite};
-use super::trajectory::{JointMotion, Motion, Reach};
+use super::trajectory::{JointMotion, Reach, Trajectory};
 use super::visibility::Absorber;
 
 /// Length of a log \[s\].
@@ -45,9 +45,9 @@ pub struct Case<'a> {
     /// What is not.
     pub secrets: Vec<Drawn>,
     /// Motions of the two training logs and the validation log.
-    pub motions: Vec<Motion>,
+    pub motions: Vec<Trajectory>,
     /// Motions of the logs of the clean robot, where a model is held.
-    pub clean_motions: Vec<Motion>,
+    pub clean_motions: Vec<Trajectory>,
     /// The sensors.
     pub sensors: Sensors,
     /// Effects of the wide suites' plants that are declared, in forms of their own.
@@ -84,26 +84,26 @@ impl<'a> Case<'a> {
     }
 
     fn attempt(spec: &Spec, robot: &'a Robot, attempt: u64) -> Option<Self> {
-        let dice = |stream| Dice::new(spec.seed, attempt, stream);
-        let (mut secret_dice, mut plant_dice, mut motion_dice) =
-            (dice(Stream::Secret), dice(Stream::Plant), dice(Stream::Motion));
-        let joints = choose_joints(spec, robot, &mut secret_dice)?;
+        let rng = |stream| CaseRng::new(spec.seed, attempt, stream);
+        let (mut secret_rng, mut plant_rng, mut motion_rng) =
+            (rng(Stream::Secret), rng(Stream::Plant), rng(Stream::Motion));
+        let joints = choose_joints(spec, robot, &mut secret_rng)?;
         let reach =
             spec.secrets.iter().zip(&joints).find(|(name, _)| **name == Name::Catalogue(Kind::EndStop));
-        let reach = reach.map(|(_, &joint)| Reach { joint, upper: secret_dice.chance(0.5) });
+        let reach = reach.map(|(_, &joint)| Reach { joint, upper: secret_rng.chance(0.5) });
         // Bristles hold a force at rest, and springs ring after a jerk: for them the robot keeps moving.
         let restless = spec.has(Kind::CoulombFriction)
             || spec.has(Kind::StribeckFriction)
             || spec.has(Kind::JointElasticity)
             || spec.has(Kind::ActuatorSaturation);
-        let motions = draw_motions(robot, reach, restless, &mut motion_dice);
+        let motions = draw_motions(robot, reach, restless, &mut motion_rng);
         let clean_motions =
-            if spec.held { draw_motions(robot, None, restless, &mut motion_dice) } else { Vec::new() };
-        let (ordinary, declared) = draw_ordinary(spec, robot, &motions, &mut plant_dice);
+            if spec.held { draw_motions(robot, None, restless, &mut motion_rng) } else { Vec::new() };
+        let (ordinary, declared) = draw_ordinary(spec, robot, &motions, &mut plant_rng);
 
         let times: Vec<Vec<f64>> = motions.iter().map(|motion| even_times(motion, SIZE_RATE)).collect();
         let survey = survey(robot, &ordinary, &motions, &times, reach);
-        let sensors = Sensors::draw(&robot.tree, &survey.torque, &mut plant_dice);
+        let sensors = Sensors::draw(&robot.tree, &survey.torque, &mut plant_rng);
         let mut case = Case {
             spec: spec.clone(),
             robot,
@@ -118,7 +118,7 @@ impl<'a> Case<'a> {
             attempt,
         };
         for (&name, &joint) in spec.secrets.iter().zip(&joints) {
-            let drawn = case.draw_secret(name, joint, &survey, &times, &mut secret_dice)?;
+            let drawn = case.draw_secret(name, joint, &survey, &times, &mut secret_rng)?;
             case.secrets.push(drawn);
         }
         Some(case)
@@ -130,19 +130,19 @@ impl<'a> Case<'a> {
         joint: usize,
         survey: &Survey,
         times: &[Vec<f64>],
-        dice: &mut Dice,
+        rng: &mut CaseRng,
     ) -> Option<Drawn> {
         let (mut joints, form, scale) = match name {
-            Name::Catalogue(kind) => catalogue(kind, joint, survey, dice)?,
-            Name::Outside(stranger) => outside(stranger, joint, survey, dice)?,
+            Name::Catalogue(kind) => catalogue(kind, joint, survey, rng)?,
+            Name::Outside(stranger) => outside(stranger, joint, survey, rng)?,
         };
         joints.sort_unstable();
-        let wanted = dice.log_uniform(SIZES[0], SIZES[1]);
+        let wanted = rng.log_uniform(SIZES[0], SIZES[1]);
         let mut secret = Secret { name, joints, form, scale };
         let (tree, ordinary) = (&self.robot.tree, &self.ordinary);
         let size = match secret.form {
             Form::Saturation => {
-                super::saturation::install(&mut secret, wanted, tree, ordinary, &mut self.motions, dice)?
+                super::saturation::install(&mut secret, wanted, tree, ordinary, &mut self.motions, rng)?
             }
             _ => secret.calibrate(wanted, tree, ordinary, &self.motions, times),
         };
@@ -190,18 +190,18 @@ impl<'a> Case<'a> {
 
     /// Names and texts of the logs: training, validation, and those of the clean robot where a model is held.
     pub fn logs(&self) -> Vec<(&'static str, String)> {
-        let mut dice = Dice::new(self.spec.seed, self.attempt, Stream::Sensors);
+        let mut rng = CaseRng::new(self.spec.seed, self.attempt, Stream::Sensors);
         let plant: Vec<&Secret> = self.plant.iter().collect();
         let secrets: Vec<&Secret> =
             self.plant.iter().chain(self.secrets.iter().map(|drawn| &drawn.secret)).collect();
-        let mut log = |motion: &Motion, secrets: &[&Secret]| {
-            let [times, stamps] = self.sensors.times(motion.start, motion.duration, &mut dice);
+        let mut log = |motion: &Trajectory, secrets: &[&Secret]| {
+            let [times, stamps] = self.sensors.times(motion.start, motion.duration, &mut rng);
             let record = record(&self.robot.tree, &self.ordinary, secrets, motion, &times);
             match &self.sensors.logging {
                 Some(logging) => {
-                    logging.log(&self.sensors, &self.robot.tree, motion, &record, &stamps, &mut dice)
+                    logging.log(&self.sensors, &self.robot.tree, motion, &record, &stamps, &mut rng)
                 }
-                None => self.sensors.log(&self.robot.tree, &record, &stamps, &mut dice),
+                None => self.sensors.log(&self.robot.tree, &record, &stamps, &mut rng),
             }
         };
         let mut logs = Vec::new();
@@ -216,18 +216,18 @@ impl<'a> Case<'a> {
 }
 
 /// Times of an even grid over a motion.
-pub fn even_times(motion: &Motion, rate: f64) -> Vec<f64> {
+pub fn even_times(motion: &Trajectory, rate: f64) -> Vec<f64> {
     (0..(motion.duration * rate) as usize).map(|k| motion.start + k as f64 / rate).collect()
 }
 
-fn choose_joints(spec: &Spec, robot: &Robot, dice: &mut Dice) -> Option<Vec<usize>> {
+fn choose_joints(spec: &Spec, robot: &Robot, rng: &mut CaseRng) -> Option<Vec<usize>> {
     let mut joints: Vec<usize> = Vec::new();
     for _ in &spec.secrets {
         let free: Vec<usize> = (0..robot.joints()).filter(|joint| !joints.contains(joint)).collect();
         let joint = match joints.last() {
             Some(&joint) if spec.together => joint,
             _ if free.is_empty() => return None,
-            _ => dice.pick(&free),
+            _ => rng.pick(&free),
         };
         joints.push(joint);
     }
@@ -236,19 +236,24 @@ fn choose_joints(spec: &Spec, robot: &Robot, dice: &mut Dice) -> Option<Vec<usiz
 
 /// Two training motions and the one that is held out, of periodic excitation, but for at most one from point
 /// to point.
-pub fn draw_motions(robot: &Robot, reach: Option<Reach>, restless: bool, dice: &mut Dice) -> Vec<Motion> {
+pub fn draw_motions(
+    robot: &Robot,
+    reach: Option<Reach>,
+    restless: bool,
+    rng: &mut CaseRng,
+) -> Vec<Trajectory> {
     // At most one of the three is made of moves from point to point.
-    let resting = if restless || dice.chance(0.55) { None } else { Some(dice.index(STARTS.len())) };
+    let resting = if restless || rng.chance(0.55) { None } else { Some(rng.index(STARTS.len())) };
     let draw = |(number, start): (usize, f64)| {
-        let draw = if resting == Some(number) { Motion::point_to_point } else { Motion::fourier };
-        tamed(robot, draw(&robot.tree, dice, start, DURATION, reach), reach)
+        let draw = if resting == Some(number) { Trajectory::point_to_point } else { Trajectory::fourier };
+        tamed(robot, draw(&robot.tree, rng, start, DURATION, reach), reach)
     };
     STARTS.into_iter().enumerate().map(draw).collect()
 }
 
 /// The motion, made so small that the joints can deliver it; one that has to come near a limit is left as it
 /// is.
-pub fn tamed(robot: &Robot, mut motion: Motion, reach: Option<Reach>) -> Motion {
+pub fn tamed(robot: &Robot, mut motion: Trajectory, reach: Option<Reach>) -> Trajectory {
     for _ in 0..12 {
         if peak_effort(robot, &motion) < 0.8 || reach.is_some() {
             break;
@@ -259,7 +264,7 @@ pub fn tamed(robot: &Robot, mut motion: Motion, reach: Option<Reach>) -> Motion 
 }
 
 /// Largest torque of the rigid body over the joint's limit.
-fn peak_effort(robot: &Robot, motion: &Motion) -> f64 {
+fn peak_effort(robot: &Robot, motion: &Trajectory) -> f64 {
     let states = States::of_motion(motion, &even_times(motion, 25.0));
     let torque = rigid_torque(&states, |_| &robot.tree);
     let share = |(index, torque): (usize, &f64)| {
@@ -273,8 +278,8 @@ fn peak_effort(robot: &Robot, motion: &Motion) -> f64 {
 pub fn draw_ordinary(
     spec: &Spec,
     robot: &Robot,
-    motions: &[Motion],
-    dice: &mut Dice,
+    motions: &[Trajectory],
+    rng: &mut CaseRng,
 ) -> (Ordinary, Vec<Kind>) {
     let joints = robot.joints();
     let mut squares = vec![[0.0; 3]; joints];
@@ -294,15 +299,15 @@ pub fn draw_ordinary(
     let rms: Vec<[f64; 3]> =
         squares.iter().map(|squares| squares.map(|square| (square / samples).sqrt())).collect();
     let level = |joint: usize| rms[joint][0].max(LEAST_LEVEL * robot.tree.joint(joint).limits.effort);
-    let viscous = (0..joints).map(|joint| dice.uniform(0.05, 0.2) * level(joint) / rms[joint][1]).collect();
-    let coulomb = (0..joints).map(|joint| dice.uniform(0.05, 0.25) * level(joint)).collect();
-    let rotor = (0..joints).map(|joint| dice.uniform(0.03, 0.15) * level(joint) / rms[joint][2]).collect();
-    let offset = (0..joints).map(|joint| dice.uniform(-0.08, 0.08) * level(joint)).collect();
-    let width = dice.log_uniform(0.002, 0.05);
-    let smoothing = if dice.chance(0.5) { Sign::Tanh } else { Sign::Algebraic };
+    let viscous = (0..joints).map(|joint| rng.uniform(0.05, 0.2) * level(joint) / rms[joint][1]).collect();
+    let coulomb = (0..joints).map(|joint| rng.uniform(0.05, 0.25) * level(joint)).collect();
+    let rotor = (0..joints).map(|joint| rng.uniform(0.03, 0.15) * level(joint) / rms[joint][2]).collect();
+    let offset = (0..joints).map(|joint| rng.uniform(-0.08, 0.08) * level(joint)).collect();
+    let width = rng.log_uniform(0.002, 0.05);
+    let smoothing = if rng.chance(0.5) { Sign::Tanh } else { Sign::Algebraic };
     let mut ordinary = Ordinary { viscous, coulomb, rotor, offset, width, smoothing };
     let mut declared = Vec::new();
-    let (with_rotor, with_offset) = (dice.chance(0.75), dice.chance(0.15));
+    let (with_rotor, with_offset) = (rng.chance(0.75), rng.chance(0.15));
     let mut settle = |kind: Kind, values: &mut Vec<f64>, wanted: bool| {
         // Against a held model the friction has grown; else only the secret's joints have any.
         if wanted && (spec.held || !spec.has(kind)) {
@@ -322,7 +327,7 @@ pub fn draw_ordinary(
 pub fn survey<'r>(
     robot: &'r Robot,
     ordinary: &Ordinary,
-    motions: &[Motion],
+    motions: &[Trajectory],
     times: &[Vec<f64>],
     reach: Option<Reach>,
 ) -> Survey<'r> {
@@ -361,7 +366,7 @@ pub fn felt_in_every_log(
     secret: &Secret,
     tree: &phiw_dynamics::Tree,
     ordinary: &Ordinary,
-    motions: &[Motion],
+    motions: &[Trajectory],
     times: &[Vec<f64>],
 ) -> bool {
     if secret.name == Name::Catalogue(Kind::ThermalDrift) {
@@ -378,6 +383,6 @@ pub fn felt_in_every_log(
 }
 
 /// Whether a motion came out of a simulation.
-pub fn is_simulated(motion: &Motion) -> bool {
+pub fn is_simulated(motion: &Trajectory) -> bool {
     motion.joints.iter().any(|joint| matches!(joint, JointMotion::Simulated { .. }))
 }

@@ -1,10 +1,10 @@
 //! Draws the form of an effect: which joints, which constants.
 
-use super::dice::Dice;
 use super::friction::Friction;
 use super::kind::{Kind, Stranger};
 use super::load::{HeldBody, WorldForce};
 use super::mechanism::Mechanism;
+use super::rng::CaseRng;
 use super::secret::Form;
 use super::trajectory::Reach;
 use phiw_dynamics::{JointType, Tree};
@@ -37,8 +37,8 @@ impl Survey<'_> {
         self.tree.joint(joint).joint_type == JointType::Prismatic
     }
 
-    fn inside(&self, joint: usize, dice: &mut Dice) -> f64 {
-        dice.uniform(self.range[joint][0], self.range[joint][1])
+    fn inside(&self, joint: usize, rng: &mut CaseRng) -> f64 {
+        rng.uniform(self.range[joint][0], self.range[joint][1])
     }
 
     /// Whether the effect on this joint gives, to the last digit, the torques of another one: then there is
@@ -65,12 +65,12 @@ impl Survey<'_> {
     }
 
     /// Lengths along a slide are a tenth of angles.
-    fn distance(&self, joint: usize, dice: &mut Dice, low: f64, high: f64) -> f64 {
-        dice.log_uniform(low, high) * if self.is_prismatic(joint) { 0.1 } else { 1.0 }
+    fn distance(&self, joint: usize, rng: &mut CaseRng, low: f64, high: f64) -> f64 {
+        rng.log_uniform(low, high) * if self.is_prismatic(joint) { 0.1 } else { 1.0 }
     }
 
     /// A joint and the one before it in the tree.
-    fn neighbours(&self, dice: &mut Dice) -> Option<Vec<usize>> {
+    fn neighbours(&self, rng: &mut CaseRng) -> Option<Vec<usize>> {
         let bodies = self.tree.bodies();
         let pairs: Vec<[usize; 2]> = bodies
             .iter()
@@ -79,7 +79,7 @@ impl Survey<'_> {
                 inner.parent.map(|outer| [bodies[outer].velocity_index, bodies[body].velocity_index])
             })
             .collect();
-        (!pairs.is_empty()).then(|| dice.pick(&pairs).to_vec())
+        (!pairs.is_empty()).then(|| rng.pick(&pairs).to_vec())
     }
 }
 
@@ -90,7 +90,7 @@ pub fn catalogue(
     kind: Kind,
     joint: usize,
     survey: &Survey,
-    dice: &mut Dice,
+    rng: &mut CaseRng,
 ) -> Option<(Vec<usize>, Form, f64)> {
     if survey.is_ambiguous(kind, joint) {
         return None;
@@ -100,65 +100,65 @@ pub fn catalogue(
     let mechanism = |mechanism: Mechanism, sign: f64| Some((vec![joint], Form::Mechanism(mechanism), sign));
     match kind {
         Kind::ViscousFriction => one(Friction::Viscous),
-        Kind::CoulombFriction if dice.chance(0.35) => {
-            one(Friction::CoulombLuGre { distance: survey.distance(joint, dice, 1e-5, 1e-4) })
+        Kind::CoulombFriction if rng.chance(0.35) => {
+            one(Friction::CoulombLuGre { distance: survey.distance(joint, rng, 1e-5, 1e-4) })
         }
         Kind::CoulombFriction => one(Friction::Coulomb),
         Kind::AsymmetricFriction => {
-            let coulomb = if dice.chance(0.5) { 0.0 } else { dice.uniform(0.1, 1.0) * speed };
-            one(Friction::Asymmetric { positive: dice.chance(0.5), coulomb })
+            let coulomb = if rng.chance(0.5) { 0.0 } else { rng.uniform(0.1, 1.0) * speed };
+            one(Friction::Asymmetric { positive: rng.chance(0.5), coulomb })
         }
         Kind::StribeckFriction => {
             // Not so narrow that the smoothed sign hides it.
-            let speed = (speed * dice.log_uniform(0.08, 0.4)).max(2.0 * survey.width);
-            let exponent = dice.uniform(0.5, 2.0);
-            if dice.chance(0.5) {
+            let speed = (speed * rng.log_uniform(0.08, 0.4)).max(2.0 * survey.width);
+            let exponent = rng.uniform(0.5, 2.0);
+            if rng.chance(0.5) {
                 return one(Friction::Stribeck { speed, exponent });
             }
             one(Friction::StribeckLuGre {
                 speed,
                 exponent,
-                distance: survey.distance(joint, dice, 1e-5, 1e-4),
+                distance: survey.distance(joint, rng, 1e-5, 1e-4),
             })
         }
         Kind::QuadraticFriction => one(Friction::Quadratic),
         Kind::LoadDependentFriction => one(Friction::LoadDependent),
         Kind::ThermalDrift => one(Friction::Thermal {
-            time_constant: dice.log_uniform(10.0, 60.0),
-            viscous: dice.uniform(0.2, 2.0) / speed,
+            time_constant: rng.log_uniform(10.0, 60.0),
+            viscous: rng.uniform(0.2, 2.0) / speed,
         }),
-        Kind::Hysteresis => one(hysteresis(joint, survey, dice)),
+        Kind::Hysteresis => one(hysteresis(joint, survey, rng)),
         Kind::RotorInertia => mechanism(Mechanism::Rotor, 1.0),
-        Kind::TorqueOffset => mechanism(Mechanism::Offset, dice.sign()),
-        Kind::JointSpring => mechanism(Mechanism::Spring { center: survey.inside(joint, dice) }, 1.0),
+        Kind::TorqueOffset => mechanism(Mechanism::Offset, rng.sign()),
+        Kind::JointSpring => mechanism(Mechanism::Spring { center: survey.inside(joint, rng) }, 1.0),
         Kind::GravityBalancer if survey.is_prismatic(joint) => None,
         Kind::GravityBalancer => {
-            let rest = if dice.chance(0.5) { 0.0 } else { dice.uniform(0.1, 0.4) };
+            let rest = if rng.chance(0.5) { 0.0 } else { rng.uniform(0.1, 0.4) };
             let balancer =
-                Mechanism::Balancer { zero: dice.uniform(-PI, PI), arm: dice.uniform(0.2, 0.5), rest };
-            mechanism(balancer, dice.sign())
+                Mechanism::Balancer { zero: rng.uniform(-PI, PI), arm: rng.uniform(0.2, 0.5), rest };
+            mechanism(balancer, rng.sign())
         }
-        Kind::TorqueRipple => mechanism(ripple(joint, survey, dice)?, 1.0),
+        Kind::TorqueRipple => mechanism(ripple(joint, survey, rng)?, 1.0),
         Kind::EndStop => {
             let reach = survey.reach.filter(|reach| reach.joint == joint)?;
             let limits = survey.tree.joint(joint).limits;
-            let depth = dice.uniform(0.05, 0.14) * (limits.upper - limits.lower);
+            let depth = rng.uniform(0.05, 0.14) * (limits.upper - limits.lower);
             let threshold = if reach.upper { limits.upper - depth } else { limits.lower + depth };
-            let exponent = if dice.chance(0.7) { 1.0 } else { dice.uniform(1.0, 1.6) };
+            let exponent = if rng.chance(0.7) { 1.0 } else { rng.uniform(1.0, 1.6) };
             mechanism(Mechanism::EndStop { threshold, upper: reach.upper, depth, exponent }, 1.0)
         }
-        Kind::TransmissionCoupling => coupling(survey, dice),
+        Kind::TransmissionCoupling => coupling(survey, rng),
         Kind::ExternalForce => {
-            let (heading, rise) = (dice.uniform(0.0, TAU), dice.uniform(-0.6, 0.6));
+            let (heading, rise) = (rng.uniform(0.0, TAU), rng.uniform(-0.6, 0.6));
             let direction = [heading.cos() * rise.cos(), heading.sin() * rise.cos(), rise.sin()];
-            let point = [0; 3].map(|_| dice.uniform(-0.15, 0.15));
+            let point = [0; 3].map(|_| rng.uniform(-0.15, 0.15));
             Some((vec![joint], Form::Force(WorldForce { body: joint, point, direction }), 1.0))
         }
-        Kind::Payload => Some((vec![joint], Form::Payload(held_body(joint, dice)), 1.0)),
-        Kind::GravityTilt => Some((Vec::new(), Form::Tilt { heading: dice.uniform(0.0, TAU) }, 1.0)),
-        Kind::EncoderOffset => Some((vec![joint], Form::EncoderOffset, dice.sign())),
-        Kind::TorqueGain => Some((vec![joint], Form::Gain, dice.sign())),
-        Kind::TimeDelay if dice.chance(0.4) => Some(((0..survey.speed.len()).collect(), Form::Delay, 1.0)),
+        Kind::Payload => Some((vec![joint], Form::Payload(held_body(joint, rng)), 1.0)),
+        Kind::GravityTilt => Some((Vec::new(), Form::Tilt { heading: rng.uniform(0.0, TAU) }, 1.0)),
+        Kind::EncoderOffset => Some((vec![joint], Form::EncoderOffset, rng.sign())),
+        Kind::TorqueGain => Some((vec![joint], Form::Gain, rng.sign())),
+        Kind::TimeDelay if rng.chance(0.4) => Some(((0..survey.speed.len()).collect(), Form::Delay, 1.0)),
         Kind::TimeDelay => Some((vec![joint], Form::Delay, 1.0)),
         Kind::JointElasticity => Some((vec![joint], Form::Elasticity, 1.0)),
         Kind::ActuatorSaturation => Some((vec![joint], Form::Saturation, 1.0)),
@@ -170,24 +170,24 @@ pub fn outside(
     stranger: Stranger,
     joint: usize,
     survey: &Survey,
-    dice: &mut Dice,
+    rng: &mut CaseRng,
 ) -> Option<(Vec<usize>, Form, f64)> {
     let joints = survey.speed.len();
     let mechanism = |mechanism: Mechanism| Some((vec![joint], Form::Mechanism(mechanism), 1.0));
     match stranger {
         Stranger::TimeSinusoid => mechanism(Mechanism::TimeSinusoid {
-            frequency: TAU * dice.log_uniform(0.2, 3.0),
-            phase: dice.uniform(0.0, TAU),
+            frequency: TAU * rng.log_uniform(0.2, 3.0),
+            phase: rng.uniform(0.0, TAU),
         }),
         Stranger::PositionCoupling => {
-            let pair = survey.neighbours(dice)?;
-            let center = pair.iter().map(|&joint| survey.inside(joint, dice)).sum();
+            let pair = survey.neighbours(rng)?;
+            let center = pair.iter().map(|&joint| survey.inside(joint, rng)).sum();
             Some((pair, Form::Mechanism(Mechanism::PositionCoupling { center }), 1.0))
         }
         Stranger::DeadZoneSpring => {
             let [low, high] = survey.range[joint];
-            let center = 0.5 * (low + high) + dice.uniform(-0.1, 0.1) * (high - low);
-            mechanism(Mechanism::DeadZoneSpring { center, half: dice.uniform(0.15, 0.25) * (high - low) })
+            let center = 0.5 * (low + high) + rng.uniform(-0.1, 0.1) * (high - low);
+            mechanism(Mechanism::DeadZoneSpring { center, half: rng.uniform(0.15, 0.25) * (high - low) })
         }
         Stranger::RandomWalk => {
             let (step, end) = (0.05, survey.spans.iter().map(|span| span[1]).fold(0.0, f64::max));
@@ -195,7 +195,7 @@ pub fn outside(
             let mut velocity = 0.0;
             let walk = |_| {
                 // A walk smoothed over a second or so: a wandering offset, not noise.
-                velocity += 0.05 * (dice.normal() - velocity);
+                velocity += 0.05 * (rng.normal() - velocity);
                 level += velocity;
                 level *= 0.998;
                 level
@@ -210,36 +210,36 @@ pub fn outside(
             let when = survey
                 .spans
                 .iter()
-                .map(|[from, to]| [dice.uniform(from + 5.0, to - 5.0), *to + 1.0])
+                .map(|[from, to]| [rng.uniform(from + 5.0, to - 5.0), *to + 1.0])
                 .collect();
-            Some((vec![joint], Form::LoadStep { held: held_body(joint, dice), when }, 1.0))
+            Some((vec![joint], Form::LoadStep { held: held_body(joint, rng), when }, 1.0))
         }
         Stranger::SpeedProduct => {
-            let other = (joint + 1 + dice.index((joints - 1).max(1))) % joints;
+            let other = (joint + 1 + rng.index((joints - 1).max(1))) % joints;
             let pair = vec![joint.min(other), joint.max(other)];
-            Some((pair, Form::Mechanism(Mechanism::SpeedProduct { felt: joint, other }), dice.sign()))
+            Some((pair, Form::Mechanism(Mechanism::SpeedProduct { felt: joint, other }), rng.sign()))
         }
         Stranger::PositionFriction => {
-            let cycles = TAU * dice.uniform(1.5, 4.0) / survey.travel(joint);
-            mechanism(Mechanism::PositionFriction { cycles, phase: dice.uniform(0.0, TAU) })
+            let cycles = TAU * rng.uniform(1.5, 4.0) / survey.travel(joint);
+            mechanism(Mechanism::PositionFriction { cycles, phase: rng.uniform(0.0, TAU) })
         }
     }
 }
 
-fn hysteresis(joint: usize, survey: &Survey, dice: &mut Dice) -> Friction {
-    let distance = survey.distance(joint, dice, 0.02, 0.3).min(0.25 * survey.travel(joint));
-    if dice.chance(0.4) {
-        return Friction::Dahl { distance, exponent: dice.uniform(1.0, 2.0) };
+fn hysteresis(joint: usize, survey: &Survey, rng: &mut CaseRng) -> Friction {
+    let distance = survey.distance(joint, rng, 0.02, 0.3).min(0.25 * survey.travel(joint));
+    if rng.chance(0.4) {
+        return Friction::Dahl { distance, exponent: rng.uniform(1.0, 2.0) };
     }
-    let count = 1 + dice.index(5);
-    let weights: Vec<f64> = (0..count).map(|_| dice.uniform(0.3, 1.0)).collect();
+    let count = 1 + rng.index(5);
+    let weights: Vec<f64> = (0..count).map(|_| rng.uniform(0.3, 1.0)).collect();
     let total: f64 = weights.iter().sum();
     let element =
         |(number, weight): (usize, &f64)| [distance * (number + 1) as f64 / count as f64, weight / total];
     Friction::Maxwell { elements: weights.iter().enumerate().map(element).collect() }
 }
 
-fn ripple(joint: usize, survey: &Survey, dice: &mut Dice) -> Option<Mechanism> {
+fn ripple(joint: usize, survey: &Survey, rng: &mut CaseRng) -> Option<Mechanism> {
     // At least a turn and a half over the travel, or it is a spring; at most 8 Hz at usual speed, or filters
     // take it away.
     let (fewest, most) = (1.5 * TAU / survey.travel(joint), 8.0 * TAU / survey.speed[joint]);
@@ -247,40 +247,40 @@ fn ripple(joint: usize, survey: &Survey, dice: &mut Dice) -> Option<Mechanism> {
     if fewest * 1.2 > most {
         return None;
     }
-    let mut cycles = dice.log_uniform(fewest, most);
+    let mut cycles = rng.log_uniform(fewest, most);
     if !survey.is_prismatic(joint) {
         cycles = cycles.ceil();
     }
-    let second = if dice.chance(0.5) { dice.uniform(0.1, 0.5) } else { 0.0 };
-    let [phase, second_phase] = [0; 2].map(|_| dice.uniform(0.0, TAU));
+    let second = if rng.chance(0.5) { rng.uniform(0.1, 0.5) } else { 0.0 };
+    let [phase, second_phase] = [0; 2].map(|_| rng.uniform(0.0, TAU));
     Some(Mechanism::Ripple { cycles, phase, second, second_phase })
 }
 
-fn coupling(survey: &Survey, dice: &mut Dice) -> Option<(Vec<usize>, Form, f64)> {
-    let pair = survey.neighbours(dice)?;
+fn coupling(survey: &Survey, rng: &mut CaseRng) -> Option<(Vec<usize>, Form, f64)> {
+    let pair = survey.neighbours(rng)?;
     let alike = survey.is_prismatic(pair[0]) == survey.is_prismatic(pair[1]);
     let speed = survey.speed[pair[0]].hypot(survey.speed[pair[1]]);
-    let (mechanism, sign) = match dice.index(4) {
+    let (mechanism, sign) = match rng.index(4) {
         0 | 1 if alike => {
-            let share = dice.pick(&[0.0, 0.3, 0.6, 1.0]);
+            let share = rng.pick(&[0.0, 0.3, 0.6, 1.0]);
             (Mechanism::SumFriction { viscous: (1.0 - share) / speed, coulomb: share }, 1.0)
         }
-        2 => (Mechanism::AccelerationCoupling, dice.sign()),
+        2 => (Mechanism::AccelerationCoupling, rng.sign()),
         _ => {
-            let forward = dice.chance(0.5);
+            let forward = rng.chance(0.5);
             let [driven, driver] = if forward { [pair[0], pair[1]] } else { [pair[1], pair[0]] };
-            (Mechanism::OneWay { driven, driver, coulomb: dice.chance(0.4) }, dice.sign())
+            (Mechanism::OneWay { driven, driver, coulomb: rng.chance(0.4) }, rng.sign())
         }
     };
     Some((pair, Form::Mechanism(mechanism), sign))
 }
 
-fn held_body(body: usize, dice: &mut Dice) -> HeldBody {
-    let radius = dice.uniform(0.02, 0.07);
+fn held_body(body: usize, rng: &mut CaseRng) -> HeldBody {
+    let radius = rng.uniform(0.02, 0.07);
     HeldBody {
         body,
-        center: [0; 3].map(|_| dice.uniform(-0.12, 0.12)),
+        center: [0; 3].map(|_| rng.uniform(-0.12, 0.12)),
         // Near enough to each other that any such body exists.
-        radii: [0; 3].map(|_| radius * dice.uniform(0.85, 1.15)),
+        radii: [0; 3].map(|_| radius * rng.uniform(0.85, 1.15)),
     }
 }

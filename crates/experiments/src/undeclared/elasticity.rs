@@ -2,7 +2,7 @@
 
 use super::load::Loads;
 use super::plant::{States, rigid_torque};
-use super::trajectory::Motion;
+use super::trajectory::Trajectory;
 use phiw_dynamics::{Tree, Workspace};
 use std::f64::consts::TAU;
 
@@ -16,7 +16,7 @@ const STRIDE: usize = 20;
 
 /// The greatest compliance with which the joint's resonance stays above the motions' band, whatever the pose
 /// \[rad/(N·m), m/N\].
-pub fn softest(tree: &Tree, motions: &[Motion], times: &[Vec<f64>], joint: usize) -> f64 {
+pub fn softest(tree: &Tree, motions: &[Trajectory], times: &[Vec<f64>], joint: usize) -> f64 {
     let joints = tree.joint_count();
     let mut workspace = Workspace::new(tree);
     let mut matrix = vec![0.0; joints * joints];
@@ -38,7 +38,7 @@ pub fn softest(tree: &Tree, motions: &[Motion], times: &[Vec<f64>], joint: usize
 pub fn deflect(
     motor: &mut States,
     loads: &Loads,
-    motion: &Motion,
+    motion: &Trajectory,
     times: &[f64],
     joint: usize,
     compliance: f64,

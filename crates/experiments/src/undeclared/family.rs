@@ -1,9 +1,9 @@
 //! An effect that all joints have, each in its own size: friction, rotors, offsets.
 
-use super::dice::Dice;
 use super::friction::{Sign, lugre_along};
 use super::kind::Kind;
 use super::plant::{Ordinary, Scene};
+use super::rng::CaseRng;
 
 /// One kind of effect on several joints.
 #[derive(Clone, Debug)]
@@ -38,21 +38,21 @@ impl Family {
         members: &[usize],
         speed: &[f64],
         bristles: bool,
-        dice: &mut Dice,
+        rng: &mut CaseRng,
     ) -> Self {
         let (values, shape) = match kind {
             Kind::ViscousFriction => {
-                let power = if dice.chance(0.4) { dice.uniform(0.92, 1.08) } else { 1.0 };
+                let power = if rng.chance(0.4) { rng.uniform(0.92, 1.08) } else { 1.0 };
                 (&ordinary.viscous, Shape::Viscous { power, reference: speed.to_vec() })
             }
             Kind::CoulombFriction if bristles => {
-                (&ordinary.coulomb, Shape::Bristles { distance: dice.log_uniform(1e-5, 1e-4) })
+                (&ordinary.coulomb, Shape::Bristles { distance: rng.log_uniform(1e-5, 1e-4) })
             }
             Kind::CoulombFriction => {
-                let apart = if dice.chance(0.5) { 2.0 } else { 1.0 };
-                let widths = speed.iter().map(|_| ordinary.width * dice.log_uniform(1.0 / apart, apart));
+                let apart = if rng.chance(0.5) { 2.0 } else { 1.0 };
+                let widths = speed.iter().map(|_| ordinary.width * rng.log_uniform(1.0 / apart, apart));
                 let widths = widths.collect();
-                let smoothing = dice.pick(&[Sign::Tanh, Sign::Algebraic, Sign::Arctan]);
+                let smoothing = rng.pick(&[Sign::Tanh, Sign::Algebraic, Sign::Arctan]);
                 (&ordinary.coulomb, Shape::Coulomb { smoothing, widths })
             }
             Kind::RotorInertia => (&ordinary.rotor, Shape::Rotor),

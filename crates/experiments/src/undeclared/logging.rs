@@ -1,11 +1,11 @@
 //! What a logger or a drive does to a log beyond noise and quanta: colour, tails, filters, dead bands, steps,
 //! a velocity that is late.
 
-use super::dice::Dice;
 use super::plant::Record;
+use super::rng::CaseRng;
 use super::sensors::Sensors;
 use super::situation::Situation;
-use super::trajectory::Motion;
+use super::trajectory::Trajectory;
 use phiw_dynamics::{JointType, Tree};
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -74,7 +74,7 @@ impl Logging {
         tree: &Tree,
         [torque, speed]: [&[f64]; 2],
         sensors: &mut Sensors,
-        dice: &mut Dice,
+        rng: &mut CaseRng,
     ) -> Self {
         use Situation::{
             Colour, DeadBand, DriveFilter as Filter, HeavyTails, LateFilter, LateVelocity, LongColour, Mixed,
@@ -83,39 +83,39 @@ impl Logging {
         let joints = torque.len();
         sensors.correlation_time = match situation {
             White | HeavyTails | Filter | LateFilter | Quantised => 0.0,
-            ShortColour => dice.log_uniform(0.005, 0.05),
-            Colour => dice.log_uniform(0.05, 0.3),
-            LongColour => dice.log_uniform(0.3, 1.0),
-            Mixed => dice.log_uniform(0.005, 0.3),
-            NoiseJoints if dice.chance(0.5) => dice.log_uniform(0.005, 0.3),
-            _ if dice.chance(0.5) => dice.log_uniform(0.005, 0.05),
+            ShortColour => rng.log_uniform(0.005, 0.05),
+            Colour => rng.log_uniform(0.05, 0.3),
+            LongColour => rng.log_uniform(0.3, 1.0),
+            Mixed => rng.log_uniform(0.005, 0.3),
+            NoiseJoints if rng.chance(0.5) => rng.log_uniform(0.005, 0.3),
+            _ if rng.chance(0.5) => rng.log_uniform(0.005, 0.05),
             _ => 0.0,
         };
-        let share = dice.log_uniform(0.005, if situation == Quantised { 0.02 } else { 0.05 });
+        let share = rng.log_uniform(0.005, if situation == Quantised { 0.02 } else { 0.05 });
         sensors.torque_noise =
-            torque.iter().map(|torque| torque * share * dice.log_uniform(0.7, 1.4)).collect();
+            torque.iter().map(|torque| torque * share * rng.log_uniform(0.7, 1.4)).collect();
         if situation == NoiseJoints {
-            for _ in 0..1 + dice.index((joints / 3).max(1)) {
-                let joint = dice.index(joints);
-                sensors.torque_noise[joint] = torque[joint] * dice.log_uniform(0.5, 3.0);
+            for _ in 0..1 + rng.index((joints / 3).max(1)) {
+                let joint = rng.index(joints);
+                sensors.torque_noise[joint] = torque[joint] * rng.log_uniform(0.5, 3.0);
             }
         }
-        let heavy = situation == HeavyTails || (situation == Mixed && dice.chance(0.5));
-        let tails = match dice.chance(0.5) {
+        let heavy = situation == HeavyTails || (situation == Mixed && rng.chance(0.5));
+        let tails = match rng.chance(0.5) {
             _ if !heavy => Tails::Normal,
             true => Tails::Student,
             false => Tails::Contaminated,
         };
-        let corner = dice.log_uniform(4.0, 20.0);
+        let corner = rng.log_uniform(4.0, 20.0);
         let filter = matches!(situation, Filter | LateFilter)
             .then_some(DriveFilter { corner, causal: situation == LateFilter });
         let mut torque_step = vec![0.0; joints];
         if matches!(situation, Quantised | Mixed) {
-            let steps = dice.log_uniform(0.5, 4.0);
+            let steps = rng.log_uniform(0.5, 4.0);
             torque_step = sensors.torque_noise.iter().map(|noise| noise * steps).collect();
         }
         if situation == Quantised {
-            let bits = 11 + dice.index(3) as i32;
+            let bits = 11 + rng.index(3) as i32;
             for (joint, quantum) in sensors.quantum.iter_mut().enumerate() {
                 if tree.joint(joint).joint_type != JointType::Prismatic {
                     *quantum = TAU / f64::from(bits).exp2();
@@ -123,17 +123,17 @@ impl Logging {
             }
         }
         let mut velocity = matches!(situation, LateVelocity | Mixed).then(|| VelocityColumn {
-            lag: dice.log_uniform(0.02, 0.2),
-            scale: if dice.chance(0.25) { dice.pick(&WRONG_UNITS) } else { 1.0 },
+            lag: rng.log_uniform(0.02, 0.2),
+            scale: if rng.chance(0.25) { rng.pick(&WRONG_UNITS) } else { 1.0 },
             dead_band: vec![0.0; joints],
             noise: speed.iter().map(|speed| 0.001 * speed).collect(),
         });
         let mut dead_band = vec![0.0; joints];
-        if situation == DeadBand && dice.chance(0.5) {
-            let share = dice.log_uniform(0.02, 0.1);
+        if situation == DeadBand && rng.chance(0.5) {
+            let share = rng.log_uniform(0.02, 0.1);
             dead_band = torque.iter().map(|torque| share * torque).collect();
         } else if situation == DeadBand {
-            let share = dice.log_uniform(0.05, 0.2);
+            let share = rng.log_uniform(0.05, 0.2);
             velocity = Some(VelocityColumn {
                 lag: 0.0,
                 scale: 1.0,
@@ -149,13 +149,13 @@ impl Logging {
         &self,
         sensors: &Sensors,
         tree: &Tree,
-        motion: &Motion,
+        motion: &Trajectory,
         record: &Record,
         stamps: &[f64],
-        dice: &mut Dice,
+        rng: &mut CaseRng,
     ) -> String {
         let joints = tree.joint_count();
-        let torque = self.torque(sensors, record, dice);
+        let torque = self.torque(sensors, record, rng);
         let mut text = String::with_capacity(record.times.len() * (12 + 32 * joints));
         text.push('t');
         let prefixes: &[&str] = if self.velocity.is_some() { &["q", "qd", "tau"] } else { &["q", "tau"] };
@@ -169,7 +169,7 @@ impl Logging {
             let _ = write!(text, "{stamp:.7}");
             for joint in 0..joints {
                 let quantum = sensors.quantum[joint];
-                let seen = record.states.q(sample, joint) / quantum + sensors.angle_noise * dice.normal();
+                let seen = record.states.q(sample, joint) / quantum + sensors.angle_noise * rng.normal();
                 let _ = write!(text, ",{:.9}", seen.round() * quantum);
             }
             if let Some(velocity) = &self.velocity {
@@ -178,7 +178,7 @@ impl Logging {
                     let speed = if speed.abs() < velocity.dead_band[joint] {
                         0.0
                     } else {
-                        velocity.scale * (speed + velocity.noise[joint] * dice.normal())
+                        velocity.scale * (speed + velocity.noise[joint] * rng.normal())
                     };
                     let _ = write!(text, ",{speed:.7}");
                 }
@@ -192,11 +192,11 @@ impl Logging {
     }
 
     /// The torque as logged, samples × joints: noise, filter, dead band and steps, in this order.
-    fn torque(&self, sensors: &Sensors, record: &Record, dice: &mut Dice) -> Vec<f64> {
+    fn torque(&self, sensors: &Sensors, record: &Record, rng: &mut CaseRng) -> Vec<f64> {
         let joints = sensors.torque_noise.len();
         let mut torque = record.torque.clone();
         for joint in 0..joints {
-            let noise = self.noise(&record.times, sensors.correlation_time, dice);
+            let noise = self.noise(&record.times, sensors.correlation_time, rng);
             for (row, noise) in torque.chunks_exact_mut(joints).zip(noise) {
                 row[joint] += sensors.torque_noise[joint] * noise;
             }
@@ -221,11 +221,11 @@ impl Logging {
 
     /// Noise of unit variance: a first-order autoregression of this correlation time \[s\], white where that
     /// is nought.
-    pub fn noise(&self, times: &[f64], correlation_time: f64, dice: &mut Dice) -> Vec<f64> {
-        let mut level = dice.normal();
+    pub fn noise(&self, times: &[f64], correlation_time: f64, rng: &mut CaseRng) -> Vec<f64> {
+        let mut level = rng.normal();
         let mut previous = times.first().copied().unwrap_or(0.0);
         let next = |&time: &f64| {
-            let innovation = self.tails.draw(dice);
+            let innovation = self.tails.draw(rng);
             let kept =
                 if correlation_time > 0.0 { (-(time - previous) / correlation_time).exp() } else { 0.0 };
             previous = time;
@@ -238,18 +238,18 @@ impl Logging {
 
 impl Tails {
     /// A draw of unit variance.
-    fn draw(self, dice: &mut Dice) -> f64 {
+    fn draw(self, rng: &mut CaseRng) -> f64 {
         match self {
-            Tails::Normal => dice.normal(),
+            Tails::Normal => rng.normal(),
             Tails::Student => {
-                let square: f64 = (0..3).map(|_| dice.normal().powi(2)).sum();
+                let square: f64 = (0..3).map(|_| rng.normal().powi(2)).sum();
                 // Its variance is 3.
-                dice.normal() / (square / 3.0).sqrt() / 3.0_f64.sqrt()
+                rng.normal() / (square / 3.0).sqrt() / 3.0_f64.sqrt()
             }
             Tails::Contaminated => {
                 let [share, size] = OUTLIERS;
-                let scale = if dice.chance(share) { size } else { 1.0 };
-                scale * dice.normal() / (1.0 - share + share * size * size).sqrt()
+                let scale = if rng.chance(share) { size } else { 1.0 };
+                scale * rng.normal() / (1.0 - share + share * size * size).sqrt()
             }
         }
     }

@@ -40,7 +40,6 @@
 
 mod case;
 mod certainty;
-mod dice;
 mod draw;
 mod elasticity;
 mod family;
@@ -51,6 +50,7 @@ mod logging;
 mod mechanism;
 mod plant;
 pub(crate) mod report_file;
+mod rng;
 mod robot;
 mod run;
 mod saturation;

@@ -2,7 +2,7 @@
 
 use super::friction::{Sign, interpolate};
 use super::secret::{Form, Secret};
-use super::trajectory::Motion;
+use super::trajectory::Trajectory;
 use phiw_dynamics::{Tree, Workspace};
 
 /// The effects that the physics has on every joint and that are declared to the tracer.
@@ -46,7 +46,7 @@ pub struct States {
 
 impl States {
     /// The motion at the given session times.
-    pub fn of_motion(motion: &Motion, times: &[f64]) -> Self {
+    pub fn of_motion(motion: &Trajectory, times: &[f64]) -> Self {
         let joints = motion.joints.len();
         let mut values = [0; 3].map(|_| Vec::with_capacity(times.len() * joints));
         for &time in times {
@@ -94,7 +94,7 @@ pub struct Scene<'a> {
     /// Declared friction.
     pub ordinary: &'a Ordinary,
     /// The motion of the links.
-    pub motion: &'a Motion,
+    pub motion: &'a Trajectory,
     /// Session times \[s\].
     pub times: &'a [f64],
     /// States of the links.
@@ -153,7 +153,7 @@ pub fn record(
     tree: &Tree,
     ordinary: &Ordinary,
     secrets: &[&Secret],
-    motion: &Motion,
+    motion: &Trajectory,
     times: &[f64],
 ) -> Record {
     let joints = tree.joint_count();
@@ -219,7 +219,7 @@ fn true_torque(
     tree: &Tree,
     ordinary: &Ordinary,
     secrets: &[&Secret],
-    motion: &Motion,
+    motion: &Trajectory,
     times: &[f64],
 ) -> (States, Vec<f64>) {
     let link = States::of_motion(motion, times);

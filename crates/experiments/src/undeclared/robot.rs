@@ -87,10 +87,10 @@ mod tests {
         mended.set_inertial_parameters(&moved).expect("sizes fit");
         let is_physical = |body: &Body| Inertia::<f64>::from_parameters(&body.inertial).is_physical();
         assert!(mended.bodies().iter().all(is_physical));
-        let (mut random, mut workspace) = (RandomNumbers::new(1), Workspace::new(puma));
+        let (mut rng, mut workspace) = (RandomNumbers::new(1), Workspace::new(puma));
         let [mut as_published, mut as_mended] = [[0.0; 6]; 2];
         for _ in 0..20 {
-            let RandomState { q, v, a } = random_state(puma, &mut random);
+            let RandomState { q, v, a } = random_state(puma, &mut rng);
             puma.inverse_dynamics(&q, &v, &a, &mut workspace, &mut as_published).expect("sizes fit");
             mended.inverse_dynamics(&q, &v, &a, &mut workspace, &mut as_mended).expect("sizes fit");
             assert!(as_published.iter().zip(&as_mended).all(|(a, b)| (a - b).abs() < 1e-9));

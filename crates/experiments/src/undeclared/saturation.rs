@@ -6,10 +6,10 @@
 //! sampled controller's hold would be a delay of its own.
 
 use super::case::{even_times, is_simulated};
-use super::dice::Dice;
 use super::plant::{Ordinary, States, rigid_torque};
+use super::rng::CaseRng;
 use super::secret::Secret;
-use super::trajectory::{Excess, JointMotion, Motion};
+use super::trajectory::{Excess, JointMotion, Trajectory};
 use phiw_dynamics::{Tree, Workspace};
 
 /// Step of the integration \[s\].
@@ -28,8 +28,8 @@ pub fn install(
     wanted: f64,
     tree: &Tree,
     ordinary: &Ordinary,
-    motions: &mut [Motion],
-    dice: &mut Dice,
+    motions: &mut [Trajectory],
+    rng: &mut CaseRng,
 ) -> Option<f64> {
     let joint = *secret.joints.first()?;
     if motions.iter().any(is_simulated) {
@@ -49,8 +49,8 @@ pub fn install(
     let mut quantile = 0.93_f64;
     for _ in 0..TRIALS {
         secret.scale = needed[((needed.len() - 1) as f64 * quantile) as usize];
-        let bandwidth = dice.uniform(6.0, 14.0);
-        let simulated: Option<Vec<Motion>> = motions
+        let bandwidth = rng.uniform(6.0, 14.0);
+        let simulated: Option<Vec<Trajectory>> = motions
             .iter()
             .map(|motion| simulate(tree, ordinary, motion, joint, secret.scale, bandwidth))
             .collect();
@@ -73,7 +73,7 @@ pub fn install(
     None
 }
 
-fn clipped_share(motion: &Motion) -> f64 {
+fn clipped_share(motion: &Trajectory) -> f64 {
     let torque = motion.excess.as_ref().map_or(&[][..], |excess| &excess.torque);
     torque.iter().filter(|torque| **torque != 0.0).count() as f64 / torque.len().max(1) as f64
 }
@@ -82,11 +82,11 @@ fn clipped_share(motion: &Motion) -> f64 {
 fn simulate(
     tree: &Tree,
     ordinary: &Ordinary,
-    motion: &Motion,
+    motion: &Trajectory,
     joint: usize,
     limit: f64,
     bandwidth: f64,
-) -> Option<Motion> {
+) -> Option<Trajectory> {
     let joints = tree.joint_count();
     let mut workspace = Workspace::new(tree);
     let [mut q, mut v, mut a, mut torque] = [0; 4].map(|_| vec![0.0; joints]);

@@ -7,7 +7,7 @@ use super::kind::Name;
 use super::load::{HeldBody, WorldForce};
 use super::mechanism::Mechanism;
 use super::plant::{Ordinary, Scene, record};
-use super::trajectory::Motion;
+use super::trajectory::Trajectory;
 use phiw_dynamics::Tree;
 
 /// How an effect comes about. [`Secret::scale`] is its one size.
@@ -112,7 +112,7 @@ impl Secret {
 
     /// Root mean square of the effect over that of the joint's torque without it, for the joint that feels it
     /// most.
-    pub fn size(&self, tree: &Tree, ordinary: &Ordinary, motions: &[Motion], times: &[Vec<f64>]) -> f64 {
+    pub fn size(&self, tree: &Tree, ordinary: &Ordinary, motions: &[Trajectory], times: &[Vec<f64>]) -> f64 {
         let mut squares = vec![[0.0; 2]; tree.joint_count()];
         for (motion, times) in motions.iter().zip(times) {
             let record = record(tree, ordinary, &[self], motion, times);
@@ -131,7 +131,7 @@ impl Secret {
         wanted: f64,
         tree: &Tree,
         ordinary: &Ordinary,
-        motions: &[Motion],
+        motions: &[Trajectory],
         times: &[Vec<f64>],
     ) -> f64 {
         let [lowest, mut highest] = self.form.bounds();

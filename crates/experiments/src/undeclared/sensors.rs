@@ -1,7 +1,7 @@
 //! From what a perfect logger would write to what a real one does: noise, quanta, jitter.
 
-use super::dice::Dice;
 use super::plant::Record;
+use super::rng::CaseRng;
 use phiw_dynamics::{JointType, Tree};
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -48,22 +48,22 @@ pub struct Sensors {
 
 impl Sensors {
     /// Draws sensors for joints whose torques have these root mean squares.
-    pub fn draw(tree: &Tree, torque: &[f64], dice: &mut Dice) -> Self {
-        let rate = if torque.len() > 10 { 250.0 } else { dice.pick(&[250.0, 400.0, 500.0, 800.0, 1000.0]) };
-        let correlation_time = if dice.chance(0.4) { dice.log_uniform(0.005, 0.05) } else { 0.0 };
+    pub fn draw(tree: &Tree, torque: &[f64], rng: &mut CaseRng) -> Self {
+        let rate = if torque.len() > 10 { 250.0 } else { rng.pick(&[250.0, 400.0, 500.0, 800.0, 1000.0]) };
+        let correlation_time = if rng.chance(0.4) { rng.log_uniform(0.005, 0.05) } else { 0.0 };
         let highest: f64 = if correlation_time > 0.0 { 0.03 } else { 0.06 };
-        let share = dice.log_uniform(0.005, highest);
-        let noise = |torque: &f64| torque * (share * dice.log_uniform(0.7, 1.4)).clamp(0.005, highest);
+        let share = rng.log_uniform(0.005, highest);
+        let noise = |torque: &f64| torque * (share * rng.log_uniform(0.7, 1.4)).clamp(0.005, highest);
         let torque_noise = torque.iter().map(noise).collect();
-        let bits = ENCODER_BITS[0] + dice.index((ENCODER_BITS[1] - ENCODER_BITS[0] + 1) as usize) as i32;
+        let bits = ENCODER_BITS[0] + rng.index((ENCODER_BITS[1] - ENCODER_BITS[0] + 1) as usize) as i32;
         let quantum = |joint| match tree.joint(joint).joint_type {
             JointType::Prismatic => SLIDE_QUANTUM,
             _ => TAU / f64::from(bits).exp2(),
         };
         let quantum = (0..torque.len()).map(quantum).collect();
-        let angle_noise = if dice.chance(0.25) { dice.uniform(1.0, 2.0) } else { 0.0 };
-        let jitter = dice.uniform(0.05, 0.2);
-        let clock = match dice.index(10) {
+        let angle_noise = if rng.chance(0.25) { rng.uniform(1.0, 2.0) } else { 0.0 };
+        let jitter = rng.uniform(0.05, 0.2);
+        let clock = match rng.index(10) {
             0..=5 => Clock::Even,
             6 | 7 => Clock::Truthful(jitter),
             8 => Clock::JitteredSamples(jitter),
@@ -73,14 +73,14 @@ impl Sensors {
     }
 
     /// True times of the samples and the stamps on them, from `start` on.
-    pub fn times(&self, start: f64, duration: f64, dice: &mut Dice) -> [Vec<f64>; 2] {
+    pub fn times(&self, start: f64, duration: f64, rng: &mut CaseRng) -> [Vec<f64>; 2] {
         let period = 1.0 / self.rate;
         let even: Vec<f64> =
             (0..(duration * self.rate) as usize).map(|k| start + k as f64 * period).collect();
         let mut jittered = |share: f64| -> Vec<f64> {
             // Never before the start, where nobody was logging.
             even.iter()
-                .map(|time| time + share * period * dice.uniform(-1.0, 1.0))
+                .map(|time| time + share * period * rng.uniform(-1.0, 1.0))
                 .map(|t| t.max(start))
                 .collect()
         };
@@ -96,7 +96,7 @@ impl Sensors {
     }
 
     /// The log's text: `t,q.*,tau.*`.
-    pub fn log(&self, tree: &Tree, record: &Record, stamps: &[f64], dice: &mut Dice) -> String {
+    pub fn log(&self, tree: &Tree, record: &Record, stamps: &[f64], rng: &mut CaseRng) -> String {
         let joints = tree.joint_count();
         let mut text = String::with_capacity(record.times.len() * (12 + 22 * joints));
         text.push('t');
@@ -106,18 +106,18 @@ impl Sensors {
             });
         }
         text.push('\n');
-        let mut noise: Vec<f64> = (0..joints).map(|_| dice.normal()).collect();
+        let mut noise: Vec<f64> = (0..joints).map(|_| rng.normal()).collect();
         for (sample, stamp) in stamps.iter().enumerate() {
             let _ = write!(text, "{stamp:.7}");
             for joint in 0..joints {
                 let quantum = self.quantum[joint];
-                let seen = record.states.q(sample, joint) / quantum + self.angle_noise * dice.normal();
+                let seen = record.states.q(sample, joint) / quantum + self.angle_noise * rng.normal();
                 let _ = write!(text, ",{:.9}", seen.round() * quantum);
             }
             if sample > 0 {
                 let elapsed = record.times[sample] - record.times[sample - 1];
                 for noise in &mut noise {
-                    *noise = self.next_noise(*noise, elapsed, dice.normal());
+                    *noise = self.next_noise(*noise, elapsed, rng.normal());
                 }
             }
             for joint in 0..joints {

@@ -1,7 +1,7 @@
 //! Which cases there are: a case follows from its seed alone.
 
-use super::dice::{Dice, Stream};
 use super::kind::{Kind, Name, Stranger};
+use super::rng::{CaseRng, Stream};
 use super::situation::Situation;
 use clap::ValueEnum;
 use serde::Serialize;
@@ -111,7 +111,7 @@ impl Spec {
     pub fn of_seed(seed: u64, robots: usize) -> Option<Spec> {
         let suite = *Suite::ALL.get((seed % 1_000_000 / 100_000) as usize)?;
         let index = (seed % 100_000) as usize;
-        let dice = &mut Dice::new(seed, u64::MAX >> 8, Stream::Secret);
+        let rng = &mut CaseRng::new(seed, u64::MAX >> 8, Stream::Secret);
         let kinds = Kind::value_variants();
         let mut spec = Spec {
             seed,
@@ -119,7 +119,7 @@ impl Spec {
             robot: index % robots,
             secrets: Vec::new(),
             held: false,
-            together: dice.chance(0.3),
+            together: rng.chance(0.3),
             situation: None,
             friction_declared: true,
         };
@@ -129,25 +129,25 @@ impl Spec {
                 spec.held = kind.needs_held_model() || (kind.may_grow() && index / kinds.len() % 3 == 2);
                 spec.secrets = vec![Name::Catalogue(kind)];
             }
-            Suite::Two => spec.draw_several(2, dice),
-            Suite::Three => spec.draw_several(3, dice),
-            Suite::Control => spec.held = dice.chance(0.2),
+            Suite::Two => spec.draw_several(2, rng),
+            Suite::Three => spec.draw_several(3, rng),
+            Suite::Control => spec.held = rng.chance(0.2),
             Suite::Outside => {
                 let strangers = Stranger::value_variants();
                 spec.secrets = vec![Name::Outside(strangers[index % strangers.len()])];
             }
-            Suite::WideRight | Suite::WideEffects | Suite::WideOutside => spec.draw_wide(index, robots, dice),
+            Suite::WideRight | Suite::WideEffects | Suite::WideOutside => spec.draw_wide(index, robots, rng),
         }
         Some(spec)
     }
 
     /// Situations in turn; the largest robot in one case of ten, since it takes as long as all others.
-    fn draw_wide(&mut self, index: usize, robots: usize, dice: &mut Dice) {
+    fn draw_wide(&mut self, index: usize, robots: usize, rng: &mut CaseRng) {
         let situations = Situation::ALL.len();
         self.situation = Some(Situation::ALL[index % situations]);
-        self.robot = if dice.chance(0.1) { robots - 1 } else { dice.index((robots - 1).max(1)) };
+        self.robot = if rng.chance(0.1) { robots - 1 } else { rng.index((robots - 1).max(1)) };
         self.friction_declared = match self.suite {
-            Suite::WideEffects => dice.chance(0.3),
+            Suite::WideEffects => rng.chance(0.3),
             _ => true,
         };
         let strangers = Stranger::value_variants();
@@ -155,11 +155,11 @@ impl Spec {
             Suite::WideRight => 0,
             Suite::WideOutside => {
                 self.secrets = vec![Name::Outside(strangers[(index + index / situations) % strangers.len()])];
-                dice.index(4)
+                rng.index(4)
             }
             // One with friction alone, then more and more.
-            _ if !self.friction_declared => dice.pick(&[0, 1, 3, 6, 9, 13]),
-            _ => dice.pick(&[1, 3, 6, 9, 13]),
+            _ if !self.friction_declared => rng.pick(&[0, 1, 3, 6, 9, 13]),
+            _ => rng.pick(&[1, 3, 6, 9, 13]),
         };
         let may_join = |kind: &Kind| {
             !kind.needs_held_model()
@@ -177,13 +177,13 @@ impl Spec {
         };
         let mut choices: Vec<Kind> = Kind::value_variants().iter().copied().filter(may_join).collect();
         for _ in 0..count {
-            let kind = choices.swap_remove(dice.index(choices.len()));
+            let kind = choices.swap_remove(rng.index(choices.len()));
             self.secrets.push(Name::Catalogue(kind));
         }
     }
 
-    fn draw_several(&mut self, count: usize, dice: &mut Dice) {
-        self.held = dice.chance(0.2);
+    fn draw_several(&mut self, count: usize, rng: &mut CaseRng) {
+        self.held = rng.chance(0.2);
         let may_join = |kind: &Kind| match kind {
             // Simulated motion and deflected encoders would change what a second effect is: they are judged
             // alone.
@@ -193,7 +193,7 @@ impl Spec {
         let choices: Vec<Kind> = Kind::value_variants().iter().copied().filter(may_join).collect();
         let mut kinds: Vec<Kind> = Vec::new();
         while kinds.len() < count {
-            let kind = dice.pick(&choices);
+            let kind = rng.pick(&choices);
             if !kinds.iter().any(|other| kind.is_nested_with(*other)) {
                 kinds.push(kind);
             }

@@ -1,9 +1,9 @@
 //! What a case must be, whatever its seed.
 
 use super::case::{Case, SIZES, even_times};
-use super::dice::{Dice, Stream};
 use super::kind::{Kind, Name};
 use super::plant::{Record, record};
+use super::rng::{CaseRng, Stream};
 use super::robot::{Robot, robots};
 use super::saturation::CLIPPED;
 use super::secret::{Form, Secret};
@@ -237,8 +237,8 @@ fn sensors(clock: Clock, correlation_time: f64) -> Sensors {
 #[test]
 fn clocks_jitter_as_asked() {
     let check = |clock: Clock, samples_jitter: bool, stamps_jitter: bool| {
-        let mut dice = Dice::new(7, 0, Stream::Sensors);
-        let all = sensors(clock, 0.0).times(25.0, 20.0, &mut dice);
+        let mut rng = CaseRng::new(7, 0, Stream::Sensors);
+        let all = sensors(clock, 0.0).times(25.0, 20.0, &mut rng);
         for (times, jitters) in all.iter().zip([samples_jitter, stamps_jitter]) {
             assert_eq!(times.len(), 10_000);
             assert!(times.windows(2).all(|pair| pair[0] < pair[1]) && times[0] >= 25.0);
@@ -265,10 +265,10 @@ fn logs_are_quantised_and_noisy_as_asked() {
     let (tree, motion) = (&control.robot.tree, &control.motions[0]);
     for correlation_time in [0.0, 0.02] {
         let sensors = sensors(Clock::Even, correlation_time);
-        let mut dice = Dice::new(3, 0, Stream::Sensors);
-        let [times, stamps] = sensors.times(motion.start, motion.duration, &mut dice);
+        let mut rng = CaseRng::new(3, 0, Stream::Sensors);
+        let [times, stamps] = sensors.times(motion.start, motion.duration, &mut rng);
         let record = record(tree, &control.ordinary, &[], motion, &times);
-        let log = sensors.log(tree, &record, &stamps, &mut dice);
+        let log = sensors.log(tree, &record, &stamps, &mut rng);
         let mut lines = log.lines();
         assert_eq!(lines.next(), Some("t,q.joint_1,q.joint_2,tau.joint_1,tau.joint_2"));
         let rows: Vec<Vec<f64>> =

@@ -1,6 +1,6 @@
 //! Motions whose position, velocity and acceleration are known in closed form.
 
-use super::dice::Dice;
+use super::rng::CaseRng;
 use phiw_dynamics::Tree;
 use std::f64::consts::TAU;
 
@@ -20,7 +20,7 @@ pub type JointState = [f64; 3];
 
 /// One log's motion of all joints, at rest before its start and after its end.
 #[derive(Clone, Debug)]
-pub struct Motion {
+pub struct Trajectory {
     /// Session time of its start \[s\].
     pub start: f64,
     /// How long it takes \[s\].
@@ -82,50 +82,50 @@ pub struct Reach {
     pub upper: bool,
 }
 
-impl Motion {
+impl Trajectory {
     /// State of a joint at a session time.
     pub fn state(&self, joint: usize, time: f64) -> JointState {
         self.joints[joint].state((time - self.start).clamp(0.0, self.duration), self.duration)
     }
 
     /// A periodic excitation of all joints: six to ten sinusoids each, of a fundamental of 0.05 to 0.1 Hz.
-    pub fn fourier(tree: &Tree, dice: &mut Dice, start: f64, duration: f64, reach: Option<Reach>) -> Self {
-        let fundamental = dice.uniform(0.05, 0.1);
-        let highest = dice.uniform(1.0, 1.5);
+    pub fn fourier(tree: &Tree, rng: &mut CaseRng, start: f64, duration: f64, reach: Option<Reach>) -> Self {
+        let fundamental = rng.uniform(0.05, 0.1);
+        let highest = rng.uniform(1.0, 1.5);
         let joints = (0..tree.joint_count())
             .map(|joint| {
                 let reach = reach.filter(|reach| reach.joint == joint);
-                fourier_joint(room(tree, joint), dice, fundamental, highest, duration, reach)
+                fourier_joint(room(tree, joint), rng, fundamental, highest, duration, reach)
             })
             .collect();
-        Motion { start, duration, joints, excess: None }
+        Trajectory { start, duration, joints, excess: None }
     }
 
     /// Moves from pose to pose, as when picking and placing, all joints together, with rests.
     pub fn point_to_point(
         tree: &Tree,
-        dice: &mut Dice,
+        rng: &mut CaseRng,
         start: f64,
         duration: f64,
         reach: Option<Reach>,
     ) -> Self {
-        Self::moves(tree, dice, start, duration, reach, SHORT_RESTS)
+        Self::moves(tree, rng, start, duration, reach, SHORT_RESTS)
     }
 
     /// Moves from pose to pose with long rests: all joints together, or one after the other in their own
     /// time.
     pub fn with_rests(
         tree: &Tree,
-        dice: &mut Dice,
+        rng: &mut CaseRng,
         start: f64,
         duration: f64,
         reach: Option<Reach>,
         together: bool,
     ) -> Self {
-        let mut motion = Self::moves(tree, dice, start, duration, reach, LONG_RESTS);
+        let mut motion = Self::moves(tree, rng, start, duration, reach, LONG_RESTS);
         if !together {
             for joint in 0..tree.joint_count() {
-                let mut own = Self::moves(tree, dice, start, duration, reach, LONG_RESTS);
+                let mut own = Self::moves(tree, rng, start, duration, reach, LONG_RESTS);
                 motion.joints[joint] = own.joints.swap_remove(joint);
             }
         }
@@ -133,43 +133,43 @@ impl Motion {
     }
 
     /// A periodic excitation of two to five harmonics of 0.2 to 0.5 Hz.
-    pub fn periodic(tree: &Tree, dice: &mut Dice, start: f64, duration: f64, reach: Option<Reach>) -> Self {
-        let fundamental = dice.uniform(0.2, 0.5);
-        let highest = fundamental * (2 + dice.index(4)) as f64;
+    pub fn periodic(tree: &Tree, rng: &mut CaseRng, start: f64, duration: f64, reach: Option<Reach>) -> Self {
+        let fundamental = rng.uniform(0.2, 0.5);
+        let highest = fundamental * (2 + rng.index(4)) as f64;
         let joints = (0..tree.joint_count())
             .map(|joint| {
                 let reach = reach.filter(|reach| reach.joint == joint);
-                fourier_joint(room(tree, joint), dice, fundamental, highest, duration, reach)
+                fourier_joint(room(tree, joint), rng, fundamental, highest, duration, reach)
             })
             .collect();
-        Motion { start, duration, joints, excess: None }
+        Trajectory { start, duration, joints, excess: None }
     }
 
     fn moves(
         tree: &Tree,
-        dice: &mut Dice,
+        rng: &mut CaseRng,
         start: f64,
         duration: f64,
         reach: Option<Reach>,
         rests: [f64; 2],
     ) -> Self {
         let rooms: Vec<Room> = (0..tree.joint_count()).map(|joint| room(tree, joint)).collect();
-        let pose = |dice: &mut Dice, number: usize| -> Vec<f64> {
+        let pose = |rng: &mut CaseRng, number: usize| -> Vec<f64> {
             let inside = |(joint, room): (usize, &Room)| match reach {
                 Some(reach) if reach.joint == joint && number % 3 == 1 => room.near_limit(reach.upper),
                 _ => {
                     let margin = 0.12 * (room.upper - room.lower);
-                    dice.uniform(room.lower + margin, room.upper - margin)
+                    rng.uniform(room.lower + margin, room.upper - margin)
                 }
             };
             rooms.iter().enumerate().map(inside).collect()
         };
         let mut joints = vec![Vec::new(); rooms.len()];
-        let mut from = pose(dice, 0);
+        let mut from = pose(rng, 0);
         let mut clock = 0.3;
-        let haste = dice.uniform(0.6, 0.95);
+        let haste = rng.uniform(0.6, 0.95);
         for number in 1.. {
-            let to = pose(dice, number);
+            let to = pose(rng, number);
             // A minimum-jerk move of distance d in time T peaks at 1.875 d/T and 5.77 d/T².
             let needed = rooms.iter().zip(from.iter().zip(&to)).map(|(room, (from, to))| {
                 let distance = (to - from).abs();
@@ -183,11 +183,11 @@ impl Motion {
             for (moves, (from, to)) in joints.iter_mut().zip(from.iter().zip(&to)) {
                 moves.push([clock, end, *from, *to]);
             }
-            clock = end + dice.uniform(rests[0], rests[1]);
+            clock = end + rng.uniform(rests[0], rests[1]);
             from = to;
         }
         let joints = joints.into_iter().map(|moves| JointMotion::PointToPoint { moves }).collect();
-        Motion { start, duration, joints, excess: None }
+        Trajectory { start, duration, joints, excess: None }
     }
 
     /// The same motion `factor` times as slow: as much of it as there is time for.
@@ -272,24 +272,24 @@ fn room(tree: &Tree, joint: usize) -> Room {
 
 fn fourier_joint(
     room: Room,
-    dice: &mut Dice,
+    rng: &mut CaseRng,
     fundamental: f64,
     highest: f64,
     duration: f64,
     reach: Option<Reach>,
 ) -> JointMotion {
     let harmonics = (highest / fundamental) as usize;
-    let decay = dice.uniform(0.7, 1.3);
-    let count = 6 + dice.index(5);
+    let decay = rng.uniform(0.7, 1.3);
+    let count = 6 + rng.index(5);
     let mut terms: Vec<[f64; 3]> = (0..count)
         .map(|number| {
             // Spread evenly in the logarithm, lowest and highest always among them.
-            let position = (number as f64 + dice.uniform(-0.4, 0.4)) / (count - 1) as f64;
+            let position = (number as f64 + rng.uniform(-0.4, 0.4)) / (count - 1) as f64;
             let harmonic = (harmonics as f64).powf(position.clamp(0.0, 1.0)).round().max(1.0);
             [
-                dice.uniform(0.3, 1.0) * harmonic.powf(-decay),
+                rng.uniform(0.3, 1.0) * harmonic.powf(-decay),
                 TAU * fundamental * harmonic,
-                dice.uniform(0.0, TAU),
+                rng.uniform(0.0, TAU),
             ]
         })
         .collect();
@@ -302,14 +302,14 @@ fn fourier_joint(
         fastest = fastest.max(v.abs());
     }
     let width = extent[1] - extent[0];
-    let scale = (dice.uniform(0.5, 0.9) * (room.upper - room.lower) / width)
-        .min(dice.uniform(0.5, 0.95) * room.velocity / fastest);
+    let scale = (rng.uniform(0.5, 0.9) * (room.upper - room.lower) / width)
+        .min(rng.uniform(0.5, 0.95) * room.velocity / fastest);
     terms.iter_mut().for_each(|term| term[0] *= scale);
     let center = match reach {
         Some(reach) => room.near_limit(reach.upper) - scale * extent[usize::from(reach.upper)],
         None => {
             let margin = 0.03 * (room.upper - room.lower);
-            dice.uniform(room.lower + margin - scale * extent[0], room.upper - margin - scale * extent[1])
+            rng.uniform(room.lower + margin - scale * extent[0], room.upper - margin - scale * extent[1])
         }
     };
     JointMotion::Fourier { center, terms }
@@ -364,17 +364,17 @@ fn hermite(states: &[JointState], place: f64, step: f64) -> JointState {
 
 #[cfg(test)]
 mod tests {
-    use super::super::dice::{Dice, Stream};
+    use super::super::rng::{CaseRng, Stream};
     use super::super::robot::robots;
-    use super::{JointMotion, Motion, Reach};
+    use super::{JointMotion, Reach, Trajectory};
 
     /// Derivatives by central differences, limits and rest at both ends.
     fn check(point_to_point: bool, reach: Option<Reach>) {
         let robots = robots().expect("the models read");
         for (number, robot) in robots.iter().enumerate() {
-            let mut dice = Dice::new(number as u64, 0, Stream::Motion);
-            let draw = if point_to_point { Motion::point_to_point } else { Motion::fourier };
-            let motion = draw(&robot.tree, &mut dice, 25.0, 20.0, reach);
+            let mut rng = CaseRng::new(number as u64, 0, Stream::Motion);
+            let draw = if point_to_point { Trajectory::point_to_point } else { Trajectory::fourier };
+            let motion = draw(&robot.tree, &mut rng, 25.0, 20.0, reach);
             let step = 1e-4;
             for joint in 0..robot.joints() {
                 let limits = robot.tree.joint(joint).limits;

@@ -6,18 +6,18 @@ use super::case::{
     even_times, felt_in_every_log, survey, tamed,
 };
 use super::certainty::visible_beside_others;
-use super::dice::{Dice, Stream};
 use super::draw::{Survey, catalogue, outside};
 use super::family::Family;
 use super::kind::{Kind, Name};
 use super::logging::Logging;
 use super::plant::{Ordinary, Record, States, record};
+use super::rng::{CaseRng, Stream};
 use super::robot::Robot;
 use super::secret::{Form, Secret};
 use super::sensors::Sensors;
 use super::situation::Situation;
 use super::suite::{Spec, Suite};
-use super::trajectory::{Motion, Reach};
+use super::trajectory::{Reach, Trajectory};
 use super::visibility::Absorber;
 
 /// Attempts at one effect before it is left out.
@@ -34,28 +34,28 @@ const FASTER: [f64; 2] = [3.0, 5.0];
 
 /// One attempt at the case of a spec. `None` if its stranger can't be seen.
 pub fn draw<'a>(spec: &Spec, situation: Situation, robot: &'a Robot, attempt: u64) -> Option<Case<'a>> {
-    let dice = |stream| Dice::new(spec.seed, attempt, stream);
-    let (mut secret_dice, mut plant_dice) = (dice(Stream::Secret), dice(Stream::Plant));
+    let rng = |stream| CaseRng::new(spec.seed, attempt, stream);
+    let (mut secret_rng, mut plant_rng) = (rng(Stream::Secret), rng(Stream::Plant));
     let reach = spec
         .has(Kind::EndStop)
-        .then(|| Reach { joint: secret_dice.index(robot.joints()), upper: secret_dice.chance(0.5) });
-    let motions = motions(situation, robot, reach, spec, &mut dice(Stream::Motion));
+        .then(|| Reach { joint: secret_rng.index(robot.joints()), upper: secret_rng.chance(0.5) });
+    let motions = motions(situation, robot, reach, spec, &mut rng(Stream::Motion));
     let plain = Spec { secrets: Vec::new(), ..spec.clone() };
-    let (mut full, mut kinds) = draw_ordinary(&plain, robot, &motions, &mut plant_dice);
-    if spec.suite == Suite::WideRight && plant_dice.chance(BARE) {
+    let (mut full, mut kinds) = draw_ordinary(&plain, robot, &motions, &mut plant_rng);
+    if spec.suite == Suite::WideRight && plant_rng.chance(BARE) {
         full = bare(&full);
         kinds.clear();
     }
     let times: Vec<Vec<f64>> = motions.iter().map(|motion| even_times(motion, SIZE_RATE)).collect();
     let survey = survey(robot, &full, &motions, &times, reach);
-    let mut sensors = Sensors::draw(&robot.tree, &survey.torque, &mut plant_dice);
+    let mut sensors = Sensors::draw(&robot.tree, &survey.torque, &mut plant_rng);
     let rms: [&[f64]; 2] = [&survey.torque, &survey.speed];
-    let logging = Logging::draw(situation, &robot.tree, rms, &mut sensors, &mut dice(Stream::Situation));
+    let logging = Logging::draw(situation, &robot.tree, rms, &mut sensors, &mut rng(Stream::Situation));
     sensors.logging = Some(logging);
-    let bristles = situation.rests() && plant_dice.chance(0.6);
+    let bristles = situation.rests() && plant_rng.chance(0.6);
     let families: Vec<Secret> = kinds
         .iter()
-        .map(|kind| family(*kind, spec, &full, &survey.speed, bristles, &mut plant_dice))
+        .map(|kind| family(*kind, spec, &full, &survey.speed, bristles, &mut plant_rng))
         .collect();
     let mut case = Case {
         spec: spec.clone(),
@@ -78,7 +78,7 @@ pub fn draw<'a>(spec: &Spec, situation: Situation, robot: &'a Robot, attempt: u6
     let most = EFFECTS_PER_JOINT * robot.joints();
     for &name in spec.secrets.iter().take(most) {
         let drawn = (0..ATTEMPTS).find_map(|_| {
-            one_more(name, &case, &full, &survey, &times, &secrets[families..], &mut secret_dice)
+            one_more(name, &case, &full, &survey, &times, &secrets[families..], &mut secret_rng)
         });
         match (drawn, name) {
             (Some(secret), _) => secrets.push(secret),
@@ -103,15 +103,15 @@ fn motions(
     robot: &Robot,
     reach: Option<Reach>,
     spec: &Spec,
-    dice: &mut Dice,
-) -> Vec<Motion> {
+    rng: &mut CaseRng,
+) -> Vec<Trajectory> {
     let tree = &robot.tree;
     match situation {
         Situation::SlowToFast => {
-            let factor = dice.uniform(FASTER[0], FASTER[1]);
-            let mut motions: Vec<Motion> = STARTS
+            let factor = rng.uniform(FASTER[0], FASTER[1]);
+            let mut motions: Vec<Trajectory> = STARTS
                 .into_iter()
-                .map(|start| tamed(robot, Motion::fourier(tree, dice, start, DURATION, reach), reach))
+                .map(|start| tamed(robot, Trajectory::fourier(tree, rng, start, DURATION, reach), reach))
                 .collect();
             let fast = speed(robot, &motions[2]);
             for motion in &mut motions[..2] {
@@ -120,28 +120,29 @@ fn motions(
             motions
         }
         Situation::Periodic => {
-            let mut motions: Vec<Motion> = STARTS
+            let mut motions: Vec<Trajectory> = STARTS
                 .into_iter()
-                .map(|start| tamed(robot, Motion::periodic(tree, dice, start, DURATION, reach), reach))
+                .map(|start| tamed(robot, Trajectory::periodic(tree, rng, start, DURATION, reach), reach))
                 .collect();
-            if dice.chance(0.5) {
-                motions[1] = Motion { start: STARTS[1], ..motions[0].clone() };
+            if rng.chance(0.5) {
+                motions[1] = Trajectory { start: STARTS[1], ..motions[0].clone() };
             }
             motions
         }
         Situation::Rests | Situation::Mixed => {
-            let together = dice.chance(0.5);
-            let draw =
-                |start| tamed(robot, Motion::with_rests(tree, dice, start, DURATION, reach, together), reach);
+            let together = rng.chance(0.5);
+            let draw = |start| {
+                tamed(robot, Trajectory::with_rests(tree, rng, start, DURATION, reach, together), reach)
+            };
             STARTS.into_iter().map(draw).collect()
         }
         // Bristles hold a force at rest: that belongs to the situations with rests.
-        _ => draw_motions(robot, reach, spec.has(Kind::StribeckFriction), dice),
+        _ => draw_motions(robot, reach, spec.has(Kind::StribeckFriction), rng),
     }
 }
 
 /// Root mean square over joints and time of the speed as a share of each joint's limit.
-pub fn speed(robot: &Robot, motion: &Motion) -> f64 {
+pub fn speed(robot: &Robot, motion: &Trajectory) -> f64 {
     let states = States::of_motion(motion, &even_times(motion, 25.0));
     let square = |sample: usize| -> f64 {
         let share = |joint| states.v(sample, joint) / robot.tree.joint(joint).limits.velocity;
@@ -158,18 +159,18 @@ fn family(
     full: &Ordinary,
     speed: &[f64],
     bristles: bool,
-    dice: &mut Dice,
+    rng: &mut CaseRng,
 ) -> Secret {
     let count = speed.len();
-    let choice = dice.uniform(0.0, 1.0);
-    let except = dice.index(count);
+    let choice = rng.uniform(0.0, 1.0);
+    let except = rng.index(count);
     let joints: Vec<usize> = match choice {
         _ if spec.friction_declared || count < 4 => (0..count).collect(),
         c if c < 0.7 => (0..count).collect(),
         c if c < 0.85 => (0..count.div_ceil(2)).collect(),
         _ => (0..count).filter(|joint| *joint != except).collect(),
     };
-    let family = Family::draw(kind, full, &joints, speed, bristles, dice);
+    let family = Family::draw(kind, full, &joints, speed, bristles, rng);
     Secret { name: Name::Catalogue(kind), joints, form: Form::Family(family), scale: 1.0 }
 }
 
@@ -181,16 +182,16 @@ fn one_more(
     survey: &Survey,
     times: &[Vec<f64>],
     others: &[Secret],
-    dice: &mut Dice,
+    rng: &mut CaseRng,
 ) -> Option<Secret> {
     let tree = &case.robot.tree;
     let joint = match (name, survey.reach) {
         (Name::Catalogue(Kind::EndStop), Some(reach)) => reach.joint,
-        _ => dice.index(tree.joint_count()),
+        _ => rng.index(tree.joint_count()),
     };
     let (mut joints, form, scale) = match name {
-        Name::Catalogue(kind) => catalogue(kind, joint, survey, dice)?,
-        Name::Outside(stranger) => outside(stranger, joint, survey, dice)?,
+        Name::Catalogue(kind) => catalogue(kind, joint, survey, rng)?,
+        Name::Outside(stranger) => outside(stranger, joint, survey, rng)?,
     };
     joints.sort_unstable();
     let nested = |other: &Secret| match (name, other.name) {
@@ -203,7 +204,7 @@ fn one_more(
         return None;
     }
     let mut secret = Secret { name, joints, form, scale };
-    let size = secret.calibrate(dice.log_uniform(SIZES[0], SIZES[1]), tree, full, &case.motions, times);
+    let size = secret.calibrate(rng.log_uniform(SIZES[0], SIZES[1]), tree, full, &case.motions, times);
     ((0.98 * SIZES[0]..=1.02 * SIZES[1]).contains(&size)
         && felt_in_every_log(&secret, tree, full, &case.motions, times))
     .then_some(secret)
@@ -215,7 +216,7 @@ fn weighed(secrets: &[Secret], case: &Case, full: &Ordinary) -> Vec<Drawn> {
     let joints = tree.joint_count();
     let rate = if joints > 10 { 6.0 } else { 20.0 };
     let records = |secrets: &[&Secret]| -> Vec<Record> {
-        let one = |motion: &Motion| record(tree, full, secrets, motion, &even_times(motion, rate));
+        let one = |motion: &Trajectory| record(tree, full, secrets, motion, &even_times(motion, rate));
         case.motions[..2].iter().map(one).collect()
     };
     let without = records(&[]);

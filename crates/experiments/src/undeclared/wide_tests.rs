@@ -1,15 +1,15 @@
 //! What a case of the widened suites must be: each situation does to the log what its name says.
 
 use super::case::{Case, even_times};
-use super::dice::{Dice, Stream};
 use super::kind::{Kind, Name};
 use super::logging::{DriveFilter, Logging, Tails, VelocityColumn};
 use super::plant::{Record, States, record};
+use super::rng::{CaseRng, Stream};
 use super::robot::{Robot, robots};
 use super::secret::Secret;
 use super::situation::Situation;
 use super::suite::{Seeds, Spec, Suite};
-use super::trajectory::Motion;
+use super::trajectory::Trajectory;
 use super::truth::Truth;
 use super::wide::speed;
 
@@ -58,7 +58,7 @@ fn column(log: &str, name: &str) -> Vec<f64> {
 fn noise_has_the_correlation_time_that_it_says() {
     let times: Vec<f64> = (0..400_000).map(|k| 0.002 * f64::from(k)).collect();
     for correlation_time in [0.0_f64, 0.005, 0.05, 0.3, 1.0] {
-        let noise = logging().noise(&times, correlation_time, &mut Dice::new(1, 0, Stream::Sensors));
+        let noise = logging().noise(&times, correlation_time, &mut CaseRng::new(1, 0, Stream::Sensors));
         let power = mean(noise.iter().map(|value| value * value));
         assert!((power - 1.0).abs() < 0.15, "{correlation_time}: {power}");
         // About one correlation time apart.
@@ -77,7 +77,7 @@ fn noise_has_the_tails_that_it_says() {
         [(Tails::Normal, 2.9..3.1), (Tails::Student, 6.0..1e9), (Tails::Contaminated, 44.0..54.0)]
     {
         let logging = Logging { tails, ..logging() };
-        let noise = logging.noise(&times, 0.0, &mut Dice::new(2, 0, Stream::Sensors));
+        let noise = logging.noise(&times, 0.0, &mut CaseRng::new(2, 0, Stream::Sensors));
         let square = mean(noise.iter().map(|value| value * value));
         let found = mean(noise.iter().map(|value| value.powi(4))) / (square * square);
         assert!((square - 1.0).abs() < 0.1, "{tails:?}: {square}");
@@ -113,8 +113,8 @@ fn a_late_velocity_is_the_velocity_of_earlier() {
     let motion = &case.motions[0];
     let times = even_times(motion, 100.0);
     let record = record(&case.robot.tree, &case.ordinary, &[], motion, &times);
-    let mut dice = Dice::new(3, 0, Stream::Sensors);
-    let log = logging.log(&case.sensors, &case.robot.tree, motion, &record, &times, &mut dice);
+    let mut rng = CaseRng::new(3, 0, Stream::Sensors);
+    let log = logging.log(&case.sensors, &case.robot.tree, motion, &record, &times, &mut rng);
     let qd = column(&log, "qd.joint_1");
     for sample in 15..times.len() {
         assert!((qd[sample] + record.states.v(sample - 15, 0)).abs() < 1e-5);
@@ -210,7 +210,7 @@ fn joints_of_noise_are_mostly_noise_and_others_are_not() {
     }
 }
 
-fn rms_speed(motion: &Motion, joint: usize) -> f64 {
+fn rms_speed(motion: &Trajectory, joint: usize) -> f64 {
     let states = States::of_motion(motion, &even_times(motion, 50.0));
     mean((0..states.samples()).map(|sample| states.v(sample, joint).powi(2))).sqrt()
 }

@@ -5,12 +5,13 @@ use crate::Error;
 use crate::arguments::NextArguments;
 use crate::model_file::ModelFile;
 use crate::session::{Session, declared};
-use phiw_curriculum::{
-    BayesianLeastSquares, Candidates, CurriculumError, Estimate, Estimator, Evidence, LogNoise, Prior, Robot,
-    RobotModel, RowsAt, Triangle,
-};
+use phiw_curriculum::CurriculumError;
+use phiw_curriculum::selection::{MotionCandidates, Triangle};
 use phiw_dynamics::{InertialParameters, Tree};
 use phiw_effects::Catalogue;
+use phiw_estimation::{
+    BayesianLeastSquares, Estimate, Estimator, Evidence, LogNoise, ParameterPrior, Robot, RobotModel, RowsAt,
+};
 use phiw_identification::{
     Design, EffectCatalogue, EffectSpec, IdentificationError, Identified, Progress, check_size_of_robot, fit,
     identify, merge, with_masses,
@@ -41,13 +42,13 @@ pub struct Present {
     /// The columns of the model.
     pub design: Design,
     /// The URDF, and how far off it may be.
-    pub prior: Prior,
+    pub prior: ParameterPrior,
     /// w in the design's order, and how sure it is.
     pub estimate: Estimate,
     /// The present belief.
     pub model: RobotModel,
     /// What each motion would tell.
-    pub candidates: Candidates,
+    pub candidates: MotionCandidates,
     /// R of all that has been measured, in the columns of the candidates; none if no log is given.
     pub triangle: Option<Triangle>,
     /// cond(Φ) of all that had been measured after each log.
@@ -89,13 +90,13 @@ impl Present {
             Robot::with_base(tree.clone(), design.base().clone(), base_link, specs(&design), catalogue)?;
         let nothing = vec![0.0; design.parameter_count() - design.base().count()];
         let initial = RobotModel { standard: with_masses(tree), ..robot.truth(&nothing)? };
-        let prior = Prior { model: initial, share: arguments.urdf_error };
+        let prior = ParameterPrior { model: initial, share: arguments.urdf_error };
         let estimator = BayesianLeastSquares { noise, prior: prior.clone() };
         let present = prior.model.parameters(&robot)?;
         let estimate = estimator.estimate(&design, &evidence, &prior.model, &present)?;
         let model = prior.model.with_parameters(&robot, &specs(&design), &estimate.parameters)?;
         let weights = vec![1.0; tree.joint_count()];
-        let candidates = Candidates::foreseeable(&robot, &design, &motions.dataset, &weights)?;
+        let candidates = MotionCandidates::foreseeable(&robot, &design, &motions.dataset, &weights)?;
         let after_each = measured.iter().flat_map(|measured| &measured.after_each);
         let triangles: Vec<Triangle> = after_each
             .map(|logs| candidates.measured(logs))

@@ -1,7 +1,8 @@
 //! The motions to choose from: a folder of logs without torques, as `phiw retarget` writes them.
 
 use crate::Error;
-use phiw_curriculum::{CurriculumError, Motion, MotionDataset, StepTolerance};
+use phiw_curriculum::CurriculumError;
+use phiw_curriculum::motion::{Motion, MotionDataset, StepTolerance};
 use phiw_dynamics::{JointType, Tree};
 use phiw_effects::SignalRanges;
 use phiw_identification::{IdentificationError, Progress};

@@ -1,7 +1,7 @@
 //! The chosen motion as the robot gets it: positions, velocities, accelerations, and the torque that the
 //! estimate predicts.
 
-use phiw_curriculum::Motion;
+use phiw_curriculum::motion::Motion;
 use phiw_dynamics::Tree;
 use phiw_telemetry::{LogColumns, LogWriter};
 

@@ -2,11 +2,10 @@
 
 use crate::Error;
 use crate::arguments::NextArguments;
-use phiw_curriculum::{StanceError, StanceSettings};
+use phiw_curriculum::constraint::{StanceError, StanceSettings};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{InertialParameters, Tree};
-use phiw_zmp::Stance;
-use phiw_zmp::feet_from_toml;
+use phiw_zmp::{Stance, feet_from_toml};
 use std::path::Path;
 
 /// The link that no joint moves, and the floor under it.

@@ -4,7 +4,9 @@ use super::estimate::{Present, Source};
 use super::motions::Motions;
 use crate::arguments::NextArguments;
 use crate::warnings::file_name;
-use phiw_curriculum::{Excess, Motion, MotionLimits, MotionMargin, Plan, Unrest};
+use phiw_curriculum::constraint::MotionMargin;
+use phiw_curriculum::motion::{Excess, Motion, MotionLimits, Unrest};
+use phiw_curriculum::planner::Plan;
 use phiw_dynamics::urdf::Finding;
 use phiw_report::number::{percent, significant};
 use serde_json::{Value, json};
@@ -97,7 +99,7 @@ impl Telling<'_> {
             mm(balance.balance.multi_body.margin),
             mm(balance.margin_std),
             significant(balance.worst_s, 3),
-            mm(balance.untold_std),
+            mm(balance.unidentifiable_std),
             mm(balance.balance.point_mass.margin),
         )
     }
@@ -189,7 +191,7 @@ impl Telling<'_> {
                 "largest_alpha": balance.balance.multi_body.largest_reduction,
                 "margin_m": balance.balance.multi_body.margin,
                 "margin_std_m": balance.margin_std,
-                "untold_std_m": balance.untold_std,
+                "untold_std_m": balance.unidentifiable_std,
                 "zmp_m": balance.balance.multi_body.zmp,
                 "at_s": balance.worst_s,
                 "point_mass_margin_m": balance.balance.point_mass.margin,

@@ -4,7 +4,7 @@
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{AnalyticBackend, BackendError, SimulationBackend, Tree, Workspace, World};
 use phiw_plant::{
-    ComputedTorque, Effect, Gains, History, MultiSine, Plant, PlantRun, PlantSetup, RigidBodyModel,
+    ComputedTorque, Gains, History, MultiSine, Plant, PlantEffect, PlantRun, PlantSetup, RigidBodyModel,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -42,7 +42,7 @@ pub fn poor_controller(tree: &Tree, world: &World) -> ComputedTorque {
 }
 
 /// A setup with these effects and a poor controller.
-pub fn setup(tree: &Tree, world: &World, effects: Vec<Effect>) -> PlantSetup {
+pub fn setup(tree: &Tree, world: &World, effects: Vec<PlantEffect>) -> PlantSetup {
     PlantSetup { effects, ..PlantSetup::new(poor_controller(tree, world)) }
 }
 

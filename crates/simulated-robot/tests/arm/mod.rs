@@ -2,10 +2,16 @@
 
 #![allow(dead_code, reason = "each test file uses a part")]
 
-use phiw_curriculum::*;
+use phiw_curriculum::constraint::Unconstrained;
+use phiw_curriculum::end::EndCriterion;
+use phiw_curriculum::motion::{Motion, MotionDataset};
+use phiw_curriculum::selection::MotionCandidates;
+use phiw_curriculum::{Curriculum, Experiment};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{AnalyticBackend, Tree, World};
-use phiw_plant::{Effect, Friction, Gains, MultiSine, Reference, Sensors, Timing};
+use phiw_effects::Catalogue;
+use phiw_estimation::{Estimator, MotionLikelihood, Robot, RobotModel};
+use phiw_plant::{Friction, Gains, MultiSine, PlantEffect, Reference, Sensors, Timing};
 use phiw_simulated_robot::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -17,7 +23,7 @@ pub struct Arm {
     pub truth: RobotModel,
     pub viscous: Vec<f64>,
     pub dataset: MotionDataset,
-    pub candidates: Candidates,
+    pub candidates: MotionCandidates,
     pub noise: f64,
 }
 
@@ -29,8 +35,8 @@ pub fn tree() -> Tree {
 pub fn motions(tree: &Tree, count: usize) -> Vec<Motion> {
     let joints = tree.joint_count();
     let motion = |index: usize| {
-        let mut random = ChaCha8Rng::seed_from_u64(index as u64);
-        let sine = MultiSine::random(tree, 3.0, 0.4 + 0.2 * index as f64, [0.5, 0.4], &mut random);
+        let mut rng = ChaCha8Rng::seed_from_u64(index as u64);
+        let sine = MultiSine::random(tree, 3.0, 0.4 + 0.2 * index as f64, [0.5, 0.4], &mut rng);
         let mut signals = [0; 3].map(|_| vec![0.0; 301 * joints]);
         let [q, v, a] = &mut signals;
         for sample in 0..301 {
@@ -45,21 +51,21 @@ pub fn motions(tree: &Tree, count: usize) -> Vec<Motion> {
 impl Arm {
     pub fn new(noise: f64) -> Self {
         let tree = tree();
-        let robot = Robot::with_viscous_friction(tree.clone(), [0.0; 10]).unwrap();
+        let robot = Robot::with_viscous_friction(tree.clone(), [0.0; 10], Catalogue::default()).unwrap();
         let viscous: Vec<f64> = (0..tree.joint_count())
             .map(|joint| 0.02 * tree.joint(joint).limits.effort / tree.joint(joint).limits.velocity)
             .collect();
         let truth = robot.truth(&viscous).unwrap();
         let dataset = MotionDataset::new(tree.joint_count(), motions(&tree, 6)).unwrap();
         let weights = vec![1.0; tree.joint_count()];
-        let candidates = Candidates::new(&robot, robot.declared(), &dataset, &weights).unwrap();
+        let candidates = MotionCandidates::new(&robot, robot.declared(), &dataset, &weights).unwrap();
         Arm { tree, robot, truth, viscous, dataset, candidates, noise }
     }
 
     pub fn experiment(&self) -> SimulatedRobot {
         let gains =
             Gains::critically_damped(&self.tree, &[], &self.tree.neutral_configuration(), 12.0).unwrap();
-        let friction = |(joint, &coefficient): (usize, &f64)| Effect::Friction {
+        let friction = |(joint, &coefficient): (usize, &f64)| PlantEffect::Friction {
             joint,
             law: Friction::Viscous { coefficient },
         };

@@ -28,14 +28,14 @@ impl PelvisMotion {
     /// The motion that goes with a name: always the same.
     pub fn of_name(name: &str, duration_s: f64) -> Self {
         let digest = Sha256::digest(name.as_bytes());
-        let mut random = ChaCha8Rng::from_seed(digest.into());
-        let vigour = random.random_range(CALMEST..1.0);
+        let mut rng = ChaCha8Rng::from_seed(digest.into());
+        let vigour = rng.random_range(CALMEST..1.0);
         let axes = std::array::from_fn(|axis| {
             let mut terms: Vec<[f64; 3]> = (0..SINES)
                 .map(|number| {
-                    let share = (number as f64 + random.random_range(0.6..1.4)) / SINES as f64;
-                    let amplitude = random.random_range(0.4..1.0) / (number as f64 + 1.0);
-                    [amplitude, TAU * HIGHEST_HZ * share, random.random_range(0.0..TAU)]
+                    let share = (number as f64 + rng.random_range(0.6..1.4)) / SINES as f64;
+                    let amplitude = rng.random_range(0.4..1.0) / (number as f64 + 1.0);
+                    [amplitude, TAU * HIGHEST_HZ * share, rng.random_range(0.0..TAU)]
                 })
                 .collect();
             // No sum is larger than that of its amplitudes.

@@ -1,0 +1,197 @@
+//! All that estimators remember of what was measured.
+
+use super::foresight;
+use super::stored::StoredFactor;
+use crate::{EstimationError, MotionLog};
+use phiw_identification::{Design, Fold, IdentificationError, accumulate};
+use phiw_regressor::factor::Factor;
+use phiw_regressor::least_squares::{Group, GroupedFactor};
+use phiw_telemetry::Block;
+use serde::{Deserialize, Serialize};
+
+/// Which instants of a log become rows of Φ.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RowsAt {
+    /// The stamps: position, velocity and acceleration as they were measured there, as the paper has it.
+    Stamps,
+    /// The middle of each period: what the motion was on average while one command was held. Position by
+    /// Hermite's cubic, velocity Δq/T, acceleration Δq̇/T, so that inertia and viscous friction balance the
+    /// command exactly, however fast the motion changes within a period. Effects that are not linear in the
+    /// motion are taken as they were when the period began, so that its noise is not in them.
+    #[default]
+    Periods,
+}
+
+/// How logs are reduced.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct EvidenceSettings {
+    /// Which instants become rows.
+    pub rows_at: RowsAt,
+    /// Time between two instants at which the motion's sensitivity to noise is looked at \[s\]. Shorter costs
+    /// time in each estimate. Default: 0.4, in which the inertia of a robot moved by a person changes little.
+    pub instant_every_s: f64,
+}
+
+impl Default for EvidenceSettings {
+    fn default() -> Self {
+        EvidenceSettings { rows_at: RowsAt::default(), instant_every_s: 0.4 }
+    }
+}
+
+impl From<RowsAt> for EvidenceSettings {
+    fn from(rows_at: RowsAt) -> Self {
+        EvidenceSettings { rows_at, ..EvidenceSettings::default() }
+    }
+}
+
+/// One instant of a motion that stands for many.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Instant {
+    /// How many rows it stands for.
+    pub weight: f64,
+    /// Time over which one command was held \[s\].
+    pub period_s: f64,
+    /// `[q, q̇, q̈]`.
+    pub state: [Vec<f64>; 3],
+}
+
+/// What was measured, reduced to what estimators and selections need; it depends on the length of the logs by
+/// some instants only.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(into = "StoredEvidence", try_from = "StoredEvidence")]
+pub struct Evidence {
+    pub(super) settings: EvidenceSettings,
+    pub(super) factor: GroupedFactor,
+    pub(super) instants: Vec<Instant>,
+    /// Of which parameters the columns are those of the periods' beginnings; none of them if it is empty.
+    pub(super) foreseen: Vec<bool>,
+    /// Rows a second of each torque \[Hz\]; none where they are as dense as those of the motions.
+    pub(super) rate_hz: Option<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct StoredEvidence {
+    #[serde(flatten)]
+    settings: EvidenceSettings,
+    factor: StoredFactor,
+    instants: Vec<Instant>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    foreseen: Vec<bool>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    rate_hz: Option<f64>,
+}
+
+impl From<Evidence> for StoredEvidence {
+    fn from(evidence: Evidence) -> Self {
+        let Evidence { settings, factor, instants, foreseen, rate_hz } = evidence;
+        StoredEvidence { settings, factor: StoredFactor::from(&factor), instants, foreseen, rate_hz }
+    }
+}
+
+impl TryFrom<StoredEvidence> for Evidence {
+    type Error = IdentificationError;
+
+    fn try_from(stored: StoredEvidence) -> Result<Self, IdentificationError> {
+        let StoredEvidence { settings, factor, instants, foreseen, rate_hz } = stored;
+        Ok(Evidence { settings, factor: factor.try_into()?, instants, foreseen, rate_hz })
+    }
+}
+
+impl Evidence {
+    /// Nothing yet.
+    ///
+    /// # Errors
+    /// None that a design can cause.
+    pub fn none(design: &Design, settings: impl Into<EvidenceSettings>) -> Result<Self, EstimationError> {
+        let settings = settings.into();
+        let group = |row: &phiw_identification::RowLayout| Group {
+            parameters: row.parameters.clone(),
+            factor: Factor::empty(row.parameters.len() + 1),
+        };
+        let groups = design.rows().iter().map(group).collect();
+        let factor = GroupedFactor::new(design.parameter_count(), groups)?;
+        let mut foreseen = match settings.rows_at {
+            RowsAt::Stamps => Vec::new(),
+            RowsAt::Periods => foresight::foreseen(design),
+        };
+        if !foreseen.contains(&true) {
+            foreseen.clear();
+        }
+        Ok(Evidence { settings, factor, instants: Vec::new(), foreseen, rate_hz: None })
+    }
+
+    /// The same for a robot that moves without noise: all columns are those of a period's mean motion.
+    pub fn without_noise(self) -> Self {
+        Evidence { foreseen: Vec::new(), ..self }
+    }
+
+    /// Takes in a log.
+    ///
+    /// # Errors
+    /// It is not of this robot, or has no derivatives where [`RowsAt`] asks for them.
+    pub fn add(&mut self, design: &Design, measured: &MotionLog) -> Result<(), EstimationError> {
+        let block = match self.settings.rows_at {
+            RowsAt::Stamps => measured.at_stamps()?,
+            RowsAt::Periods => measured.over_periods(),
+        };
+        self.instants.extend(instants(&block, measured.period_s, self.settings.instant_every_s));
+        let factor = match self.foreseen.as_slice() {
+            [] => grouped_factor(design, block)?,
+            foreseen => foresight::factor(design, foreseen, measured)?,
+        };
+        self.factor = self.factor.merge(&factor)?;
+        Ok(())
+    }
+
+    /// R of \[Φ f\], one for each torque.
+    pub fn factor(&self) -> &GroupedFactor {
+        &self.factor
+    }
+
+    /// Rows a second of each torque \[Hz\]; none where they are as dense in time as those of the motions to
+    /// choose from.
+    pub fn rate_hz(&self) -> Option<f64> {
+        self.rate_hz
+    }
+
+    /// Instants that stand for the motion.
+    pub fn instants(&self) -> &[Instant] {
+        &self.instants
+    }
+
+    /// Whether a parameter's columns are those of the periods' beginnings, which their own noise has not
+    /// moved.
+    pub(super) fn is_foreseen(&self, parameter: usize) -> bool {
+        self.foreseen.get(parameter).copied().unwrap_or(false)
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.factor.rows() == 0
+    }
+}
+
+/// Evenly spaced samples, each in the middle of those that it stands for.
+fn instants(block: &Block, period_s: f64, every_s: f64) -> Vec<Instant> {
+    let stride = ((every_s / period_s).round() as usize).max(1);
+    let stretches = block.len().div_ceil(stride);
+    let stretch = |index: usize| {
+        let end = ((index + 1) * stride).min(block.len());
+        let row = block.row((index * stride).midpoint(end - 1));
+        let state = [&block.q, &block.qd, &block.qdd].map(|signal| signal[row.clone()].to_vec());
+        Instant { weight: (end - index * stride) as f64, period_s, state }
+    };
+    (0..stretches).map(stretch).collect()
+}
+
+/// The factors of a block's rows, one for each torque.
+///
+/// # Errors
+/// The block is not of this robot.
+pub fn grouped_factor(design: &Design, block: Block) -> Result<GroupedFactor, EstimationError> {
+    let everything = Fold { log: block.log, start: f64::NEG_INFINITY, end: f64::INFINITY };
+    let mut factors = accumulate(design, &[everything], &[&vec![block]])?;
+    Ok(factors.swap_remove(0))
+}

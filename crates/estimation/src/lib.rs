@@ -1,0 +1,33 @@
+#![doc = include_str!("../README.md")]
+#![warn(missing_docs)]
+
+mod bayesian;
+mod error;
+mod estimator;
+mod evidence;
+mod foresight;
+mod free_directions;
+mod least_squares;
+mod likelihood;
+mod motion_log;
+mod prior;
+mod response;
+mod robot;
+mod score;
+mod sensitivity;
+mod settings;
+mod stored;
+mod torques;
+
+pub use bayesian::{BayesianLeastSquares, LogNoise};
+pub use error::EstimationError;
+pub use estimator::{Estimate, Estimator};
+pub use evidence::{Evidence, EvidenceSettings, Instant, RowsAt, grouped_factor};
+pub use least_squares::{LeastSquares, WeightedLeastSquares};
+pub use likelihood::MotionLikelihood;
+pub use motion_log::MotionLog;
+pub use prior::ParameterPrior;
+pub use robot::{KnownEffect, Robot, RobotModel};
+pub use score::Gain;
+pub use settings::{NewtonSettings, ScoreSettings};
+pub use torques::torques_along;

@@ -1,0 +1,236 @@
+//! What the noise of one period does to the motion in it.
+//!
+//! Over a period T a torque δ that is held moves a robot with inertia A and damping F by Δq̇/T = A⁻¹·φ₁(X)·δ
+//! and Δq/T = F⁻¹·(1 − φ₁(X))·δ, X = T·A⁻¹F, φ₁(x) = (1 − e^−x)/x. These are in the columns, and the mean of
+//! a column's product with δ is what the log-determinant must have for its slope: log det A + Σ p(x) over the
+//! eigenvalues x of X, p′(x) = (1 − φ₁(x))/x. A forearm behind a large gear has an x of a half. Half a period
+//! of friction alone, log(1 + x/2), is then so far off that a thousand rows take the difference for friction.
+
+use super::sensitivity::{Sensitivity, element, packed, place};
+use faer::{Mat, Side};
+use phiw_dynamics::dense::Cholesky;
+
+/// Up to here p is summed as a series; beyond, e^−x is nothing beside 1.
+const LARGE: f64 = 8.0;
+const TERMS: i32 = 40;
+
+/// p: Σ (−1)ⁿ·xⁿ⁺¹/((n+1)·(n+2)!).
+fn damped(x: f64) -> f64 {
+    if x > LARGE {
+        return damped(LARGE) + (x / LARGE).ln() + 1.0 / x - 1.0 / LARGE;
+    }
+    let mut power = 0.5 * x;
+    let mut sum = power;
+    for n in 1..TERMS {
+        power *= -x / f64::from(n + 2);
+        sum += power / f64::from(n + 1);
+    }
+    sum
+}
+
+/// p′: Σ (−1)ⁿ·xⁿ/(n+2)!.
+fn damped_slope(x: f64) -> f64 {
+    if x.abs() < 1e-2 {
+        0.5 - x / 6.0 + x * x / 24.0 - x.powi(3) / 120.0
+    } else {
+        (1.0 + (-x).exp_m1() / x) / x
+    }
+}
+
+/// Derivatives of the log-determinant of an instant.
+pub(super) struct Response {
+    /// Its derivatives by A and by T·F, packed like their columns.
+    pub slopes: [Mat<f64>; 2],
+    /// Cholesky's factor of A + ½T·F, near enough for a curvature.
+    pub factor: Cholesky,
+}
+
+/// Inertia and damping of an instant as their eigenvectors see them: Cholesky's factor of A, x and the
+/// vectors in its frame.
+struct Modes {
+    factor: Cholesky,
+    values: Vec<f64>,
+    vectors: Mat<f64>,
+}
+
+impl Modes {
+    fn of(sensitivity: &Sensitivity, w: &Mat<f64>) -> Option<Self> {
+        let n = sensitivity.directions;
+        let (inertia, mut damping) = (&sensitivity.inertia * w, &sensitivity.damping * w);
+        let factor = factor(n, inertia.col_as_slice(0))?;
+        reduce(&factor, damping.col_as_slice_mut(0));
+        let reduced = damping.col_as_slice(0);
+        let entry = |row: usize, column: usize| element(reduced, row.max(column), row.min(column));
+        let eigen = Mat::from_fn(n, n, entry).self_adjoint_eigen(Side::Lower).ok()?;
+        let values = (0..n).map(|mode| eigen.S()[mode]).collect();
+        Some(Modes { factor, values, vectors: eigen.U().to_owned() })
+    }
+
+    fn log_determinant(&self) -> f64 {
+        self.factor.log_determinant() + self.values.iter().map(|&x| damped(x)).sum::<f64>()
+    }
+}
+
+/// The log-determinant alone; none where the inertia is not one.
+pub(super) fn log_determinant(sensitivity: &Sensitivity, w: &Mat<f64>) -> Option<f64> {
+    Modes::of(sensitivity, w).map(|modes| modes.log_determinant())
+}
+
+impl Response {
+    /// None where the inertia is not one.
+    pub fn of(sensitivity: &Sensitivity, w: &Mat<f64>) -> Option<Self> {
+        let n = sensitivity.directions;
+        let modes = Modes::of(sensitivity, w)?;
+        // Columns of L⁻ᵀU.
+        let mut vectors = modes.vectors.clone();
+        for mode in 0..n {
+            modes.factor.solve_upper(vectors.col_as_slice_mut(mode));
+        }
+        let sum = |share: &dyn Fn(f64) -> f64| {
+            let mut slope = Mat::zeros(packed(n), 1);
+            for (mode, &x) in modes.values.iter().enumerate() {
+                let (vector, share) = (vectors.col_as_slice(mode), share(x));
+                for row in 0..n {
+                    for column in 0..=row {
+                        let scale = if row == column { 1.0 } else { std::f64::consts::SQRT_2 };
+                        slope[(place(row, column), 0)] += scale * share * vector[row] * vector[column];
+                    }
+                }
+            }
+            slope
+        };
+        let both = &sensitivity.inertia * w + &sensitivity.damping * w * faer::Scale(0.5);
+        Some(Response {
+            slopes: [sum(&|x| 1.0 - x * damped_slope(x)), sum(&damped_slope)],
+            factor: factor(n, both.col_as_slice(0))?,
+        })
+    }
+
+    /// Derivatives of the log-determinant by the parameters from `first` on.
+    pub fn gradient(&self, sensitivity: &Sensitivity, first: usize) -> Mat<f64> {
+        let [by_inertia, by_damping] = &self.slopes;
+        sensitivity.inertia.get(.., first..).transpose() * by_inertia
+            + sensitivity.damping.get(.., first..).transpose() * by_damping
+    }
+
+    /// L⁻¹ S L⁻ᵀ of each parameter's A + ½T·F, packed: their products are those of a curvature.
+    pub fn reduced(&self, sensitivity: &Sensitivity) -> Mat<f64> {
+        let mut columns = &sensitivity.inertia + &sensitivity.damping * faer::Scale(0.5);
+        for parameter in 0..columns.ncols() {
+            reduce(&self.factor, columns.col_as_slice_mut(parameter));
+        }
+        columns
+    }
+}
+
+/// Cholesky's factor of a packed column; none if it is not positive definite.
+fn factor(n: usize, column: &[f64]) -> Option<Cholesky> {
+    Cholesky::of(n, |row, col| element(column, row, col))
+}
+
+/// S → L⁻¹ S L⁻ᵀ, packed, in place.
+fn reduce(factor: &Cholesky, column: &mut [f64]) {
+    let n = factor.size();
+    if column.iter().all(|value| *value == 0.0) {
+        return;
+    }
+    let mut full = vec![0.0; n * n];
+    for row in 0..n {
+        for col in 0..=row {
+            let value = element(column, row, col);
+            full[row * n + col] = value;
+            full[col * n + row] = value;
+        }
+    }
+    // Rows are columns of a symmetric matrix: solve each, transpose, solve each again.
+    for _ in 0..2 {
+        full.chunks_exact_mut(n).for_each(|row| factor.solve_lower(row));
+        for row in 0..n {
+            for col in 0..row {
+                full.swap(row * n + col, col * n + row);
+            }
+        }
+    }
+    for row in 0..n {
+        for col in 0..=row {
+            let scale = if row == col { 1.0 } else { std::f64::consts::SQRT_2 };
+            column[place(row, col)] = scale * full[row * n + col];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Columns A_k and T·F_k of random symmetric matrices, the first of both near the identity.
+    fn sensitivity(rng: &mut ChaCha8Rng, n: usize, parameters: usize) -> Sensitivity {
+        let mut columns = |size: f64| {
+            Mat::from_fn(packed(n), parameters, |row, parameter| {
+                let diagonal = (0..n).any(|k| place(k, k) == row);
+                let own = if parameter == 0 && diagonal { 1.0 } else { 0.0 };
+                own + size * rng.random_range(-1.0..1.0)
+            })
+        };
+        Sensitivity { weight: 1.0, directions: n, inertia: columns(0.05), damping: columns(0.05) }
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_log_determinant() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for n in [1, 2, 5] {
+            let sensitivity = sensitivity(&mut rng, n, 4);
+            let w = Mat::from_fn(4, 1, |k, _| [1.0, 0.4, -0.3, 0.2][k]);
+            let response = Response::of(&sensitivity, &w).unwrap();
+            let gradient = response.gradient(&sensitivity, 0);
+            for parameter in 0..4 {
+                let at = |step: f64| {
+                    let mut moved = w.clone();
+                    moved[(parameter, 0)] += step;
+                    log_determinant(&sensitivity, &moved).unwrap()
+                };
+                let slope = (at(1e-5) - at(-1e-5)) / 2e-5;
+                assert!(
+                    (slope - gradient[(parameter, 0)]).abs() < 1e-7,
+                    "{slope} {}",
+                    gradient[(parameter, 0)]
+                );
+            }
+        }
+    }
+
+    /// One joint with noise and nothing else, its motion solved in closed form: at the truth the slopes are
+    /// the means of the columns' products with the noise.
+    #[test]
+    fn slopes_are_the_means_of_what_the_noise_does_to_the_columns() {
+        for (inertia, damping, period_s) in [(0.002, 0.125, 0.01), (3.0, 0.01, 0.01), (0.01, 20.0, 0.01)] {
+            let column = |value: f64| Mat::from_fn(1, 1, |_, _| value);
+            let sensitivity = Sensitivity {
+                weight: 1.0,
+                directions: 1,
+                inertia: column(1.0),
+                damping: column(period_s * damping / inertia),
+            };
+            // A = 1·w with w = inertia, and T·F in proportion.
+            let response = Response::of(&sensitivity, &column(inertia)).unwrap();
+            let x: f64 = period_s * damping / inertia;
+            let change = -(-x).exp_m1() / damping;
+            let way = (period_s - inertia * change) / damping;
+            for (slope, mean) in
+                [(&response.slopes[0], change / period_s), (&response.slopes[1], way / period_s / period_s)]
+            {
+                assert!((slope[(0, 0)] / mean - 1.0).abs() < 1e-6, "{}, not {mean}", slope[(0, 0)]);
+            }
+        }
+    }
+
+    #[test]
+    fn the_series_goes_on_smoothly_beyond_its_end() {
+        for x in [-3.0, -0.02, -0.005, 0.0, 0.005, 0.02, 0.6, 3.0, 7.9, 8.1, 50.0] {
+            let slope = (damped(x + 1e-4) - damped(x - 1e-4)) / 2e-4;
+            assert!((slope - damped_slope(x)).abs() < 1e-5, "{x}: {slope}, not {}", damped_slope(x));
+        }
+    }
+}

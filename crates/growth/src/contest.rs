@@ -1,0 +1,86 @@
+//! Which of the effects that save −log L is believed: the decisions of [`crate::ScoreTest`], from numbers
+//! alone.
+
+/// When a score test believes an effect.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScoreTestSettings {
+    /// −log L that an effect must save beyond the price of its parameters. Higher misses small effects, lower
+    /// names effects that are not there. Default: 5, so that an effect of one parameter is four standard
+    /// deviations from nothing. Seventy such effects are asked for after each log of an 18-joint robot: with
+    /// all of them together, one right model in two hundred gets a false name if their gains are χ²
+    /// (arithmetic, not a count).
+    pub least_merit: f64,
+    /// Effects of at least this share of the best one's merit are fitted in full beside it. Lower costs fits;
+    /// higher misses an effect whose gain the score predicts too small. Default: 0.6, not calibrated.
+    pub near: f64,
+    /// Effects at most that are fitted in full at a time. Default: 5, a limit on the time.
+    pub most_near: usize,
+    /// Effects whose merits differ by no more explain the logs alike \[−log L\]; then the simplest is
+    /// believed. Default: 3, odds of 20 to 1.
+    pub alike: f64,
+    /// A rival counts if it has at least this probability beside the effect that is believed. Default: 0.1.
+    pub least_rival: f64,
+    /// How often the constants of an effect are refined. Default: 2; not calibrated.
+    pub refinements: usize,
+    /// Effects at most. Default: 3, a limit on the time.
+    pub most_effects: usize,
+    /// Measured time below which nothing is looked for \[s\]. Default: 12.
+    pub least_s: f64,
+}
+
+impl Default for ScoreTestSettings {
+    fn default() -> Self {
+        ScoreTestSettings {
+            least_merit: 5.0,
+            near: 0.6,
+            most_near: 5,
+            alike: 3.0,
+            least_rival: 0.1,
+            refinements: 2,
+            most_effects: 3,
+            least_s: 12.0,
+        }
+    }
+}
+
+/// An effect that has been fitted in full.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contender {
+    /// −log L that it saves, less the price of its parameters.
+    pub merit: f64,
+    /// Number of its parameters and constants: what makes it simple.
+    pub size: usize,
+}
+
+/// The outcome of a contest.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Winner {
+    /// The contender that is believed.
+    pub winner: usize,
+    /// Those that are nearly as likely, the likeliest first.
+    pub rivals: Vec<usize>,
+}
+
+impl ScoreTestSettings {
+    /// How many effects are fitted in full, of those with these predicted `merits`, the largest first. None
+    /// of them if the best is not worth its price.
+    pub fn shortlist(&self, merits: &[f64]) -> usize {
+        let Some(best) = merits.first().filter(|best| **best >= self.least_merit) else { return 0 };
+        merits.iter().take_while(|merit| **merit >= self.near * best).count().min(self.most_near)
+    }
+
+    /// Which contender is believed: the simplest of those that explain the logs as well as the best. None if
+    /// no contender is worth its price.
+    pub fn contest(&self, contenders: &[Contender]) -> Option<Winner> {
+        let merit = |index: usize| contenders[index].merit;
+        let mut worth: Vec<usize> =
+            (0..contenders.len()).filter(|&index| merit(index) >= self.least_merit).collect();
+        worth.sort_by(|&a, &b| merit(b).total_cmp(&merit(a)));
+        let most = merit(*worth.first()?);
+        let alike = worth.iter().copied().filter(|&index| merit(index) >= most - self.alike);
+        let winner = alike.min_by_key(|&index| contenders[index].size)?;
+        let least = most + self.least_rival.ln();
+        worth.retain(|&index| merit(index) >= least && index != winner);
+        Some(Winner { winner, rivals: worth })
+    }
+}

@@ -1,0 +1,12 @@
+#![doc = include_str!("../README.md")]
+#![warn(missing_docs)]
+
+mod contest;
+mod score_test;
+mod trace_residual;
+mod whiteness;
+
+pub use contest::{Contender, ScoreTestSettings, Winner};
+pub use score_test::ScoreTest;
+pub use trace_residual::{SessionSettings, TraceResidual};
+pub use whiteness::WhitenessSettings;

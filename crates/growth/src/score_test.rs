@@ -1,0 +1,270 @@
+//! The loop closed by the estimator's own likelihood.
+
+use crate::contest::{Contender, ScoreTestSettings, Winner};
+use phiw_curriculum::CurriculumError;
+use phiw_curriculum::growth::{Found, Growth};
+use phiw_effects::{Catalogue, Constants, EffectKind, JointRange, SignalRanges};
+use phiw_estimation::{Estimator, Evidence, Gain, MotionLikelihood, MotionLog, Robot, RobotModel, RowsAt};
+use phiw_identification::EffectSpec;
+use std::sync::Arc;
+
+/// Asks of every effect of the catalogue what it would save of −log L ([`MotionLikelihood::gains`]), fits the
+/// few best in full, adds the simplest of those that explain alike if it is worth its price, and asks again.
+///
+/// The likelihood knows that noise moves the robot, and needs no residual with a colour: what many rows say
+/// together is enough, however far below the noise of one row an effect is. Effects whose columns look ahead
+/// in time or need derivatives of the model's torque (delay, elasticity, an encoder's offset) are no
+/// candidates: what is known when a period begins is not enough to identify them. [`crate::TraceResidual`]
+/// asks for them.
+#[derive(Clone)]
+pub struct ScoreTest {
+    /// The estimator that the curriculum runs with.
+    pub estimator: MotionLikelihood,
+    /// The effects that are asked for; the robot's own catalogue has to know them. Default: all that phiw
+    /// knows.
+    pub catalogue: Arc<Catalogue>,
+    /// When an effect is believed.
+    pub settings: ScoreTestSettings,
+}
+
+impl ScoreTest {
+    /// For a curriculum with this estimator.
+    pub fn new(estimator: MotionLikelihood) -> Self {
+        ScoreTest { estimator, catalogue: Arc::default(), settings: ScoreTestSettings::default() }
+    }
+
+    /// Every effect of the catalogue on every joint that a fit leaves something of, each with the constants
+    /// that save most, the best first by gain less price. `model` has been fitted to the logs.
+    ///
+    /// # Errors
+    /// The logs are not of this robot.
+    pub fn rank(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        logs: &[MotionLog],
+    ) -> Result<Vec<Gain>, CurriculumError> {
+        let ranges = ranges(robot, logs);
+        let present = model.specs();
+        let candidates = candidates(robot, &self.catalogue, &ranges, &present);
+        let gains = self.estimator.gains(robot, model, logs, &candidates)?;
+        let mut best = Vec::new();
+        // Constants of one effect on one site follow each other.
+        let mut start = 0;
+        for alike in candidates.chunk_by(is_alike) {
+            let own = &gains[start..start + alike.len()];
+            start += alike.len();
+            let known = || own.iter().flatten();
+            let Some(first) = known().max_by(|a, b| a.merit.total_cmp(&b.merit)) else { continue };
+            let sum: f64 = known().map(|gain| (gain.merit - first.merit).exp()).sum();
+            best.push(Gain { merit: first.merit + (sum / alike.len() as f64).ln(), ..first.clone() });
+        }
+        best.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+        Ok(best)
+    }
+
+    /// The model fitted to all logs with these effects in the place of its own.
+    ///
+    /// # Errors
+    /// The logs are not of this robot.
+    pub fn fitted(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        effects: &[EffectSpec],
+        logs: &[MotionLog],
+    ) -> Result<RobotModel, CurriculumError> {
+        Ok(self.fit(robot, model, effects, logs)?.0)
+    }
+
+    /// [`Self::fitted`], and −log L of it.
+    fn fit(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        effects: &[EffectSpec],
+        logs: &[MotionLog],
+    ) -> Result<(RobotModel, f64), CurriculumError> {
+        let specs = [robot.declared(), effects].concat();
+        let model = model.with_effects(robot, &specs)?;
+        let design = robot.design_of(&model)?;
+        let mut evidence = Evidence::none(&design, RowsAt::Periods)?;
+        for log in logs {
+            evidence.add(&design, log)?;
+        }
+        let present = model.parameters(robot)?;
+        let estimate = self.estimator.estimate(&design, &evidence, &model, &present)?;
+        let negative_log_likelihood =
+            self.estimator.negative_log_likelihood(&design, &evidence, &estimate.parameters)?;
+        let negative_log_likelihood = negative_log_likelihood
+            .filter(|negative_log_likelihood| negative_log_likelihood.is_finite())
+            .unwrap_or(f64::INFINITY);
+        Ok((model.with_parameters(robot, &specs, &estimate.parameters)?, negative_log_likelihood))
+    }
+
+    /// The effects of `near` once everything has been fitted again beside `known`, each with its constants
+    /// refined, and what it is then worth. The score predicts the gain of a large effect only roughly, and
+    /// may predict as much for an effect that explains half of it.
+    fn contenders(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        known: &[EffectSpec],
+        near: &[Gain],
+        logs: &[MotionLog],
+    ) -> Result<(Vec<EffectSpec>, Vec<Contender>), CurriculumError> {
+        let (_, without) = self.fit(robot, model, known, logs)?;
+        let (mut effects, mut contenders) = (Vec::new(), Vec::new());
+        for gain in near {
+            let effect = self.refined(robot, model, logs, gain.clone())?.effect;
+            let (_, with) = self.fit(robot, model, &[known, std::slice::from_ref(&effect)].concat(), logs)?;
+            let price = gain.gain - gain.merit;
+            contenders.push(Contender { merit: without - with - price, size: size(robot, &effect) });
+            effects.push(effect);
+        }
+        Ok((effects, contenders))
+    }
+
+    /// The same effect with constants between those that were tried.
+    fn refined(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        logs: &[MotionLog],
+        mut best: Gain,
+    ) -> Result<Gain, CurriculumError> {
+        let kind = self.catalogue.kind(&best.effect.kind)?;
+        for step in 0..self.settings.refinements {
+            let near: Vec<EffectSpec> = kind
+                .refine(&best.effect.constants, step)
+                .into_iter()
+                .map(|constants| EffectSpec { constants, ..best.effect.clone() })
+                .collect();
+            if near.is_empty() {
+                break;
+            }
+            let gains = self.estimator.gains(robot, model, logs, &near)?;
+            best = gains
+                .into_iter()
+                .flatten()
+                .fold(best, |best, gain| if gain.gain > best.gain { gain } else { best });
+        }
+        Ok(best)
+    }
+}
+
+impl Growth for ScoreTest {
+    fn name(&self) -> &'static str {
+        "score_test"
+    }
+
+    fn look(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        logs: &[MotionLog],
+        _doubted: bool,
+        refuted: &[EffectSpec],
+    ) -> Result<Found, CurriculumError> {
+        let mut found = Found::default();
+        if logs.iter().map(MotionLog::duration_s).sum::<f64>() < self.settings.least_s {
+            return Ok(found);
+        }
+        // From the declared model on: what was found before may have been the wrong half of the truth.
+        let mut model = match model.effects.len() == robot.declared().len() {
+            true => model.clone(),
+            false => self.fitted(robot, model, &[], logs)?,
+        };
+        while found.effects.len() < self.settings.most_effects {
+            let mut ranked = self.rank(robot, &model, logs)?;
+            ranked.retain(|gain| !refuted.iter().any(|effect| is_alike(effect, &gain.effect)));
+            let merits: Vec<f64> = ranked.iter().map(|gain| gain.merit).collect();
+            let near = &ranked[..self.settings.shortlist(&merits)];
+            if near.is_empty() {
+                break;
+            }
+            let (effects, contenders) = self.contenders(robot, &model, &found.effects, near, logs)?;
+            let Some(Winner { winner, rivals }) = self.settings.contest(&contenders) else { break };
+            let pairs = rivals.iter().map(|&rival| [effects[winner].clone(), effects[rival].clone()]);
+            found.rivals.extend(pairs);
+            found.effects.push(effects[winner].clone());
+            if found.effects.len() < self.settings.most_effects {
+                model = self.fitted(robot, &model, &found.effects, logs)?;
+            }
+        }
+        Ok(found)
+    }
+
+    fn least_gain(&self) -> f64 {
+        self.settings.least_merit
+    }
+}
+
+/// Parameters and constants of an effect.
+fn size(robot: &Robot, effect: &EffectSpec) -> usize {
+    let built = robot.catalogue().build(effect, robot.tree());
+    built.map_or(usize::MAX, |built| built.parameters().len() + effect.constants.len())
+}
+
+/// Kind and joints are the same.
+fn is_alike(one: &EffectSpec, other: &EffectSpec) -> bool {
+    one.kind == other.kind && one.joints == other.joints
+}
+
+/// Every effect that may be beside `present`, with all constants to try. Every log of a curriculum has a
+/// clock of its own: of what changes with the time since a motor was switched on, nothing is known.
+fn candidates(
+    robot: &Robot,
+    catalogue: &Catalogue,
+    ranges: &SignalRanges,
+    present: &[EffectSpec],
+) -> Vec<EffectSpec> {
+    let tree = robot.tree();
+    let mut specs = Vec::new();
+    let can_be_identified = |kind: &&dyn EffectKind| !kind.needs_held_model() && !kind.needs_session_time();
+    for kind in catalogue.kinds().filter(can_be_identified) {
+        for site in kind.sites(tree) {
+            let joints: Vec<String> = site.iter().map(|&joint| tree.joint(joint).joint.clone()).collect();
+            let spec = |constants: Constants| EffectSpec {
+                kind: kind.name().to_owned(),
+                joints: joints.clone(),
+                constants,
+            };
+            let needs = kind.build(tree, &site, &Constants::new()).needs();
+            let is_present = present.iter().any(|other| is_alike(other, &spec(Constants::new())));
+            if !is_present && !needs.derivatives {
+                specs.extend(kind.scan(&site, ranges).into_iter().map(spec));
+            }
+        }
+    }
+    specs
+}
+
+/// What the logs cover. No period of a ripple is known from a residual that is mostly noise, so there is none
+/// to try.
+fn ranges(robot: &Robot, logs: &[MotionLog]) -> SignalRanges {
+    let joints = robot.tree().joint_count();
+    let joint = |joint: usize| {
+        let each = |pick: fn(&MotionLog) -> &Vec<f64>| {
+            logs.iter().flat_map(move |log| pick(log).iter().skip(joint).step_by(joints.max(1)).copied())
+        };
+        let rms = |pick: fn(&MotionLog) -> &Vec<f64>| {
+            let (sum, count) = each(pick).fold((0.0, 0_usize), |(sum, count), x| (sum + x * x, count + 1));
+            (sum / count.max(1) as f64).sqrt()
+        };
+        JointRange {
+            position: each(|log| &log.q)
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q))),
+            velocity_rms: rms(|log| &log.qd),
+            torque_rms: rms(|log| &log.tau),
+            torque_peak: each(|log| &log.tau).fold(0.0, |peak, torque| peak.max(torque.abs())),
+        }
+    };
+    SignalRanges {
+        joints: (0..joints).map(joint).collect(),
+        session: (0.0, logs.iter().map(MotionLog::duration_s).fold(0.0, f64::max)),
+        period: logs.first().map_or(0.0, |log| log.period_s),
+        ripple_frequencies: vec![Vec::new(); joints],
+        temperature: false,
+    }
+}
