@@ -264,13 +264,11 @@ impl Model {
         let of_effects = effects.iter().map(|effect| effect.as_ref());
         check_size_of_robot(tree, of_effects, 1, &Limits::default())?;
         let base = BaseParameters::of_tree(tree, Default::default())?;
-        if base.count() != self.base_parameters.len() {
-            let own: Vec<&str> =
-                self.base_parameters.iter().map(|parameter| parameter.name.as_str()).collect();
-            let names: Vec<String> =
-                base.independent().iter().map(|&column| parameter_name(tree, column)).collect();
-            let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            let difference = first_difference("base parameter", &own, &names).unwrap_or_default();
+        let own: Vec<&str> = self.base_parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+        let names: Vec<String> =
+            base.independent().iter().map(|&column| parameter_name(tree, column)).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        if let Some(difference) = first_difference("base parameter", &own, &names) {
             let message =
                 format!("the kinematics differ, {difference}: use the URDF that the model was made with");
             return Err(IdentificationError::Model(message));

@@ -4,6 +4,7 @@ use super::{Case, FILES, Reproduction};
 use crate::Error;
 use crate::arguments::SimulateArguments;
 use crate::model_use::ModelUse;
+use crate::page::counted;
 use crate::summary::write_table;
 use phiw_report::number::percent;
 use phiw_report::plot::{self, GrowthLine, Line};
@@ -135,9 +136,9 @@ pub fn warnings(reproduction: &Reproduction) -> Vec<String> {
 /// Errors at the horizons that are told.
 pub fn summary(used: &ModelUse, reproduction: &Reproduction, arguments: &SimulateArguments) -> String {
     let mut text = format!(
-        "{}: {} windows of {} s, errors as a share of each joint's travel (windows that are lost)\n\n",
+        "{}: {} of {} s, errors as a share of each joint's travel (windows that are lost)\n\n",
         used.tree.name(),
-        reproduction.windows,
+        counted(reproduction.windows, "window"),
         reproduction.window_s
     );
     let mut rows = vec![["", "0.5 s", "1 s", "2 s"].map(str::to_owned)];
