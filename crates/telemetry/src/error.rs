@@ -158,7 +158,7 @@ pub enum LogError {
     },
     /// A cut-off that the log's sample rate can't carry.
     #[error(
-        "{}: a cut-off of {cutoff_hz} Hz does not fit a sample rate of {rate_hz:.1} Hz; choose one from {lowest_hz:.1e} to {highest_hz:.1} Hz",
+        "{}: a cut-off of {cutoff_hz} Hz does not fit a sample rate of {rate_hz:.1} Hz; choose one above {lowest_hz:.3} and up to {highest_hz:.1} Hz",
         path.display()
     )]
     Cutoff {

@@ -118,7 +118,7 @@ fn check_cutoffs(survey: &phiw_telemetry::Survey, cutoffs: &[f64]) {
         let options = ConditioningOptions { cutoff_hz: Some(cutoff), ..Default::default() };
         let message = Conditioning::choose(std::slice::from_ref(survey), &options).unwrap_err().to_string();
         assert!(
-            message.contains("sample rate of 100.0 Hz") && message.contains("from 1.0e-3 to 35.0 Hz"),
+            message.contains("sample rate of 100.0 Hz") && message.contains("above 0.001 and up to 35.0 Hz"),
             "{message}"
         );
     }
