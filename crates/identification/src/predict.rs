@@ -27,9 +27,10 @@ pub struct Prediction<'a> {
     pub qdd: &'a [f64],
     /// Torques of the shares that were asked for ([`PredictionParts::shares`]) \[N·m, N\].
     pub shares: &'a [f64],
+    /// Standard deviation of each predicted torque by what the parameters are not known to \[N·m, N\]; zero
+    /// without [`PredictionParts::deviations`].
+    pub parameter_std: &'a [f64],
     moves: &'a [f64],
-    /// For each torque, the torques of the parameters' deviations.
-    deviations: &'a [f64],
 }
 
 /// The torque that effects of one kind deliver at one joint.
@@ -88,14 +89,6 @@ impl Prediction<'_> {
     /// Measured minus predicted torque \[N·m, N\].
     pub fn residual(&self, row: usize) -> f64 {
         self.measured[row] - self.predicted[row]
-    }
-
-    /// Standard deviation of the predicted torque `row` by what the parameters are not known to
-    /// \[N·m, N\]; zero without [`PredictionParts::deviations`].
-    pub fn parameter_std(&self, row: usize) -> f64 {
-        let each = self.deviations.len() / self.measured.len().max(1);
-        let own = self.deviations.get(row * each..(row + 1) * each).unwrap_or(&[]);
-        own.iter().map(|deviation| deviation * deviation).sum::<f64>().sqrt()
     }
 
     /// Whether the torque `row` counts in the fit: its joint moves (see [`Design::with_rest_speeds`]).
@@ -167,6 +160,22 @@ impl Sums<'_> {
         (3 + self.parts.deviations.len()) * torques + self.parts.shares.len()
     }
 
+    /// The same with one standard deviation for each torque.
+    fn width_of_output(self) -> usize {
+        4 * self.design.rows().len() + self.parts.shares.len()
+    }
+
+    /// A filtered row of sums as an output has it.
+    fn put_output(self, row: &[f64], out: &mut Vec<f64>) {
+        let (kept, deviations) = row.split_at(3 * self.design.rows().len() + self.parts.shares.len());
+        out.extend_from_slice(kept);
+        let each = self.parts.deviations.len();
+        out.extend((0..self.design.rows().len()).map(|torque| {
+            let own = &deviations[torque * each..(torque + 1) * each];
+            own.iter().map(|deviation| deviation * deviation).sum::<f64>().sqrt()
+        }));
+    }
+
     fn of(self, evaluation: &[f64], out: &mut [f64]) {
         let torques = self.design.rows().len();
         let (main, rest) = out.split_at_mut(3 * torques);
@@ -194,7 +203,8 @@ struct Outputs {
     log: usize,
     segment: usize,
     t: Vec<f64>,
-    /// For each output what [`Sums::of`] gives.
+    /// For each output what [`Sums::of`] gives, but one standard deviation for each torque in the place of all
+    /// of its deviations.
     values: Vec<f64>,
     /// For each output: positions, velocities, accelerations.
     signals: Vec<f64>,
@@ -208,28 +218,18 @@ impl Outputs {
     ) -> Result<(), E> {
         let (log, segment, torques) = (self.log, self.segment, sums.design.rows().len());
         let joints = self.signals.len() / (3 * self.t.len()).max(1);
-        let values = self.values.chunks_exact(sums.width().max(1));
+        let values = self.values.chunks_exact(sums.width_of_output().max(1));
         let both = values.zip(self.signals.chunks_exact((3 * joints).max(1)));
         for (&t, (values, signals)) in self.t.iter().zip(both) {
             let (measured, rest) = values.split_at(torques);
             let (predicted, rest) = rest.split_at(torques);
             let (moves, rest) = rest.split_at(torques);
-            let (shares, deviations) = rest.split_at(sums.parts.shares.len());
+            let (shares, parameter_std) = rest.split_at(sums.parts.shares.len());
             let (q, rest) = signals.split_at(joints);
             let (qd, qdd) = rest.split_at(joints);
-            sink(&Prediction {
-                log,
-                segment,
-                t,
-                measured,
-                predicted,
-                q,
-                qd,
-                qdd,
-                shares,
-                moves,
-                deviations,
-            })?;
+            let prediction =
+                Prediction { log, segment, t, measured, predicted, q, qd, qdd, shares, parameter_std, moves };
+            sink(&prediction)?;
         }
         Ok(())
     }
@@ -261,7 +261,7 @@ impl<'a> Predictor<'a> {
             log: block.log,
             segment: block.segment,
             t: Vec::with_capacity(block.outputs.len()),
-            values: Vec::with_capacity(sums.width() * block.outputs.len()),
+            values: Vec::with_capacity(sums.width_of_output() * block.outputs.len()),
             signals: Vec::with_capacity(3 * block.joints * block.outputs.len()),
         };
         block.try_filter(
@@ -274,7 +274,7 @@ impl<'a> Predictor<'a> {
             },
             |output, t, row| {
                 outputs.t.push(t);
-                outputs.values.extend_from_slice(row);
+                sums.put_output(row, &mut outputs.values);
                 let at = block.row(block.outputs[output]);
                 for signal in [&block.q, &block.qd, &block.qdd] {
                     outputs.signals.extend_from_slice(&signal[at.clone()]);
