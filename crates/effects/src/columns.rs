@@ -117,6 +117,12 @@ impl<F: Formula> OwnTorque<F> {
         self
     }
 
+    /// The same with parameters that are `highest` at most.
+    pub fn at_most(mut self, highest: f64) -> Self {
+        self.parameters.iter_mut().for_each(|parameter| parameter.bounds.1 = highest);
+        self
+    }
+
     /// The same with columns that are all linear in the motion ([`Effect::is_linear_in_motion`]).
     pub fn linear_in_motion(mut self) -> Self {
         self.linear_in_motion = true;

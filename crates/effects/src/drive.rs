@@ -69,6 +69,9 @@ impl EffectKind for TorqueOffset {
     }
 }
 
+/// A sensor that is further off measures in another unit.
+const LARGEST_GAIN_ERROR: f64 = 0.5;
+
 /// (1 + ε) on the measured torque: the column is all torque that the model knows of, friction included. Where
 /// the friction is fitted its own columns take up that part of the change; where it is held nothing else
 /// would.
@@ -98,9 +101,10 @@ impl EffectKind for TorqueGain {
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
             out[0] = sample.total_torque().get(joint).copied().unwrap_or_default();
         };
-        let parameters = [("gain_error", ParameterKind::Ratio, -1.0)];
+        let parameters = [("gain_error", ParameterKind::Ratio, -LARGEST_GAIN_ERROR)];
         let needs = Needs { total_torque: true, ..Needs::default() };
-        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns).needing(needs))
+        let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
+        Box::new(effect.needing(needs).at_most(LARGEST_GAIN_ERROR))
     }
 }
 

@@ -14,6 +14,8 @@ use phiw_telemetry::Block;
 pub struct TimeDelay;
 
 const DELAY: &str = "delay";
+/// A log whose torque is later than its motion by more is no log of a controlled robot \[s\].
+const MOST_DELAY_S: f64 = 0.1;
 
 impl EffectKind for TimeDelay {
     fn name(&self) -> &str {
@@ -59,7 +61,7 @@ impl Effect for Delay {
     }
     fn parameters(&self) -> Vec<EffectParameter> {
         let joint = self.spec.joints.first().cloned().unwrap_or_default();
-        let bounds = (f64::NEG_INFINITY, f64::INFINITY);
+        let bounds = (-MOST_DELAY_S - self.delay, MOST_DELAY_S - self.delay);
         vec![EffectParameter { joint, name: DELAY.to_owned(), unit: "s".to_owned(), bounds }]
     }
     fn entries(&self) -> Vec<Entry> {
@@ -174,7 +176,10 @@ impl Effect for Offset {
     }
     fn parameters(&self) -> Vec<EffectParameter> {
         let joint = self.spec.joints.first().cloned().unwrap_or_default();
-        let bounds = (f64::NEG_INFINITY, f64::INFINITY);
+        // A joint that turns is off by half a turn at most; where the torque hardly depends on its angle, a
+        // fit would say anything.
+        let most = if self.unit == "rad" { std::f64::consts::PI } else { f64::INFINITY };
+        let bounds = (-most, most);
         vec![EffectParameter { joint, name: OFFSET.to_owned(), unit: self.unit.to_owned(), bounds }]
     }
     fn entries(&self) -> Vec<Entry> {
@@ -212,10 +217,16 @@ impl Evaluator for OffsetColumns<'_> {
 }
 
 /// The logged torque is the commanded one; what is delivered clips at `limit`. The column is the part beyond
-/// it, whose parameter is one where the drive clips in truth.
+/// it, where the motion asks for the limit too: noise of the measured torque must not explain itself. The
+/// parameter is one where the drive clips in truth.
 pub struct ActuatorSaturation;
 
 const LIMIT: &str = "limit";
+/// Share of the limit that the model's torque reaches where the drive clips; the model was fitted with the
+/// clipping, and is not exact.
+const REACHED: f64 = 0.8;
+/// What the share of the part beyond the limit that is missing may be.
+const CLIPPED_SHARE: (f64, f64) = (0.5, 1.5);
 
 impl EffectKind for ActuatorSaturation {
     fn name(&self) -> &str {
@@ -256,10 +267,14 @@ impl EffectKind for ActuatorSaturation {
         let (joint, limit) = (site[0], constant(constants, LIMIT, f64::INFINITY));
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
             let torque = sample.tau().get(joint).copied().unwrap_or_default();
-            out[0] = torque.signum() * (torque.abs() - limit).max(0.0);
+            let of_motion = sample.total_torque().get(joint).copied().unwrap_or_default();
+            let reached = of_motion * torque.signum() >= REACHED * limit;
+            out[0] = if reached { torque.signum() * (torque.abs() - limit).max(0.0) } else { 0.0 };
         };
-        let parameters = [("clipped_share", ParameterKind::Ratio, 0.3)];
-        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+        let parameters = [("clipped_share", ParameterKind::Ratio, CLIPPED_SHARE.0)];
+        let needs = Needs { total_torque: true, ..Needs::default() };
+        let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
+        Box::new(effect.needing(needs).at_most(CLIPPED_SHARE.1))
     }
 }
 

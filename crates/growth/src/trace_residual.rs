@@ -77,7 +77,7 @@ impl Default for TraceResidual {
             catalogue: Arc::default(),
             options: TraceOptions {
                 most_effects: 3,
-                least_significance: 5.0,
+                false_name_probability: 0.01,
                 least_share: 0.01,
                 ..TraceOptions::default()
             },

@@ -176,7 +176,7 @@ fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
         rmse: by_joint(&joints, &error.rmse),
         relative: Some(error.relative),
     };
-    let first = tracing.specs.len() - tracing.effects.len();
+    let first = tracing.specs.len() - tracing.effects.len() - tracing.refinements.len();
     let effect = |(index, found): (usize, &trace::FoundEffect)| {
         let effect = &analysis.model.effects[first + index];
         let info = analysis.identified.design.effects()[first + index].parameters();
@@ -233,7 +233,8 @@ fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
         phiw: program,
         verdict: Some(verdict(tracing.verdict)),
         before: TorqueErrors { train: error(&tracing.before.0), validate: error(&tracing.before.1) },
-        effects: tracing.effects.iter().enumerate().map(effect).collect(),
+        effects: families(tracing.effects.iter().enumerate().map(effect)),
+        refinements: families((tracing.effects.len()..).zip(&tracing.refinements).map(effect)),
         after: TorqueErrors { train: error(&tracing.model.train), validate: error(&tracing.model.held_out) },
         remaining: RemainingJson {
             structured: !tracing.remaining.joints.is_empty(),
@@ -242,6 +243,28 @@ fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
         },
         ..base
     }
+}
+
+/// A kind on each of several joints, one after another, is one effect.
+fn families(effects: impl Iterator<Item = EffectJson>) -> Vec<EffectJson> {
+    let mut families: Vec<EffectJson> = Vec::new();
+    for effect in effects {
+        let single = effect.joints.len() == 1;
+        match families.last_mut() {
+            Some(family)
+                if single && family.kind == effect.kind && family.parameters.len() == family.joints.len() =>
+            {
+                family.joints.extend(effect.joints);
+                family.parameters.extend(effect.parameters);
+                family.validate_relative = effect.validate_relative;
+                family.explains = 1.0 - (1.0 - family.explains) * (1.0 - effect.explains);
+                family.confidence = family.confidence.min(effect.confidence);
+                family.rivals.extend(effect.rivals);
+            }
+            _ => families.push(effect),
+        }
+    }
+    families
 }
 
 /// The answer in sentences.

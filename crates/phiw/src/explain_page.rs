@@ -68,12 +68,42 @@ pub fn headline(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<String> {
             percent(before)
         )),
         trace::Verdict::Explained | trace::Verdict::PartlyExplained => {
-            lines.extend((0..tracing.effects.len()).map(|index| sentence_of(analysis, tracing, index)));
+            lines.extend(sentences(analysis, tracing));
+            if !tracing.refinements.is_empty() {
+                lines.push(format!(
+                    "{} refinements polish the form of these; they are in the model and in the error.",
+                    tracing.refinements.len()
+                ));
+            }
             lines.push(format!("Held-out error {} % → {} %.", percent(before), percent(after)));
         }
     }
     if !tracing.remaining.joints.is_empty() {
         lines.push(describe(tracing));
+    }
+    lines
+}
+
+/// A sentence for each effect; for a kind on each of several joints, one.
+fn sentences(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<String> {
+    let family = |a: &FoundEffect, b: &FoundEffect| {
+        a.spec.kind == b.spec.kind && a.spec.joints.len() == 1 && b.spec.joints.len() == 1
+    };
+    let mut lines = Vec::new();
+    let mut first = 0;
+    for members in tracing.effects.chunk_by(family) {
+        let indices = first..first + members.len();
+        first = indices.end;
+        if members.len() == 1 {
+            lines.extend(indices.map(|index| sentence_of(analysis, tracing, index)));
+            continue;
+        }
+        let joints: Vec<&str> = members.iter().map(|member| member.spec.joints[0].as_str()).collect();
+        let kind = members[0].spec.kind.replace('_', " ");
+        lines.push(match joints.len() == analysis.joints().len() {
+            true => format!("All {} joints have {kind}.", joints.len()),
+            false => format!("{} have {kind}, each of its own.", joints.join(", ")),
+        });
     }
     lines
 }
@@ -119,7 +149,7 @@ fn signal_in_words(signal: &str) -> String {
 
 /// Place of a found effect among those of the model.
 fn place(tracing: &Tracing, index: usize) -> usize {
-    tracing.specs.len() - tracing.effects.len() + index
+    tracing.specs.len() - tracing.effects.len() - tracing.refinements.len() + index
 }
 
 fn sentence_of(analysis: &Analysis<'_>, tracing: &Tracing, index: usize) -> String {
@@ -221,7 +251,7 @@ fn remaining(analysis: &Analysis<'_>, tracing: &Tracing) -> Remaining {
 /// What the logs leave no trace of, kind by kind.
 pub fn cannot_be_told(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<CannotBeToldJson> {
     let mut kinds: Vec<CannotBeToldJson> = Vec::new();
-    for spec in &tracing.remaining.silent {
+    for spec in &tracing.remaining.unidentifiable {
         match kinds.iter_mut().find(|other| other.kind == spec.kind) {
             Some(kind) => kind.joints.push(spec.joints.clone()),
             None => kinds.push(CannotBeToldJson {

@@ -25,6 +25,7 @@ pub fn report_json(analysis: &Analysis<'_>) -> ReportJson {
         noise_floor: by_joint(&joints, &analysis.noise_floor),
         before: errors.clone(),
         effects: Vec::new(),
+        refinements: Vec::new(),
         after: errors,
         remaining: RemainingJson { structured: !above.is_empty(), joints: above, depends_on: Vec::new() },
         phiw: Some(program(analysis)),

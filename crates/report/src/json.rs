@@ -31,6 +31,9 @@ pub struct ReportJson {
     pub before: TorqueErrors,
     /// The effects in the order in which they were added.
     pub effects: Vec<EffectJson>,
+    /// Effects that are certain, but only polish the form of those before; `after` counts them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub refinements: Vec<EffectJson>,
     /// The errors once all effects are in.
     pub after: TorqueErrors,
     /// What is left.

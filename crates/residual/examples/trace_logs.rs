@@ -67,9 +67,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         rows_per_independent: plan.output_rate_hz() / (2.0 * logs.conditioning().parallel_cutoff_hz),
     };
     let tracing = trace(input, &TraceOptions::default())?;
-    for effect in &tracing.effects {
+    let found = [("named", &tracing.effects), ("refinement", &tracing.refinements)];
+    for (how, effect) in
+        found.iter().flat_map(|(how, effects)| effects.iter().map(move |effect| (how, effect)))
+    {
         println!(
-            "{} {:?} {:?}: {:.2} % -> {:.2} %, explains {:.2}, z {:.1}, confidence {:.3}",
+            "{how} {} {:?} {:?}: {:.2} % -> {:.2} %, explains {:.2}, z {:.1}, folds {:.2}, confidence {:.3}",
             effect.spec.kind,
             effect.spec.joints,
             effect.spec.constants,
@@ -77,6 +80,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             100.0 * effect.relative,
             effect.explains,
             effect.significance,
+            effect.stability,
             effect.confidence
         );
         for rival in &effect.rivals {
@@ -85,24 +89,6 @@ fn main() -> Result<(), Box<dyn Error>> {
                 rival.spec.kind, rival.spec.joints, rival.spec.constants, rival.confidence
             );
         }
-        for ranked in effect.ranking.iter().take(4) {
-            println!(
-                "    {:.3} % {} {:?} {:?}",
-                100.0 * ranked.held_out,
-                ranked.spec.kind,
-                ranked.spec.joints,
-                ranked.spec.constants
-            );
-        }
-    }
-    for ranked in tracing.remaining.ranking.iter().take(5) {
-        println!(
-            "  next {:.3} % {} {:?} {:?}",
-            100.0 * ranked.held_out,
-            ranked.spec.kind,
-            ranked.spec.joints,
-            ranked.spec.constants
-        );
     }
     println!(
         "{:?}: held out {:.2} -> {:.2} %",

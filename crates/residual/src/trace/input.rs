@@ -5,34 +5,44 @@ use phiw_effects::{Catalogue, SignalRanges};
 use phiw_identification::{Data, EffectSpec};
 use phiw_regressor::factor::Factor;
 
-/// When a candidate is believed.
+/// When an effect is believed: the policy of a trace.
+///
+/// `cargo xtask undeclared` is what each of these numbers is held against: how often a name is wrong on a
+/// right model, and what is missed.
 #[derive(Clone, Debug)]
 pub struct TraceOptions {
-    /// Effects at most.
+    /// Effects at most, refinements included: a bound for time and memory, far above what any robot has been
+    /// found to lack.
     pub most_effects: usize,
-    /// Standard deviations (cluster-robust over the folds) that an effect must be from nothing.
-    pub least_significance: f64,
-    /// Share of a torque's held-out residual variance that an effect on it must take away at least.
+    /// Probability of naming anything on a right model, for all candidates of a run together.
+    pub false_name_probability: f64,
+    /// Probability at which a refinement is in the model, if it were not there.
+    pub false_refinement_probability: f64,
+    /// Share of a torque's residual variance on motion held out that an effect on it must take away to have a
+    /// name.
     pub least_share: f64,
-    /// Share of the variance that the effects found before took from the same torque, at least.
+    /// The same for an effect whose torque follows the same signal of the same joint as a simpler one of the
+    /// model.
+    pub least_share_of_kin: f64,
+    /// Share of what the other effects took from the same torque that it must take: the form of an effect is
+    /// never quite the catalogue's, and what mends it is no effect of its own.
     pub least_of_others: f64,
-    /// RMS of an effect over the RMS of its torque, at least.
+    /// Share of the squares of what it is a form of that a form must take: how exactly a sign turns is no
+    /// effect of its own.
+    pub least_of_simpler: f64,
+    /// RMS of what an effect takes over the RMS of its torque, at least, to have a name.
     pub least_size: f64,
-    /// A residual over the noise floor by less than this is noise.
+    /// A residual below this share of its torque (RMS) is as good as none: nothing is sought in it.
+    pub negligible_share: f64,
+    /// A residual over the noise floor by less than this factor is noise.
     pub floor_margin: f64,
-    /// Autocorrelation over 0.25 to 0.5 s from which a residual is structure: that of the declared model, and
-    /// that of one to which effects were added. To say that an effect explains all asks for more than to say
-    /// that nothing is missing.
-    pub structured_correlation: [f64; 2],
+    /// A residual below this share of its torque (RMS) is no structure: filters and encoders leave as much of
+    /// a right model.
+    pub structured_share: f64,
     /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which it
-    /// is structure: the noise of a robot's sensors is of one colour, and raises all residuals over their
-    /// floors alike.
+    /// is structure whatever it follows: the noise of a robot's sensors is of one colour, and raises all
+    /// residuals over their floors alike.
     pub structured_ratio: f64,
-    /// RMS residual over the RMS of its torque from which it may be structure: filters and encoders leave as
-    /// much of a right model. The second one is for torques on which effects act that were found, and those
-    /// of the joints next to them, and for what follows the motion only: to say of a torque that it is
-    /// explained asks for more.
-    pub structured_share: [f64; 2],
     /// Torques whose residual is to be explained: what acts on none of them is no candidate. `None`: all.
     pub torques: Option<Vec<usize>>,
     /// Effects (kind and joints) that are no candidates, because they are known not to be there.
@@ -42,15 +52,18 @@ pub struct TraceOptions {
 impl Default for TraceOptions {
     fn default() -> Self {
         TraceOptions {
-            most_effects: 12,
-            least_significance: 12.0,
+            most_effects: 100,
+            false_name_probability: 0.01,
+            false_refinement_probability: 0.01,
             least_share: 0.2,
+            least_share_of_kin: 0.75,
             least_of_others: 0.025,
+            least_of_simpler: 0.0025,
             least_size: 0.01,
+            negligible_share: 0.005,
             floor_margin: 1.15,
-            structured_correlation: [0.3, 0.2],
+            structured_share: 0.03,
             structured_ratio: 8.0,
-            structured_share: [0.01, 0.002],
             torques: None,
             excluded: Vec::new(),
         }

@@ -1,29 +1,26 @@
-//! Tracing a residual to the physical effect that the model lacks.
+//! Tracing a residual to the physical effects that the model lacks.
 //!
-//! The loop: fit, ask whether there is structure, try every candidate of the catalogue by refitting
-//! everything with it, take the simplest that explains on motion held out, refine its constants, and begin
-//! again, until nothing that is left has a name.
+//! All candidates' columns stand beside the model's in one pass over the logs; which of them enter is decided
+//! on what is left of the rows (`selection`). Then the constants of what was chosen are refined, columns that
+//! are made of the model's torque are made again, and all is chosen anew, until nothing changes. In the end,
+//! motion held out says what has a name.
 
-mod candidate;
-mod choice;
-mod evidence;
+mod constants;
 mod floor;
+mod hypotheses;
 mod input;
+mod naming;
 mod probe;
-mod refine;
 mod residuals;
-mod revision;
-mod screening;
 mod search;
 mod signal_shapes;
-mod stability;
 mod stage;
 mod tracing;
 mod verdict;
 
-pub use choice::LEAST_RIVAL;
 pub use floor::noise_floor;
 pub use input::{HeldModel, TraceInput, TraceOptions};
+pub use naming::LEAST_RIVAL;
 pub use probe::Dependence;
 pub use residuals::{ResidualShape, residual_shape};
 pub use search::trace;

@@ -1,9 +1,7 @@
 //! What a residual follows, without a name: shapes over each signal, fitted on some folds, judged on the
 //! others.
 
-use super::candidate::{Candidate, Candidates};
-use super::evidence::paired_t;
-use super::signal_shapes::{Shape, neighbours, other_shapes, own_shapes};
+use super::signal_shapes::{SWINGS, Shape, neighbours, other_shapes, own_shapes};
 use super::stage::{Fixed, Stage};
 use phiw_effects::SignalRanges;
 use phiw_identification::{EffectSpec, IdentificationError};
@@ -30,6 +28,9 @@ pub struct Dependence {
 /// on other noise.
 const LEAST_SHARE: f64 = 0.05;
 const LEAST_SIGNIFICANCE: f64 = 2.2;
+/// The same share for swings over the time, whose frequencies are those at which the residual itself is
+/// largest.
+const LEAST_SHARE_OF_SWINGS: f64 = 0.25;
 /// Parts that take turns in being left out.
 const PARTS: usize = 5;
 /// A shape's height is drawn to nothing as if this share of all rows had said so: where few rows are, it does
@@ -45,12 +46,14 @@ pub(super) struct Fit<'a> {
     pub specs: &'a [EffectSpec],
     pub parameters: &'a [f64],
     pub ranges: &'a SignalRanges,
+    /// For each torque the angular frequencies \[rad/s\] at which its residual swings over the time.
+    pub lines: &'a [Vec<f64>],
 }
 
 /// Which signals the residuals of the torques `rows` follow, strongest first.
 pub(super) fn probe(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<Dependence>, IdentificationError> {
     let shapes = |row| {
-        let mut shapes = own_shapes(fit.fixed, row, fit.ranges);
+        let mut shapes = own_shapes(fit.fixed, row, fit.ranges, &fit.lines[row]);
         let others = (0..fit.fixed.tree.joint_count()).filter(|&other| other != row);
         shapes.extend(other_shapes(fit.fixed, row, others, fit.ranges));
         shapes
@@ -67,7 +70,7 @@ pub(super) fn probe(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<Dependence>, Ide
 /// that does not know the motion foretells nothing, whatever its colour.
 pub(super) fn following(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<usize>, IdentificationError> {
     let shapes = |row| {
-        let mut shapes = own_shapes(fit.fixed, row, fit.ranges);
+        let mut shapes = own_shapes(fit.fixed, row, fit.ranges, &fit.lines[row]);
         shapes.extend(other_shapes(fit.fixed, row, neighbours(fit.fixed.tree, row), fit.ranges));
         shapes
     };
@@ -93,27 +96,20 @@ fn probes(
     if rows.is_empty() {
         return Ok(Vec::new());
     }
-    let mut candidates = Candidates::none();
-    let mut signals = Vec::new();
+    let (mut effects, mut signals) = (Vec::new(), Vec::new());
     for &row in rows {
         for (signal, effect) in shapes(row) {
-            let first = candidates.effects.len();
-            candidates.list.push(Candidate {
-                specs: vec![EffectSpec::new("shape", &[])],
-                rank: 0,
-                effects: first..first + 1,
-                constants: 0,
-            });
-            candidates.effects.push(effect);
+            effects.push(effect);
             signals.push((row, signal));
         }
     }
     let Fit { fixed, specs, parameters, .. } = fit;
-    let stage = fixed.pass(specs, candidates, fixed.reference(specs, parameters)?)?;
+    let folds = [fixed.data.train.as_slice(), &fixed.data.held_out].concat();
+    let stage = fixed.pass(specs, effects, fixed.reference(specs, parameters)?, &folds)?;
     // A held model's parameters do not give way.
     let free = if fixed.prior.is_some() { 0 } else { stage.model_size() };
     let mut parameters = parameters.to_vec();
-    parameters.resize(stage.train.parameter_count(), 0.0);
+    parameters.resize(stage.design.parameter_count(), 0.0);
     let of_row = |&row: &usize| {
         let own = signals.iter().enumerate().filter(|(_, (of, _))| *of == row);
         let own: Vec<(usize, &String)> = own.map(|(candidate, (_, signal))| (candidate, signal)).collect();
@@ -121,14 +117,17 @@ fn probes(
         let alone = residual.left_over(&[])?;
         let mut found = Vec::new();
         for (candidate, signal) in own {
-            let after = residual.left_over(&stage.parameters(candidate))?;
+            let shape = stage.design.effect_parameters(stage.model_effects + candidate);
+            let after = residual.left_over(&shape.collect::<Vec<usize>>())?;
             let share = 1.0 - after.iter().sum::<f64>() / alone.iter().sum::<f64>().max(f64::MIN_POSITIVE);
             let logarithms = |squares: &[f64]| -> Vec<f64> {
                 squares.iter().map(|square| square.max(f64::MIN_POSITIVE).ln()).collect()
             };
             let t = paired_t(&logarithms(&alone), &logarithms(&after));
-            if share >= LEAST_SHARE && t >= LEAST_SIGNIFICANCE {
-                found.push(Probe { row, signal: signal.clone(), share });
+            let least = if signal == SWINGS { LEAST_SHARE_OF_SWINGS } else { LEAST_SHARE };
+            if share >= least && t >= LEAST_SIGNIFICANCE {
+                let signal = if signal == SWINGS { "t" } else { signal };
+                found.push(Probe { row, signal: signal.to_owned(), share });
             }
         }
         Ok(found)
@@ -209,4 +208,13 @@ fn drawn_to_nothing(factor: &Factor, added: usize) -> Result<Vec<f64>, Regressor
         builder.push_row(&row)?;
     }
     Ok(builder.factor().solve()?.parameters)
+}
+
+/// Mean of paired differences over their standard error.
+fn paired_t(left: &[f64], right: &[f64]) -> f64 {
+    let count = left.len() as f64;
+    let differences: Vec<f64> = left.iter().zip(right).map(|(a, b)| a - b).collect();
+    let mean = differences.iter().sum::<f64>() / count;
+    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    if variance > 0.0 { mean / (variance / count).sqrt() } else { 0.0 }
 }

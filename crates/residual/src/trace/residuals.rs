@@ -13,6 +13,9 @@ pub struct ResidualShape {
     /// For each joint, spatial frequencies \[periods·2π over the unit of position\] at which its residual has
     /// peaks, strongest first.
     pub ripple_frequencies: Vec<Vec<f64>>,
+    /// For each joint, angular frequencies \[rad/s\] at which its residual has peaks over the time of the
+    /// session, strongest first.
+    pub time_frequencies: Vec<Vec<f64>>,
     /// Filtered rows that were looked at.
     pub rows: u64,
 }
@@ -34,6 +37,8 @@ struct Collector {
     /// For each torque and distance: sum of the products, sum of the squares.
     products: Vec<[(f64, f64); STRUCTURE_LAGS.len()]>,
     grids: Vec<Grid>,
+    /// The same over the time.
+    times: Vec<Grid>,
 }
 
 /// Fourier sums of a residual over the position.
@@ -95,6 +100,7 @@ pub fn residual_shape(
     ranges: &[(f64, f64)],
 ) -> Result<ResidualShape, IdentificationError> {
     let torques = design.rows().len();
+    let duration: f64 = folds.iter().map(|fold| fold.end - fold.start).sum();
     let mut collector = Collector {
         lags: Default::default(),
         of_noise: Default::default(),
@@ -102,6 +108,7 @@ pub fn residual_shape(
         filled: 0,
         products: vec![Default::default(); torques],
         grids: ranges.iter().map(|&range| Grid::new(range)).collect(),
+        times: ranges.iter().map(|_| Grid::new((0.0, duration))).collect(),
     };
     let mut scratch = design.scratch();
     let mut filter = FilterScratch::default();
@@ -153,7 +160,7 @@ pub fn residual_shape(
                         let measured = row_of[layout.parameters.len()];
                         residual[torque] = if design.counts(row, torque) { measured - fitted } else { 0.0 };
                     }
-                    collector.add(&residual, &block.q[block.row(outputs[output])]);
+                    collector.add(&residual, &block.q[block.row(outputs[output])], t + block.session_offset);
                 },
             );
             if let Err(error) = evaluated {
@@ -172,6 +179,7 @@ pub fn residual_shape(
     Ok(ResidualShape {
         autocorrelation: collector.products.iter().map(largest).collect(),
         ripple_frequencies: collector.grids.iter().map(Grid::peaks).collect(),
+        time_frequencies: collector.times.iter().map(Grid::peaks).collect(),
         rows,
     })
 }
@@ -188,10 +196,11 @@ impl Collector {
         }
     }
 
-    fn add(&mut self, residual: &[f64], positions: &[f64]) {
+    fn add(&mut self, residual: &[f64], positions: &[f64], time: f64) {
         for (joint, grid) in self.grids.iter_mut().enumerate() {
             if residual[joint] != 0.0 {
                 grid.add(positions[joint], residual[joint]);
+                self.times[joint].add(time, residual[joint]);
             }
         }
         let size = self.ring.len();

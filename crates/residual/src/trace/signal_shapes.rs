@@ -11,13 +11,19 @@ pub(super) type Shape = (String, Box<dyn Effect>);
 /// Nodes over the joint's own signals, and over those of other joints.
 const OWN_NODES: usize = 10;
 const OTHER_NODES: usize = 6;
+/// The signal of swings over the time.
+pub(super) const SWINGS: &str = "swings";
+/// Swings over the time that are tried.
+const LINES: usize = 2;
 /// Speeds and torques bend most near nothing: nodes stand evenly over asinh of the signal over this share of
 /// its RMS, up to this many times its RMS.
 const FINE: f64 = 0.05;
 const FAR: f64 = 3.0;
 
-/// Shapes over the own signals of the joint `row`.
-pub(super) fn own_shapes(fixed: &Fixed<'_>, row: usize, ranges: &SignalRanges) -> Vec<Shape> {
+/// Shapes over the own signals of the joint `row`; `lines` are the angular frequencies \[rad/s\] at which its
+/// residual swings.
+pub(super) fn own_shapes(fixed: &Fixed<'_>, row: usize, ranges: &SignalRanges, lines: &[f64]) -> Vec<Shape> {
+    let lines: Vec<f64> = lines.iter().copied().take(LINES).collect();
     let range = &ranges.joints[row];
     let speed = range.velocity_rms.max(1e-9);
     let torque = range.torque_rms.max(1e-9);
@@ -60,6 +66,15 @@ pub(super) fn own_shapes(fixed: &Fixed<'_>, row: usize, ranges: &SignalRanges) -
             }),
         ),
         shape("t", OTHER_NODES, Box::new(move |sample, out| time.write(sample.time(), out))),
+        shape(
+            SWINGS,
+            2 * lines.len(),
+            Box::new(move |sample, out| {
+                for (pair, line) in out.chunks_exact_mut(2).zip(&lines) {
+                    (pair[0], pair[1]) = (line * sample.time()).sin_cos();
+                }
+            }),
+        ),
     ]
 }
 

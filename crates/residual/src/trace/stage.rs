@@ -1,11 +1,12 @@
 //! One pass over the logs with a model and candidates beside it.
 
-use super::candidate::{Candidate, Candidates};
-use super::evidence::{Evidence, Refit};
+use super::hypotheses::Candidates;
+use super::input::{TraceInput, TraceOptions};
+use crate::selection::{self, Hypothesis, Member, Products, Torque, Variant};
 use phiw_dynamics::Tree;
 use phiw_effects::Catalogue;
 use phiw_identification::{
-    Data, Design, Effect, EffectCatalogue, EffectSpec, IdentificationError, ReferenceModel, accumulate, merge,
+    Data, Design, Effect, EffectCatalogue, EffectSpec, Fold, IdentificationError, ReferenceModel, accumulate,
 };
 use phiw_regressor::factor::{Factor, FactorBuilder};
 use phiw_regressor::least_squares::GroupedFactor;
@@ -22,6 +23,10 @@ pub(super) struct Fixed<'a> {
     pub data: &'a Data<'a>,
     /// What was known before, over the parameters of the held model that its logs determined.
     pub prior: Option<Prior>,
+    /// Rows that the conditioning alone makes one.
+    pub rows_per_independent: f64,
+    /// A residual below this share of its torque (RMS) is as good as none.
+    pub negligible_share: f64,
     /// Hypotheses that could not be judged.
     pub not_judged: Mutex<BTreeSet<(String, Vec<String>)>>,
 }
@@ -30,50 +35,55 @@ pub(super) struct Fixed<'a> {
 pub(super) struct Prior {
     pub factor: Factor,
     pub parameters: Vec<usize>,
-    /// Number of parameters that the held model has, determined or not.
-    pub known: usize,
     /// 1/σ of each torque when it was fitted.
     pub weights: Vec<f64>,
 }
 
-/// Factors of a model and its candidates over all folds.
+/// Factors of a design over some folds.
 pub(super) struct Stage {
     pub design: Design,
-    pub candidates: Vec<Candidate>,
     /// Number of the model's effects; the candidates' follow.
     pub model_effects: usize,
-    pub train: GroupedFactor,
-    pub held_out: GroupedFactor,
     pub folds: Vec<GroupedFactor>,
 }
 
-/// How a candidate is refitted.
-#[derive(Clone, Copy)]
-pub(super) enum Thoroughness {
-    /// Quickly, for a first ranking.
-    Screening,
-    /// To full precision.
-    Full,
-}
-
-/// A candidate and what a refit with it gave.
-#[derive(Clone)]
-pub(super) struct Judged {
-    pub candidate: usize,
-    pub refit: Refit,
-    /// Gain in log-likelihood, correlated samples counted once, less a penalty for parameters and constants.
-    pub score: f64,
-    /// That penalty, and how many parameters and constants it counts.
-    pub penalty: f64,
-    pub counted: usize,
-    /// Gain on the folds held out alone.
-    pub held_out_gain: f64,
-    pub parameters: Vec<usize>,
-}
-
 impl<'a> Fixed<'a> {
+    pub fn new(
+        input: &TraceInput<'a>,
+        data: &'a Data<'a>,
+        options: &TraceOptions,
+    ) -> Result<Self, RegressorError> {
+        let prior = input.held.as_ref().map(|held| Prior {
+            factor: held.factor.clone(),
+            parameters: held.determined.clone(),
+            weights: held.residual_std.iter().map(|std| 1.0 / std.max(f64::MIN_POSITIVE)).collect(),
+        });
+        Ok(Fixed {
+            tree: input.tree,
+            base: BaseParameters::of_tree(input.tree, Default::default())?,
+            catalogue: input.catalogue,
+            data,
+            prior,
+            rows_per_independent: input.rows_per_independent,
+            negligible_share: options.negligible_share,
+            not_judged: Mutex::default(),
+        })
+    }
+
     pub fn build(&self, specs: &[EffectSpec]) -> Result<Vec<Box<dyn Effect>>, IdentificationError> {
         Ok(specs.iter().map(|spec| self.catalogue.build(spec, self.tree)).collect::<Result<_, _>>()?)
+    }
+
+    /// For an effect that is in force through its point of linearisation, the values of its parameters that
+    /// take it out of force again.
+    pub fn absent(&self, spec: &EffectSpec) -> Result<Option<Vec<f64>>, IdentificationError> {
+        let effect = self.catalogue.build(spec, self.tree)?;
+        let parameters = effect.parameters();
+        if effect.relinearised(&vec![0.0; parameters.len()]).is_none() {
+            return Ok(None);
+        }
+        let in_force = |name: &String| spec.constants.get(name).copied().unwrap_or_default();
+        Ok(Some(parameters.iter().map(|parameter| -in_force(&parameter.name)).collect()))
     }
 
     /// A rigid body and effects with numbers, for columns that need torques.
@@ -98,37 +108,157 @@ impl<'a> Fixed<'a> {
     pub fn pass(
         &self,
         specs: &[EffectSpec],
-        candidates: Candidates,
+        candidates: Vec<Box<dyn Effect>>,
         reference: ReferenceModel,
+        folds: &[Fold],
     ) -> Result<Stage, IdentificationError> {
         let mut effects = self.build(specs)?;
         let model_effects = effects.len();
-        effects.extend(candidates.effects);
+        effects.extend(candidates);
         let design = Design::new(self.tree.clone(), self.base.clone(), effects)
             .with_rest_speeds(self.data.rest_speeds.clone())
             .with_candidates_from(model_effects)
             .with_reference(reference);
-        let all = [self.data.train.as_slice(), &self.data.held_out].concat();
-        let folds = accumulate(&design, &all, &self.data.sources)?;
-        let not_finite = design.not_finite();
-        let (fit, unfit): (Vec<Candidate>, Vec<Candidate>) =
-            candidates.list.into_iter().partition(|candidate| {
-                !candidate.effects.clone().any(|effect| not_finite.contains(&(model_effects + effect)))
-            });
-        if let Ok(mut not_judged) = self.not_judged.lock() {
-            let specs = unfit.into_iter().flat_map(|candidate| candidate.specs);
-            not_judged.extend(specs.map(|spec| (spec.kind, spec.joints)));
+        let folds = accumulate(&design, folds, &self.data.sources)?;
+        Ok(Stage { model_effects, folds, design })
+    }
+
+    /// Parameters of the base and of a held model's effects that are there in any case.
+    fn always(&self, stage: &Stage) -> Result<Vec<usize>, RegressorError> {
+        let Some(prior) = &self.prior else { return Ok((0..self.base.count()).collect()) };
+        // A parameter that was not determined then would take up what has come since: it stays out.
+        let mut builder = FactorBuilder::new(prior.parameters.len() + 1);
+        let all: Vec<usize> = (0..=prior.parameters.len()).collect();
+        builder.push_factor(&prior.factor, &all, 1.0)?;
+        let folds: Result<Vec<GroupedFactor>, RegressorError> =
+            stage.folds.iter().map(|fold| fold.select(&prior.parameters)).collect();
+        for fold in folds? {
+            builder.push_factor(&fold.combine(&prior.weights)?, &all, 1.0)?;
         }
-        let (train, held_out) = folds.split_at(self.data.train.len());
-        Ok(Stage {
-            model_effects,
-            candidates: fit,
-            train: merge(train)?,
-            held_out: merge(held_out)?,
-            folds,
-            design,
+        let undetermined = builder.factor().undetermined_columns();
+        let places = prior.parameters.iter().enumerate();
+        Ok(places
+            .filter(|(place, _)| !undetermined.contains(place))
+            .map(|(_, &parameter)| parameter)
+            .collect())
+    }
+
+    /// What is to be chosen from, as plain data; hypotheses and their variants are those of `candidates`, in
+    /// their order.
+    pub fn problem(
+        &self,
+        stage: &Stage,
+        candidates: &mut Candidates,
+    ) -> Result<selection::Problem, IdentificationError> {
+        self.leave_out_what_is_not_finite(stage, candidates);
+        let design = &stage.design;
+        let mut absent = vec![0.0; design.parameter_count()];
+        let mut hypotheses = Vec::with_capacity(candidates.list.len());
+        for candidate in &candidates.list {
+            let mut torques: Vec<usize> = Vec::new();
+            let mut variants = Vec::new();
+            let mut made_of_model = false;
+            for (&effect, spec) in candidate.effects.iter().zip(&candidate.specs) {
+                let own = &design.effects()[effect];
+                torques.extend(own.entries().iter().map(|entry| entry.row));
+                made_of_model |= own.needs().total_torque;
+                variants.push(Variant {
+                    parameters: design.effect_parameters(effect).collect(),
+                    bounds: own.parameters().iter().map(|parameter| parameter.bounds).collect(),
+                    constants: spec.constants.len(),
+                });
+            }
+            if effect_is_found(candidate, stage)
+                && let Some(values) = self.absent(&candidate.specs[0])?
+            {
+                design
+                    .effect_parameters(candidate.effects[0])
+                    .zip(values)
+                    .for_each(|(parameter, value)| absent[parameter] = value);
+            }
+            torques.sort_unstable();
+            torques.dedup();
+            hypotheses.push(Hypothesis {
+                kind: candidate.kind,
+                textbook: self.catalogue.kind(&candidate.specs[0].kind)?.joint_property().is_some(),
+                familiar: candidate.familiar,
+                torques,
+                variants,
+                declared: candidate.declared,
+                linearised: self.absent(&candidate.specs[0])?.is_some(),
+                requires: self.required(candidates, candidate)?,
+                made_of_model,
+            });
+        }
+        let torques = (0..design.rows().len()).into_par_iter().map(|row| {
+            let parameters = design.rows()[row].parameters.clone();
+            let of_fold = |fold: &GroupedFactor| Products::of_factor(&fold.groups()[row].factor);
+            Torque::new(parameters, stage.folds.iter().map(of_fold).collect(), self.negligible_share)
+        });
+        Ok(selection::Problem {
+            torques: torques.collect(),
+            parameters: design.parameter_count(),
+            model: self.always(stage)?,
+            hypotheses,
+            prior: self.prior.as_ref().map(|prior| selection::Prior {
+                parameters: prior.parameters.clone(),
+                products: Products::of_factor(&prior.factor),
+            }),
+            absent,
+            rows_per_independent: self.rows_per_independent,
         })
     }
+
+    /// Candidates that a URDF has a place for, on the same joint and followed by the same signal: of these
+    /// another is a form. Nothing where the model is held: they are in what is held.
+    fn required(
+        &self,
+        candidates: &Candidates,
+        candidate: &super::hypotheses::Candidate,
+    ) -> Result<Vec<usize>, IdentificationError> {
+        let spec = &candidate.specs[0];
+        let own = self.catalogue.kind(&spec.kind)?;
+        if self.prior.is_some() || own.joint_property().is_some() || !candidate.familiar {
+            return Ok(Vec::new());
+        }
+        let mut required = Vec::new();
+        for (place, other) in candidates.list.iter().enumerate() {
+            let kind = self.catalogue.kind(&other.specs[0].kind)?;
+            if other.specs[0].joints == spec.joints
+                && kind.joint_property().is_some()
+                && kind.seen_against() == own.seen_against()
+            {
+                required.push(place);
+            }
+        }
+        Ok(required)
+    }
+
+    fn leave_out_what_is_not_finite(&self, stage: &Stage, candidates: &mut Candidates) {
+        let not_finite = stage.design.not_finite();
+        if not_finite.is_empty() {
+            return;
+        }
+        for candidate in &mut candidates.list {
+            let places: Vec<usize> = (0..candidate.effects.len())
+                .filter(|&place| !not_finite.contains(&candidate.effects[place]))
+                .collect();
+            if places.len() < candidate.effects.len()
+                && let Ok(mut not_judged) = self.not_judged.lock()
+            {
+                let spec = &candidate.specs[0];
+                not_judged.insert((spec.kind.clone(), spec.joints.clone()));
+            }
+            candidate.specs = places.iter().map(|&place| candidate.specs[place].clone()).collect();
+            candidate.effects = places.iter().map(|&place| candidate.effects[place]).collect();
+        }
+        // Effects of the model come first and are finite, so that the places of its members stay.
+        candidates.list.retain(|candidate| !candidate.effects.is_empty());
+    }
+}
+
+fn effect_is_found(candidate: &super::hypotheses::Candidate, stage: &Stage) -> bool {
+    !candidate.declared && candidate.effects[0] < stage.model_effects
 }
 
 impl Stage {
@@ -139,189 +269,19 @@ impl Stage {
             count => self.design.effect_parameters(count - 1).end,
         }
     }
+}
 
-    /// Parameters of a candidate.
-    pub fn parameters(&self, candidate: usize) -> Vec<usize> {
-        let effects = self.candidates[candidate].effects.clone();
-        effects.flat_map(|effect| self.design.effect_parameters(self.model_effects + effect)).collect()
-    }
-
-    /// Torques that a candidate acts on.
-    pub fn rows(&self, candidate: usize) -> Vec<usize> {
-        let effects = self.candidates[candidate].effects.clone();
-        let mut rows: Vec<usize> = effects
-            .flat_map(|effect| self.design.effects()[self.model_effects + effect].entries())
-            .map(|entry| entry.row)
-            .collect();
-        rows.sort_unstable();
-        rows.dedup();
-        rows
-    }
-
-    /// Candidates whose columns would be the same if the model did not have the effect at `place`. A column
-    /// of all torque that the model knows of has that effect in it, and does the effect's work under its own
-    /// name where nothing else binds it.
-    pub fn independent_of(&self, place: usize) -> Vec<usize> {
-        let rows = self.rows_of(place);
-        let made_of_it = |candidate: &usize| {
-            let mut effects = self.candidates[*candidate].effects.clone();
-            effects.any(|effect| self.design.effects()[self.model_effects + effect].needs().total_torque)
-                && self.rows(*candidate).iter().any(|row| rows.contains(row))
-        };
-        (0..self.candidates.len()).filter(|candidate| !made_of_it(candidate)).collect()
-    }
-
-    /// Torques that an effect of the model acts on.
-    pub fn rows_of(&self, place: usize) -> Vec<usize> {
-        let entries = self.design.effects()[place].entries();
-        let mut rows: Vec<usize> = entries.iter().map(|entry| entry.row).collect();
-        rows.sort_unstable();
-        rows.dedup();
-        rows
-    }
-
-    /// Parameters of the model that the rows (and what was known before) determine.
-    pub fn determined(&self, prior: Option<&Prior>) -> Result<Vec<bool>, RegressorError> {
-        let model = self.model_size();
-        if let Some(prior) = prior {
-            return self.determined_beside(prior);
-        }
-        let kept: Vec<usize> = (0..model).collect();
-        let selected = self.train.select(&kept)?;
-        let scale = |group: &phiw_regressor::least_squares::Group| {
-            let square = group.factor.right_hand_side_sum_of_squares() / group.factor.rows().max(1) as f64;
-            if square > 0.0 { 1.0 / square.sqrt() } else { 1.0 }
-        };
-        let weights: Vec<f64> = selected.groups().iter().map(scale).collect();
-        let undetermined = selected.combine(&weights)?.undetermined_columns();
-        Ok((0..model).map(|parameter| !undetermined.contains(&parameter)).collect())
-    }
-
-    /// The same where a prior determines the base and the effects that it knew; those added since need the
-    /// rows.
-    fn determined_beside(&self, prior: &Prior) -> Result<Vec<bool>, RegressorError> {
-        let model = self.model_size();
-        // A parameter that was not determined then would take up what has come since: it stays out.
-        let open: Vec<usize> = (0..model)
-            .filter(|parameter| *parameter >= prior.known || prior.parameters.contains(parameter))
-            .collect();
-        let place = |parameter: &usize| open.binary_search(parameter).unwrap_or(open.len());
-        let mut builder = FactorBuilder::new(open.len() + 1);
-        let columns: Vec<usize> = prior.parameters.iter().map(place).chain([open.len()]).collect();
-        builder.push_factor(&prior.factor, &columns, 1.0)?;
-        let rows = self.train.select(&open)?.combine(&prior.weights)?;
-        let all: Vec<usize> = (0..=open.len()).collect();
-        builder.push_factor(&rows, &all, 1.0)?;
-        let undetermined = builder.factor().undetermined_columns();
-        let mut determined = vec![false; model];
-        open.iter().enumerate().for_each(|(place, &parameter)| {
-            determined[parameter] = !undetermined.contains(&place);
-        });
-        Ok(determined)
-    }
-
-    /// The evidence with the given weights.
-    pub fn evidence<'a>(
-        &'a self,
-        determined: &[bool],
-        weights: &[f64],
-        prior: Option<&'a Factor>,
-    ) -> Result<Evidence<'a>, RegressorError> {
-        let folds = self.folds.iter().collect();
-        Evidence::new(
-            &self.train,
-            &self.held_out,
-            folds,
-            self.model_size(),
-            determined.to_vec(),
-            weights.to_vec(),
-            prior,
-        )
-    }
-
-    /// Screens every candidate of `which`, or refits with it in full; those that leave nothing to identify,
-    /// or break their bounds, are left out.
-    ///
-    /// `inflation` says how many correlated samples make one.
-    pub fn judge(
-        &self,
-        evidence: &Evidence<'_>,
-        before: &Refit,
-        which: &[usize],
-        thoroughness: Thoroughness,
-        inflation: f64,
-    ) -> Result<Vec<Judged>, RegressorError> {
-        let judged: Result<Vec<Option<Judged>>, RegressorError> = which
-            .par_iter()
-            .map(|&candidate| {
-                let parameters = self.parameters(candidate);
-                let rows = self.rows(candidate);
-                let refit = match thoroughness {
-                    Thoroughness::Screening => evidence.screen(&parameters, &rows)?,
-                    Thoroughness::Full => evidence.refit(&parameters, &rows)?,
-                };
-                let Some(refit) = refit else { return Ok(None) };
-                if !self.within_bounds(candidate, &refit) {
-                    return Ok(None);
-                }
-                let (train, held_out) = self.gain(before, &refit);
-                // A parameter that the rows do not determine costs nothing.
-                let heard =
-                    parameters.iter().filter(|&&parameter| refit.parameters[parameter] != 0.0).count();
-                let count = heard + self.candidates[candidate].constants;
-                let penalty = self.penalty(&rows, count, inflation);
-                let score = (train + held_out) / inflation - penalty;
-                let held_out_gain = held_out / inflation;
-                Ok(Some(Judged {
-                    candidate,
-                    refit,
-                    score,
-                    penalty,
-                    counted: count,
-                    held_out_gain,
-                    parameters,
-                }))
-            })
-            .collect();
-        let mut judged: Vec<Judged> = judged?.into_iter().flatten().collect();
-        judged.sort_by(|a, b| b.score.total_cmp(&a.score));
-        Ok(judged)
-    }
-
-    /// What parameters and constants that act on `rows` cost (Schwarz 1978), correlated samples counted once.
-    pub fn penalty(&self, rows: &[usize], count: usize, inflation: f64) -> f64 {
-        let samples: u64 = rows.iter().map(|&row| self.train.groups()[row].factor.rows()).sum();
-        0.5 * (samples as f64 / inflation).max(2.0).ln() * count as f64
-    }
-
-    /// Gain in log-likelihood of each torque's rows over `before`, with each torque's noise unknown:
-    /// rows/2·ln(RSS⁰/RSS), training and held out.
-    pub fn gain(&self, before: &Refit, after: &Refit) -> (f64, f64) {
-        let gain = |factors: &GroupedFactor, before: &[f64], after: &[f64]| -> f64 {
-            let of_group = |row: usize| {
-                let rows = factors.groups()[row].factor.rows() as f64;
-                if before[row] > 0.0 && after[row] > 0.0 {
-                    0.5 * rows * (before[row] / after[row]).ln()
-                } else {
-                    0.0
-                }
-            };
-            (0..before.len()).map(of_group).sum()
-        };
-        (
-            gain(&self.train, &before.train, &after.train),
-            gain(&self.held_out, &before.held_out, &after.held_out),
-        )
-    }
-
-    fn within_bounds(&self, candidate: usize, refit: &Refit) -> bool {
-        let effects = self.candidates[candidate].effects.clone();
-        effects.map(|effect| self.model_effects + effect).all(|effect| {
-            let info = self.design.effects()[effect].parameters();
-            self.design.effect_parameters(effect).zip(info).all(|(parameter, info)| {
-                let value = refit.parameters[parameter];
-                info.bounds.0 <= value && value <= info.bounds.1
-            })
-        })
-    }
+/// Specs of the members, and the values of the base parameters and of theirs, in that order.
+pub(super) fn specs_and_values(
+    problem: &selection::Problem,
+    candidates: &Candidates,
+    held: &[EffectSpec],
+    members: &[Member],
+    values: &[f64],
+    first: std::ops::Range<usize>,
+) -> (Vec<EffectSpec>, Vec<f64>) {
+    let spec = |member: &Member| candidates.list[member.hypothesis].specs[member.variant].clone();
+    let specs = held.iter().cloned().chain(members.iter().map(spec)).collect();
+    let own = members.iter().flat_map(|&member| problem.variant(member).parameters.iter());
+    (specs, first.chain(own.copied()).map(|parameter| values[parameter]).collect())
 }

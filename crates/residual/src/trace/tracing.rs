@@ -49,8 +49,8 @@ pub struct FoundEffect {
     pub explains: f64,
     /// Its probability against its rivals.
     pub confidence: f64,
-    /// Share of bootstrap draws of the training folds in which it, or one of its rivals, is chosen beside the
-    /// other effects.
+    /// Share of the stretches of training motion whose error is smaller with it; after bootstrap draws, the
+    /// share of draws that name it.
     pub stability: f64,
     /// Standard deviations from nothing.
     pub significance: f64,
@@ -71,21 +71,24 @@ pub struct Remaining {
     pub ranking: Vec<Ranked>,
     /// What these logs cannot tell: candidates of which the motion leaves nothing beside the model's own
     /// columns.
-    pub silent: Vec<EffectSpec>,
+    pub unidentifiable: Vec<EffectSpec>,
 }
 
 /// The result of a trace.
 pub struct Tracing {
     /// The verdict.
     pub verdict: Verdict,
-    /// Declared effects, then those found, with their constants.
+    /// Declared effects, then those named, then the refinements, with their constants.
     pub specs: Vec<EffectSpec>,
     /// The final model; with a held model its parameters are those held, changed by what was found.
     pub model: Identified,
     /// Error of the declared (or held) model: training, held out.
     pub before: (TorqueError, TorqueError),
-    /// The effects that were added, in order.
+    /// The effects that were added and have a name, in order.
     pub effects: Vec<FoundEffect>,
+    /// Effects that were added behind them: certain, but they only polish the form of others or are too small
+    /// for a name.
+    pub refinements: Vec<FoundEffect>,
     /// What is left.
     pub remaining: Remaining,
     /// Kinds and joints of which some constants could not be judged, since their columns are not finite on

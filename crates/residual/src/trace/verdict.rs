@@ -1,101 +1,43 @@
 //! The end of a search: the final fit, what each effect explained, what remains.
 
 use super::probe::{self, Fit};
-use super::residuals::ResidualShape;
-use super::search::{Fitted, Search, relative};
-use super::signal_shapes::neighbours;
-use super::stage::Stage;
-use super::tracing::{Ranked, Remaining, Tracing, Verdict};
-use phiw_identification::{EffectSpec, IdentificationError, Identified, TorqueError, fit, torque_error};
-use phiw_regressor::RegressorError;
-use phiw_regressor::least_squares::{Group, GroupedFactor};
-
-/// The held-out error of a model on its way.
-#[derive(Clone)]
-pub(super) struct Account {
-    /// RMS of the error over RMS of the torque.
-    relative: f64,
-    /// Sum of squares above the noise floor.
-    excess: f64,
-    /// Effects found so far.
-    effects: usize,
-}
+use super::residuals::residual_shape;
+use super::search::Search;
+use super::tracing::{Remaining, Tracing, Verdict};
+use phiw_identification::{IdentificationError, Identified, TorqueError, accumulate, fit, torque_error};
+use phiw_regressor::least_squares::GroupedFactor;
 
 impl Search<'_> {
-    /// Writes what the newest effects have explained into them, now that the model with them is fitted.
-    pub(super) fn account(&mut self, fitted: &Fitted) {
-        let now = Account {
-            relative: relative(&fitted.stage.held_out, &fitted.refit.held_out),
-            excess: self.excess(fitted),
-            effects: self.found.len(),
-        };
-        if let Some(before) = &self.account {
-            for effect in self.found.iter_mut().skip(before.effects) {
-                effect.relative_before = before.relative;
-                effect.relative = now.relative;
-                effect.explains = match before.excess > 0.0 {
-                    true => (1.0 - now.excess / before.excess).clamp(0.0, 1.0),
-                    false => 0.0,
-                };
-            }
+    pub(super) fn finish(mut self) -> Result<Tracing, IdentificationError> {
+        let before = self.declared_error()?;
+        let (mut effects, named) = self.name()?;
+        let refinements = effects.split_off(named);
+        if effects.is_empty() && refinements.is_empty() && self.is_worse_than(&before.1)? {
+            self.specs.clone_from(&self.input.declared);
+            self.parameters.clone_from(&self.input.parameters);
         }
-        self.account = Some(now);
-    }
-
-    /// What is found from now on has not been accounted for.
-    pub(super) fn account_from_here(&mut self) {
-        let effects = self.found.len();
-        self.account.iter_mut().for_each(|account| account.effects = effects);
-    }
-
-    /// Held-out residual sum of squares above what the noise alone would leave.
-    fn excess(&self, fitted: &Fitted) -> f64 {
-        let groups = fitted.stage.held_out.groups().iter();
-        let of_row = |((group, squares), floor): ((&Group, &f64), &f64)| {
-            (squares - group.factor.rows() as f64 * floor * floor).max(0.0)
-        };
-        groups.zip(&fitted.refit.held_out).zip(&self.input.noise_floor).map(of_row).sum()
-    }
-
-    pub(super) fn finish(
-        self,
-        fitted: Fitted,
-        ranking: Vec<Ranked>,
-        shape: &ResidualShape,
-    ) -> Result<Tracing, IdentificationError> {
-        let silent = silent(&fitted)?;
-        let stage = fitted.stage;
-        let model = stage.model_size();
-        let kept: Vec<usize> = (0..model).collect();
-        let folds: Result<Vec<GroupedFactor>, RegressorError> =
-            stage.folds.iter().map(|fold| fold.select(&kept)).collect();
-        let mut train_folds = folds?;
-        let held_out_folds = train_folds.split_off(self.input.data.train.len());
-        let design = self.design(&self.specs)?;
+        let design = self.design()?;
+        let data = self.fixed.data;
+        let folds = [data.train.as_slice(), &data.held_out].concat();
+        let mut train_folds = accumulate(&design, &folds, &data.sources)?;
+        let held_out_folds = train_folds.split_off(data.train.len());
         let mut final_fit = fit(&design, &train_folds)?;
-        if self.input.held.is_some() {
-            final_fit.parameters = fitted.refit.parameters[..model].to_vec();
+        if self.fixed.prior.is_some() {
+            final_fit.parameters = match effects.is_empty() && refinements.is_empty() {
+                true => self.input.parameters.clone(),
+                false => self.parameters.clone(),
+            };
         }
-        if self.input.held.is_some() && self.found.is_empty() {
-            final_fit.parameters = self.input.parameters.clone();
-        }
-        let after = (
-            torque_error(&train_folds, &final_fit.parameters)?,
-            torque_error(&held_out_folds, &final_fit.parameters)?,
-        );
-        let remaining =
-            Remaining { silent, ..self.remaining(&stage, &final_fit.parameters, &after.1, ranking, shape)? };
-        let design = design.with_reference(self.fixed.reference(&self.specs, &final_fit.parameters)?);
-        let verdict = match (self.found.is_empty(), remaining.joints.is_empty()) {
+        let after = errors(&train_folds, &held_out_folds, &final_fit.parameters)?;
+        self.parameters.clone_from(&final_fit.parameters);
+        let remaining = self.remaining(&held_out_folds, &after.1)?;
+        let verdict = match (effects.is_empty(), remaining.joints.is_empty()) {
             (true, true) => Verdict::Sufficient,
             (true, false) => Verdict::Unexplained,
             (false, true) => Verdict::Explained,
             (false, false) => Verdict::PartlyExplained,
         };
-        let before = self.before.unwrap_or_else(|| after.clone());
-        let declared = self.input.declared.len();
-        let mut found = self.found;
-        found.iter_mut().zip(&self.specs[declared..]).for_each(|(effect, spec)| effect.spec = spec.clone());
+        let design = design.with_reference(self.fixed.reference(&self.specs, &final_fit.parameters)?);
         let model = Identified {
             design,
             fit: final_fit,
@@ -106,81 +48,88 @@ impl Search<'_> {
         };
         let not_judged = self.fixed.not_judged.lock().map(|hypotheses| hypotheses.iter().cloned().collect());
         let not_judged = not_judged.unwrap_or_default();
-        Ok(Tracing { verdict, specs: self.specs, model, before, effects: found, remaining, not_judged })
+        Ok(Tracing { verdict, specs: self.specs, model, before, effects, refinements, remaining, not_judged })
     }
 
-    /// Torques on which effects that were found act, and those of the joints next to them.
-    fn touched(&self) -> Result<Vec<usize>, IdentificationError> {
-        let tree = self.fixed.tree;
-        let mut touched = Vec::new();
-        for effect in self.fixed.build(&self.specs[self.input.declared.len()..])? {
-            for row in effect.entries().iter().map(|entry| entry.row) {
-                touched.push(row);
-                touched.extend(neighbours(tree, row));
-            }
-        }
-        Ok(touched)
+    /// Whether other constants of the declared effects make the error on motion held out larger than it was
+    /// with those that were declared.
+    fn is_worse_than(&self, declared: &TorqueError) -> Result<bool, IdentificationError> {
+        let design = self.design()?;
+        let data = self.fixed.data;
+        let folds = accumulate(&design, &data.held_out, &data.sources)?;
+        Ok(torque_error(&folds, &self.parameters)?.relative > declared.relative)
     }
 
-    /// Which residuals have structure, and what they follow.
+    /// Error of the declared (or held) model: training, held out.
+    fn declared_error(&self) -> Result<(TorqueError, TorqueError), IdentificationError> {
+        let data = self.fixed.data;
+        let (specs, parameters) = (&self.input.declared, &self.input.parameters);
+        let folds = [data.train.as_slice(), &data.held_out].concat();
+        let reference = self.fixed.reference(specs, parameters)?;
+        let mut train = self.fixed.pass(specs, Vec::new(), reference, &folds)?.folds;
+        let held_out = train.split_off(data.train.len());
+        errors(&train, &held_out, parameters)
+    }
+
+    /// Which residuals have structure, and what they follow: what motion foretells on data that were not
+    /// fitted.
     fn remaining(
         &self,
-        stage: &Stage,
-        parameters: &[f64],
-        held_out: &TorqueError,
-        ranking: Vec<Ranked>,
-        shape: &ResidualShape,
+        held_out: &[GroupedFactor],
+        error: &TorqueError,
     ) -> Result<Remaining, IdentificationError> {
-        let least = self.options.structured_correlation[usize::from(!self.found.is_empty())];
-        let over = |row: usize| held_out.rmse[row] / self.input.noise_floor[row];
-        let nearest = (0..held_out.rmse.len()).map(over).fold(f64::INFINITY, f64::min).max(1.0);
         let torque_rms = |row: usize| {
-            let torque = &stage.held_out.groups()[row].factor;
-            (torque.right_hand_side_sum_of_squares() / torque.rows().max(1) as f64).sqrt()
+            let (squares, rows) = held_out.iter().fold((0.0, 0), |(squares, rows), fold| {
+                let factor = &fold.groups()[row].factor;
+                (squares + factor.right_hand_side_sum_of_squares(), rows + factor.rows())
+            });
+            (squares / rows.max(1) as f64).sqrt()
         };
-        let share = |row: usize| held_out.rmse[row] / torque_rms(row);
-        let touched = self.touched()?;
-        let large = |row: usize| {
-            over(row) > self.options.floor_margin && share(row) > self.options.structured_share[0]
+        let large = |row: &usize| {
+            error.rmse[*row] > self.options.floor_margin * self.input.noise_floor[*row]
+                && error.rmse[*row] > self.options.structured_share * torque_rms(*row)
+                && !self.is_as_it_was(*row, error.rmse[*row])
         };
-        let claimed = |row: usize| touched.contains(&row) && share(row) > self.options.structured_share[1];
-        let loud = |row: &usize| large(*row) || claimed(*row);
-        let loud: Vec<usize> = (0..held_out.rmse.len()).filter(loud).collect();
-        let fit = Fit { fixed: self.fixed, specs: &self.specs, parameters, ranges: &self.input.ranges };
-        let following = probe::following(fit, &loud)?;
-        let structured: Vec<usize> = loud
-            .into_iter()
-            .filter(|&row| {
-                let stands_out = over(row) > self.options.structured_ratio * nearest;
-                let correlated = shape.autocorrelation[row].abs() > least;
-                large(row) && (stands_out || correlated) || following.contains(&row)
-            })
-            .collect();
-        let probed = probe::probe(fit, &structured)?;
+        let large: Vec<usize> = (0..error.rmse.len()).filter(large).collect();
+        if large.is_empty() {
+            return Ok(Remaining {
+                unidentifiable: self.chosen.unidentifiable.clone(),
+                ..Remaining::default()
+            });
+        }
+        let positions: Vec<(f64, f64)> =
+            self.input.ranges.joints.iter().map(|joint| joint.position).collect();
+        let data = self.fixed.data;
+        let folds = [data.train.as_slice(), &data.held_out].concat();
+        let shape = residual_shape(&self.design()?, &self.parameters, &folds, &data.sources, &positions)?;
+        let fit = Fit {
+            lines: &shape.time_frequencies,
+            fixed: self.fixed,
+            specs: &self.specs,
+            parameters: &self.parameters,
+            ranges: &self.input.ranges,
+        };
+        let following = probe::following(fit, &large)?;
+        let over = |row: usize| error.rmse[row] / self.input.noise_floor[row];
+        let nearest = (0..error.rmse.len()).map(over).fold(f64::INFINITY, f64::min).max(1.0);
+        let stands_out = |row: usize| over(row) > self.options.structured_ratio * nearest;
+        let structured: Vec<usize> =
+            large.into_iter().filter(|&row| following.contains(&row) || stands_out(row)).collect();
+        let depends_on = probe::probe(fit, &structured)?;
         let names: Vec<String> = self.fixed.tree.joint_names().map(str::to_owned).collect();
-        let joints = structured.iter().map(|&row| names[row].clone()).collect();
-        Ok(Remaining { joints, depends_on: probed, ranking, silent: Vec::new() })
+        Ok(Remaining {
+            joints: structured.iter().map(|&row| names[row].clone()).collect(),
+            depends_on,
+            ranking: Vec::new(),
+            unidentifiable: self.chosen.unidentifiable.clone(),
+        })
     }
 }
 
-/// Hypotheses of which nothing is left beside the model's columns, whatever their constants.
-fn silent(fitted: &Fitted) -> Result<Vec<EffectSpec>, RegressorError> {
-    let stage = &fitted.stage;
-    let evidence = stage.evidence(&fitted.determined, &fitted.weights, fitted.prior.as_ref())?;
-    let mut silent: Vec<EffectSpec> = Vec::new();
-    let mut heard: Vec<&EffectSpec> = Vec::new();
-    for (index, candidate) in stage.candidates.iter().enumerate() {
-        let [spec] = candidate.specs.as_slice() else { continue };
-        let is_this = |other: &EffectSpec| other.kind == spec.kind && other.joints == spec.joints;
-        if heard.iter().any(|other| is_this(other)) {
-            continue;
-        }
-        if evidence.screen(&stage.parameters(index), &stage.rows(index))?.is_some() {
-            silent.retain(|other| !is_this(other));
-            heard.push(spec);
-        } else if !silent.iter().any(is_this) {
-            silent.push(spec.clone());
-        }
-    }
-    Ok(silent)
+fn errors(
+    train: &[GroupedFactor],
+    held_out: &[GroupedFactor],
+    parameters: &[f64],
+) -> Result<(TorqueError, TorqueError), IdentificationError> {
+    Ok((torque_error(train, parameters)?, torque_error(held_out, parameters)?))
 }

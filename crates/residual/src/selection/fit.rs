@@ -1,0 +1,386 @@
+//! A weighted fit of some parameters, from products.
+
+use super::problem::{Problem, Torque};
+use std::ops::Range;
+
+/// A column of the model with less than this share of its squared norm left beside those before it is
+/// undetermined.
+const DEPENDENT: f64 = 1e-10;
+/// The same for a candidate's column: what is left of it is rounding, or the model's own error.
+pub(super) const ABSORBED: f64 = 4e-6;
+/// Times that the weights are renewed from the residual.
+const ITERATIONS: usize = 4;
+/// Weights that change by less are settled.
+const SETTLED: f64 = 1e-3;
+
+/// The least-squares fit with each torque weighted by its effective rows over its residual: the smallest Σ
+/// n_e·log(rss).
+#[derive(Clone, Debug)]
+pub(crate) struct Fit {
+    /// The parameters that are fitted, in the order of the system.
+    pub active: Vec<usize>,
+    /// For each parameter its place in `active`.
+    pub place: Vec<Option<usize>>,
+    /// For each torque (column, place) of the active parameters that act on it.
+    pub own: Vec<Vec<(usize, usize)>>,
+    /// For each torque (column, value) of the absent ones whose absence is a value.
+    absent: Vec<Vec<(usize, f64)>>,
+    /// Whether the rows determine it beside those before it.
+    pub determined: Vec<bool>,
+    /// L of the system's Cholesky factor, row-major.
+    triangle: Vec<f64>,
+    /// L⁻¹ of the right-hand side.
+    pub half: Vec<f64>,
+    /// The value of every parameter: those that are not in the fit are absent.
+    pub values: Vec<f64>,
+    /// Residual sum of squares of each torque.
+    pub rss: Vec<f64>,
+    /// Weight of each torque's squares.
+    pub weights: Vec<f64>,
+    /// What the prior's squares are multiplied by: the share of its rows that is independent.
+    pub prior_weight: f64,
+}
+
+impl Fit {
+    /// Fits `active` parameters, of which the first `model` are the model's; the others may be absorbed.
+    /// `rows` are the effective rows of each torque.
+    pub fn new(problem: &Problem, active: Vec<usize>, rows: &[f64], start: Option<&Fit>) -> Self {
+        let mut fit = Fit::prepared(problem, active, rows, start);
+        for _ in 0..ITERATIONS {
+            fit.weights =
+                rows.iter().zip(&fit.rss).map(|(rows, rss)| rows / rss.max(f64::MIN_POSITIVE)).collect();
+            fit.solve(problem, None);
+            let rss: Vec<f64> =
+                (0..problem.torques.len()).map(|torque| fit.residual(problem, torque)).collect();
+            let change =
+                rss.iter().zip(&fit.rss).map(|(new, old)| (new / old - 1.0).abs()).fold(0.0, f64::max);
+            fit.rss = rss;
+            if change < SETTLED {
+                break;
+            }
+        }
+        fit
+    }
+
+    /// The same with the weights of `start`, which was fitted to the same `rows`: the triangle of the
+    /// parameters that both begin with is taken over, so that a few parameters more or less cost the square
+    /// of their number and not the cube.
+    pub fn beside(problem: &Problem, active: Vec<usize>, rows: &[f64], start: &Fit) -> Self {
+        let mut fit = Fit::prepared(problem, active, rows, Some(start));
+        fit.weights.clone_from(&start.weights);
+        fit.solve(problem, Some(start));
+        fit.rss = (0..problem.torques.len()).map(|torque| fit.residual(problem, torque)).collect();
+        fit
+    }
+
+    /// The same weights and rows with some of the active parameters absent: values and residuals only, by the
+    /// constraint's Schur complement. `None` where these parameters are not told apart.
+    pub fn pinned(&self, problem: &Problem, places: &[usize]) -> Option<Self> {
+        let places: Vec<usize> = places.iter().copied().filter(|&place| self.determined[place]).collect();
+        let column = |&place: &usize| {
+            let mut unit = vec![0.0; self.active.len()];
+            unit[place] = 1.0;
+            self.backward(self.forward(&unit))
+        };
+        let inverse: Vec<Vec<f64>> = places.iter().map(column).collect();
+        let change: Vec<f64> = places
+            .iter()
+            .map(|&place| self.values[self.active[place]] - problem.absent[self.active[place]])
+            .collect();
+        let solved = solve_block(&places, &inverse, &change)?;
+        let mut values = self.values.clone();
+        for (at, &parameter) in self.active.iter().enumerate().filter(|(at, _)| self.determined[*at]) {
+            let change: f64 = inverse.iter().zip(&solved).map(|(column, value)| column[at] * value).sum();
+            values[parameter] -= change;
+        }
+        places.iter().for_each(|&place| values[self.active[place]] = problem.absent[self.active[place]]);
+        let mut fit = Fit {
+            active: self.active.clone(),
+            place: self.place.clone(),
+            own: self.own.clone(),
+            absent: self.absent.clone(),
+            determined: self.determined.clone(),
+            triangle: Vec::new(),
+            half: Vec::new(),
+            values,
+            rss: Vec::new(),
+            weights: self.weights.clone(),
+            prior_weight: self.prior_weight,
+        };
+        fit.rss = (0..problem.torques.len()).map(|torque| fit.residual(problem, torque)).collect();
+        Some(fit)
+    }
+
+    /// The same parameters fitted with the same weights to the rows of all folds but some.
+    pub fn without(&self, problem: &Problem, folds: &Range<usize>) -> Self {
+        let mut fit = self.clone();
+        fit.determined.fill(true);
+        fit.solve_rows(problem, None, folds);
+        fit
+    }
+
+    /// Everything but the solution.
+    fn prepared(problem: &Problem, active: Vec<usize>, rows: &[f64], start: Option<&Fit>) -> Self {
+        let mut place = vec![None; problem.parameters];
+        active.iter().enumerate().for_each(|(at, &parameter)| place[parameter] = Some(at));
+        let all_rows: f64 = problem.torques.iter().map(|torque| torque.whole.rows()).sum();
+        let of_torque = |rows: &Torque| -> Vec<(usize, usize)> {
+            let places = rows.parameters.iter().enumerate();
+            places.filter_map(|(column, &parameter)| Some((column, place[parameter]?))).collect()
+        };
+        let absent_of = |rows: &Torque| -> Vec<(usize, f64)> {
+            let parameters = rows.parameters.iter().enumerate();
+            let absent = parameters.filter(|&(_, &parameter)| place[parameter].is_none());
+            absent
+                .map(|(column, &parameter)| (column, problem.absent[parameter]))
+                .filter(|(_, value)| *value != 0.0)
+                .collect()
+        };
+        Fit {
+            own: problem.torques.iter().map(of_torque).collect(),
+            absent: problem.torques.iter().map(absent_of).collect(),
+            determined: vec![true; active.len()],
+            active,
+            place,
+            triangle: Vec::new(),
+            half: Vec::new(),
+            values: problem.absent.clone(),
+            rss: match start {
+                Some(start) => start.rss.clone(),
+                None => problem.torques.iter().map(|torque| torque.whole.right_hand_side()).collect(),
+            },
+            weights: Vec::new(),
+            prior_weight: rows.iter().sum::<f64>() / all_rows.max(1.0),
+        }
+    }
+
+    /// (column, value) of all parameters with a value in a torque.
+    pub fn columns(&self, torque: usize) -> Vec<(usize, f64)> {
+        let fitted =
+            self.own[torque].iter().map(|&(column, place)| (column, self.values[self.active[place]]));
+        let valued = fitted.filter(|(_, value)| *value != 0.0);
+        valued.chain(self.absent[torque].iter().copied()).collect()
+    }
+
+    fn residual(&self, problem: &Problem, torque: usize) -> f64 {
+        problem.torques[torque].whole.residual(&self.columns(torque))
+    }
+
+    /// Products of a parameter's columns with those of the active ones, and with the right-hand side less
+    /// what is absent.
+    pub fn products(
+        &self,
+        problem: &Problem,
+        parameter: usize,
+        torques: &[usize],
+        out: &mut [f64],
+    ) -> (f64, f64) {
+        out.fill(0.0);
+        let (mut own, mut right) = (0.0, 0.0);
+        for &torque in torques {
+            let rows = &problem.torques[torque];
+            let Some(column) = rows.column(parameter) else { continue };
+            let weight = self.weights[torque];
+            let products = rows.whole.column(column);
+            own += weight * products[column];
+            right += weight * products[rows.parameters.len()];
+            self.own[torque].iter().for_each(|&(other, place)| out[place] += weight * products[other]);
+            let absent = self.absent[torque].iter().filter(|(other, _)| *other != column);
+            right -= weight * absent.map(|&(other, value)| products[other] * value).sum::<f64>();
+        }
+        (own, right)
+    }
+
+    /// Takes the rows of the triangle that are those of `start` from there; the weights must be the same.
+    fn solve(&mut self, problem: &Problem, start: Option<&Fit>) {
+        self.solve_rows(problem, start, &(0..0));
+    }
+
+    /// The same with the rows of all folds but `left_out`.
+    fn solve_rows(&mut self, problem: &Problem, start: Option<&Fit>, left_out: &Range<usize>) {
+        let size = self.active.len();
+        let same = |start: &Fit| {
+            self.active.iter().zip(&start.active).take_while(|(own, other)| own == other).count()
+        };
+        let kept = start.map_or(0, same);
+        let mut system = vec![0.0; size * size];
+        if let Some(start) = start {
+            let other = start.active.len();
+            for row in 0..kept {
+                system[row * size..row * size + row + 1]
+                    .copy_from_slice(&start.triangle[row * other..row * other + row + 1]);
+            }
+            self.determined[..kept].copy_from_slice(&start.determined[..kept]);
+        }
+        let mut right = vec![0.0; size];
+        for (torque, rows) in problem.torques.iter().enumerate() {
+            let weight = self.weights[torque];
+            let mut fewer = Vec::new();
+            for &(column, place) in &self.own[torque] {
+                let mut products = rows.whole.column(column);
+                if !left_out.is_empty() {
+                    fewer.clear();
+                    fewer.extend_from_slice(products);
+                    for fold in &rows.folds[left_out.clone()] {
+                        fewer.iter_mut().zip(fold.column(column)).for_each(|(sum, own)| *sum -= own);
+                    }
+                    products = &fewer;
+                }
+                if place >= kept {
+                    // What is above the diagonal is not looked at.
+                    let row = &mut system[place * size..place * size + place + 1];
+                    let below = self.own[torque].iter().filter(|(_, at)| *at <= place);
+                    below.for_each(|&(other, at)| row[at] += weight * products[other]);
+                }
+                let absent: f64 =
+                    self.absent[torque].iter().map(|&(other, value)| products[other] * value).sum();
+                right[place] += weight * (products[rows.parameters.len()] - absent);
+            }
+        }
+        if let Some(prior) = &problem.prior {
+            let last = prior.parameters.len();
+            for (a, &parameter) in prior.parameters.iter().enumerate() {
+                let Some(at) = self.place[parameter] else { continue };
+                let products = prior.products.column(a);
+                right[at] += self.prior_weight * products[last];
+                for (b, other) in prior.parameters.iter().enumerate().filter(|_| at >= kept) {
+                    if let Some(other) = self.place[*other] {
+                        system[at * size + other] += self.prior_weight * products[b];
+                    }
+                }
+            }
+        }
+        self.factor(system, kept, problem.model.len());
+        self.half = self.forward(&right);
+        let solution = self.backward(self.half.clone());
+        self.values.clone_from(&problem.absent);
+        for ((&parameter, value), determined) in self.active.iter().zip(&solution).zip(&self.determined) {
+            self.values[parameter] = if *determined { *value } else { problem.absent[parameter] };
+        }
+    }
+
+    /// Cholesky's factor of the system, whose first `kept` rows have it already; columns of which nothing is
+    /// left are passed over.
+    fn factor(&mut self, mut system: Vec<f64>, kept: usize, model: usize) {
+        pulp::Arch::new().dispatch(|| self.factor_rows(&mut system, kept, model));
+        self.triangle = system;
+    }
+
+    #[inline(always)]
+    fn factor_rows(&mut self, system: &mut [f64], kept: usize, model: usize) {
+        let size = self.active.len();
+        for row in kept..size {
+            let (before, rest) = system.split_at_mut(row * size);
+            let own = &mut rest[..size];
+            let norm = own[row];
+            for column in 0..row {
+                own[column] = match self.determined[column] {
+                    true => {
+                        let other = &before[column * size..column * size + column + 1];
+                        (own[column] - dot(&own[..column], &other[..column])) / other[column]
+                    }
+                    false => 0.0,
+                };
+            }
+            let left = norm - dot(&own[..row], &own[..row]);
+            let least = if row < model { DEPENDENT } else { ABSORBED };
+            self.determined[row] = left > least * norm && left > 0.0;
+            if self.determined[row] {
+                own[row] = left.sqrt();
+            } else {
+                own[..row].fill(0.0);
+                own[row] = 1.0;
+            }
+        }
+    }
+
+    /// L⁻¹·x.
+    pub fn forward(&self, x: &[f64]) -> Vec<f64> {
+        let mut y = vec![0.0; self.active.len()];
+        pulp::Arch::new().dispatch(|| self.forward_rows(x, &mut y));
+        y
+    }
+
+    #[inline(always)]
+    fn forward_rows(&self, x: &[f64], y: &mut [f64]) {
+        let size = self.active.len();
+        for row in 0..size {
+            if self.determined[row] {
+                let own = &self.triangle[row * size..row * size + row + 1];
+                y[row] = (x[row] - dot(&own[..row], &y[..row])) / own[row];
+            }
+        }
+    }
+
+    /// L⁻ᵀ·y.
+    pub fn backward(&self, mut y: Vec<f64>) -> Vec<f64> {
+        let size = self.active.len();
+        for row in (0..size).rev() {
+            if !self.determined[row] {
+                y[row] = 0.0;
+                continue;
+            }
+            let own = &self.triangle[row * size..row * size + row + 1];
+            y[row] /= own[row];
+            let value = y[row];
+            y[..row].iter_mut().zip(own).for_each(|(y, entry)| *y -= entry * value);
+        }
+        y
+    }
+
+    /// What the prior says against the values: its weighted squares.
+    pub fn prior_squares(&self, problem: &Problem) -> f64 {
+        let Some(prior) = &problem.prior else { return 0.0 };
+        let values: Vec<(usize, f64)> = prior
+            .parameters
+            .iter()
+            .enumerate()
+            .map(|(at, &parameter)| (at, self.values[parameter]))
+            .collect();
+        self.prior_weight * prior.products.residual(&values)
+    }
+}
+
+#[inline(always)]
+pub(super) fn dot(left: &[f64], right: &[f64]) -> f64 {
+    // Many sums, so that the additions do not wait for each other and fill the widest registers.
+    let mut sums = [0.0; 16];
+    let (left_parts, right_parts) = (left.chunks_exact(16), right.chunks_exact(16));
+    let rest: f64 = left_parts.remainder().iter().zip(right_parts.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in left_parts.zip(right_parts) {
+        for lane in 0..16 {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
+/// (Z_oo)⁻¹·x for some places o, from their columns of Z, by Cholesky's factor of the small block.
+pub(super) fn solve_block(own: &[usize], inverse: &[Vec<f64>], x: &[f64]) -> Option<Vec<f64>> {
+    let count = own.len();
+    let mut l = vec![0.0; count * count];
+    for row in 0..count {
+        for column in 0..=row {
+            let known: f64 = (0..column).map(|k| l[row * count + k] * l[column * count + k]).sum();
+            let rest = inverse[row][own[column]] - known;
+            if row == column {
+                if rest.is_nan() || rest <= 0.0 {
+                    return None;
+                }
+                l[row * count + row] = rest.sqrt();
+            } else {
+                l[row * count + column] = rest / l[column * count + column];
+            }
+        }
+    }
+    let mut y = x.to_vec();
+    for row in 0..count {
+        let known: f64 = (0..row).map(|k| l[row * count + k] * y[k]).sum();
+        y[row] = (y[row] - known) / l[row * count + row];
+    }
+    for row in (0..count).rev() {
+        let known: f64 = (row + 1..count).map(|k| l[k * count + row] * y[k]).sum();
+        y[row] = (y[row] - known) / l[row * count + row];
+    }
+    Some(y)
+}

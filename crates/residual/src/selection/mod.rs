@@ -1,0 +1,31 @@
+//! Which effects a model lacks, from triangles alone.
+//!
+//! Plain data go in: for each torque and fold the scalar products of all columns (the model's, and those of
+//! every candidate beside them), which columns make a hypothesis, and which hypotheses are one family. What
+//! comes out is the set of hypotheses at which one criterion is smallest. Nothing here knows a robot, a log,
+//! or an effect by name.
+//!
+//! The criterion is that of Schwarz (1978) over torques whose noise is unknown and whose rows are correlated,
+//! with the price of a choice among many (Chen & Chen 2008): see [`criterion`].
+
+mod admissible;
+mod criterion;
+mod cross_validation;
+mod design_effect;
+mod distribution;
+mod fit;
+mod moves;
+mod problem;
+mod products;
+mod screening;
+mod search;
+mod wald;
+
+#[cfg(test)]
+mod tests;
+
+pub(crate) use fit::Fit;
+pub(crate) use problem::{Hypothesis, Member, Prior, Problem, Torque, Variant};
+pub(crate) use products::Products;
+pub(crate) use search::{Policy, choose_variants, select, value};
+pub(crate) use wald::certainty;

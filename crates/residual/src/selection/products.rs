@@ -1,0 +1,80 @@
+//! Scalar products of columns: what is left of the rows of one torque.
+
+use phiw_regressor::factor::Factor;
+
+/// ΦᵀΦ of some columns, the right-hand side as the last of them.
+///
+/// Half the digits of a triangular factor are lost. To tell candidates apart the other half is enough; the
+/// model that is chosen is fitted from factors.
+#[derive(Clone, Debug)]
+pub(crate) struct Products {
+    size: usize,
+    /// `[column × column]`, symmetric.
+    values: Vec<f64>,
+    /// Rows that it stands for.
+    rows: f64,
+}
+
+impl Products {
+    /// Of no rows.
+    pub fn zero(size: usize) -> Self {
+        Products { size, values: vec![0.0; size * size], rows: 0.0 }
+    }
+
+    /// RᵀR. The factor of few rows has as few that are not zero.
+    pub fn of_factor(factor: &Factor) -> Self {
+        let size = factor.columns();
+        let rows = usize::try_from(factor.rows()).map_or(size, |rows| rows.min(size));
+        let r = factor.as_mat().subrows(0, rows);
+        let product = r.transpose() * r;
+        let values = (0..size).flat_map(|column| product.col_as_slice(column).to_vec()).collect();
+        Products { size, values, rows: factor.rows() as f64 }
+    }
+
+    /// Adds the rows of another.
+    pub fn add(&mut self, other: &Products) {
+        self.values.iter_mut().zip(&other.values).for_each(|(sum, value)| *sum += value);
+        self.rows += other.rows;
+    }
+
+    /// Rows that it stands for.
+    pub fn rows(&self) -> f64 {
+        self.rows
+    }
+
+    /// The products of one column with all.
+    pub fn column(&self, column: usize) -> &[f64] {
+        &self.values[column * self.size..(column + 1) * self.size]
+    }
+
+    /// ‖f‖².
+    pub fn right_hand_side(&self) -> f64 {
+        self.values.last().copied().unwrap_or_default()
+    }
+
+    /// ‖Φw − f‖² for `w` as (column, value) pairs. What rounding leaves of an exact fit counts as 1e-12 of
+    /// ‖f‖².
+    pub fn residual(&self, w: &[(usize, f64)]) -> f64 {
+        let last = self.size - 1;
+        let mut sum = self.right_hand_side();
+        for &(column, value) in w {
+            let products = self.column(column);
+            let along: f64 = w.iter().map(|&(other, value)| products[other] * value).sum();
+            sum += value * (along - 2.0 * products[last]);
+        }
+        sum.max(1e-12 * self.right_hand_side()).max(f64::MIN_POSITIVE)
+    }
+
+    /// ‖Φw‖².
+    pub fn size_of(&self, w: &[(usize, f64)]) -> f64 {
+        let along =
+            |products: &[f64]| -> f64 { w.iter().map(|&(other, value)| products[other] * value).sum() };
+        w.iter().map(|&(column, value)| value * along(self.column(column))).sum::<f64>().max(0.0)
+    }
+
+    /// Φ_columnᵀ(f − Φw).
+    pub fn score(&self, column: usize, w: &[(usize, f64)]) -> f64 {
+        let products = self.column(column);
+        products[self.size - 1] - w.iter().map(|&(other, value)| products[other] * value).sum::<f64>()
+    }
+}

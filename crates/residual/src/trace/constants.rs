@@ -1,0 +1,74 @@
+//! Constants closer to the best, once an effect is in the model.
+
+use super::hypotheses::{Candidates, Present};
+use super::search::Search;
+use crate::selection::choose_variants;
+use phiw_identification::{EffectSpec, IdentificationError};
+
+/// Passes to refine constants.
+const REFINEMENTS: usize = 3;
+
+impl Search<'_> {
+    /// Refines the constants of all effects of the model that are not held, linearises anew what is
+    /// linearised, and makes columns again that are made of the model's torque: one pass a step, for all of
+    /// them.
+    pub(super) fn refine(&mut self) -> Result<(), IdentificationError> {
+        for step in 0..REFINEMENTS {
+            let mut candidates = self.near(step)?;
+            let depends = self.fixed.build(&self.specs)?.iter().any(|effect| !effect.needs().is_empty());
+            if candidates.effects.is_empty() && !depends {
+                break;
+            }
+            let effects = std::mem::take(&mut candidates.effects);
+            let stage = self.pass(effects)?;
+            let mut problem = self.fixed.problem(&stage, &mut candidates)?;
+            problem.hypotheses.iter_mut().for_each(|hypothesis| hypothesis.declared = true);
+            let outcome = choose_variants(&problem, candidates.present.clone(), self.policy());
+            let before = self.specs.clone();
+            self.take(&problem, &candidates, &outcome.members, &outcome.fit.values);
+            let relinearised = self.relinearise()?;
+            if self.specs == before && !relinearised && step > 0 {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The model's effects, each with constants near its own.
+    fn near(&self, step: usize) -> Result<Candidates, IdentificationError> {
+        let present = Present { specs: &self.specs, declared: self.declared };
+        let mut candidates = Candidates::of_model(self.fixed, present);
+        for (place, spec) in self.specs.iter().enumerate() {
+            if self.is_held(place) {
+                continue;
+            }
+            let kind = self.fixed.catalogue.kind(&spec.kind)?;
+            let mut near = kind.refine(&spec.constants, step);
+            if step == 0 && place < self.declared && !spec.constants.is_empty() {
+                let site: Vec<usize> =
+                    spec.joints.iter().filter_map(|joint| self.fixed.tree.joint_index(joint)).collect();
+                near.extend(kind.scan(&site, &self.input.ranges));
+            }
+            let specs = near.into_iter().map(|constants| EffectSpec { constants, ..spec.clone() });
+            candidates.add_variants(self.fixed, present, place, specs.collect())?;
+        }
+        Ok(candidates)
+    }
+
+    /// Moves the point of linearisation of effects that have one.
+    fn relinearise(&mut self) -> Result<bool, IdentificationError> {
+        let mut changed = false;
+        let mut first = self.fixed.base.count();
+        for (place, effect) in self.fixed.build(&self.specs)?.into_iter().enumerate() {
+            let own = first..first + effect.parameters().len();
+            first = own.end;
+            let values = &mut self.parameters[own];
+            if let Some(moved) = effect.relinearised(values) {
+                changed |= values.iter().any(|value| value.abs() > 0.0);
+                self.specs[place] = moved.spec();
+                values.fill(0.0);
+            }
+        }
+        Ok(changed)
+    }
+}

@@ -1,0 +1,493 @@
+//! What of the chosen effects has a name, what only refines the model, and what motion held out speaks
+//! against.
+
+use super::hypotheses::{Candidates, Present};
+use super::search::Search;
+use super::stage::Stage;
+use super::tracing::{FoundEffect, RivalEffect};
+use crate::selection::{Fit, Member, Problem, Products, certainty};
+use phiw_identification::{EffectSpec, IdentificationError};
+use phiw_regressor::least_squares::GroupedFactor;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// A rival that is less probable is none.
+pub const LEAST_RIVAL: f64 = 0.05;
+/// Share of its torque that an effect must be where the other parameters have taken up most of it, over the
+/// least size.
+const ABSORBED_SIZE: f64 = 3.0;
+/// RMS of what an effect takes over the RMS of its torque below which it is asked whether constants of
+/// another could do its work.
+const SMALL: f64 = 0.05;
+/// Times the residual that a held model left when it was fitted.
+const AS_IT_WAS: f64 = 1.25;
+
+/// The chosen model, fitted to the training motion, and motion held out to judge it.
+pub(super) struct Trial {
+    problem: Problem,
+    members: Vec<Member>,
+    rows: Vec<f64>,
+    fit: Fit,
+    held_out: Vec<Products>,
+    /// The place of each member among the model's effects.
+    places: Vec<usize>,
+}
+
+/// The model without the forms of something simpler from a level on, constants refined.
+struct Simpler {
+    trial: Trial,
+    /// What it leaves of each torque on motion held out.
+    squares: Vec<f64>,
+    /// The places, among the effects of the whole model, of the forms that are left out, ascending.
+    left_out: Vec<usize>,
+}
+
+/// What is left of each torque on motion held out.
+struct Squares {
+    /// By the declared effects alone.
+    initial: Vec<f64>,
+    /// Without an effect.
+    without: Vec<f64>,
+    /// With it.
+    with: Vec<f64>,
+}
+
+/// What leaving out an effect does.
+struct Judged {
+    /// Place among the model's effects.
+    place: usize,
+    significance: f64,
+    /// What the logarithms of the errors held out gain with it: Σ rows·log(without/with).
+    gain: f64,
+    /// Share of the stretches of training motion that it makes better.
+    folds: f64,
+    /// RMS of what it takes over the RMS of a torque that it acts on, the largest.
+    size: f64,
+    named: bool,
+}
+
+impl Search<'_> {
+    /// The effects that were found, in the order in which they count: those that have a name, then those that
+    /// refine. `self.specs` are put in that order.
+    ///
+    /// What makes the error on motion held out larger is left out.
+    pub(super) fn name(&mut self) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
+        let trial = loop {
+            let trial = self.trial()?;
+            let harmful = self.harmful(&trial);
+            if harmful.is_empty() {
+                break trial;
+            }
+            for place in harmful.into_iter().rev() {
+                self.remove(place)?;
+            }
+            self.refine()?;
+        };
+        let mut judged = self.judge(&trial)?;
+        self.judge_small(&trial, &mut judged)?;
+        self.in_order(&trial, judged)
+    }
+
+    /// The places of the effects, ascending, that make the error on motion held out larger: the worst, the
+    /// worst of what is left without it, and so on. What others are forms of stays.
+    fn harmful(&self, trial: &Trial) -> Vec<usize> {
+        let mut left_out: Vec<usize> = Vec::new();
+        let mut present = trial.held_out_squares(&trial.fit);
+        loop {
+            let found = trial.members.par_iter().zip(&trial.places).filter(|(member, place)| {
+                **place >= self.declared && !trial.is_required(member) && !left_out.contains(place)
+            });
+            let without = found.map(|(_, &place)| {
+                let fit = trial.fit_with(|other| other != place && !left_out.contains(&other));
+                let squares = trial.held_out_squares(&fit);
+                (trial.gain(&squares, &present), place, squares)
+            });
+            let worst = without.min_by(|a, b| a.0.total_cmp(&b.0));
+            match worst.filter(|(gain, ..)| *gain <= 0.0) {
+                Some((_, place, squares)) => {
+                    left_out.push(place);
+                    present = squares;
+                }
+                None => break,
+            }
+        }
+        left_out.sort_unstable();
+        left_out
+    }
+
+    /// For each effect of the model how many simpler ones on the same joints it stands on, by its place: what
+    /// the textbook has stands on none, the first form of it on one level, the next on two.
+    fn levels(&self, trial: &Trial) -> BTreeMap<usize, usize> {
+        let rank = |place: usize| {
+            let kind = &self.specs[place].kind;
+            self.fixed.catalogue.kinds().position(|other| other.name() == kind)
+        };
+        let is_form = |member: &Member| {
+            let hypothesis = &trial.problem.hypotheses[member.hypothesis];
+            !hypothesis.declared && !hypothesis.requires.is_empty()
+        };
+        let forms = trial.members.iter().zip(&trial.places).filter(|(member, _)| is_form(member));
+        let forms: Vec<usize> = forms.map(|(_, place)| *place).collect();
+        let simpler = |place: usize| {
+            let own = &self.specs[place].joints;
+            forms
+                .iter()
+                .filter(|&&other| self.specs[other].joints == *own && rank(other) < rank(place))
+                .count()
+        };
+        forms.iter().map(|&place| (place, 1 + simpler(place))).collect()
+    }
+
+    /// The models with the forms below each level only. An effect is judged against what is as simple or
+    /// simpler: beside all forms of it, none is missed.
+    fn simpler(&self, levels: &BTreeMap<usize, usize>) -> Result<Vec<Simpler>, IdentificationError> {
+        let highest = levels.values().copied().max().unwrap_or(0);
+        let below = |level: usize| {
+            let mut branch = self.clone();
+            let left_out: Vec<usize> =
+                levels.iter().filter(|(_, own)| **own > level).map(|(place, _)| *place).collect();
+            for &place in left_out.iter().rev() {
+                branch.remove(place)?;
+            }
+            branch.refine()?;
+            let trial = branch.trial()?;
+            Ok(Simpler { squares: trial.held_out_squares(&trial.fit), trial, left_out })
+        };
+        (0..highest).map(below).collect()
+    }
+
+    /// Asks again of small effects on joints where another effect has constants, now that these are refined
+    /// without it: a sign that turns over another speed looks like some viscous friction.
+    fn judge_small(&self, trial: &Trial, judged: &mut [Judged]) -> Result<(), IdentificationError> {
+        let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
+        for judged in judged.iter_mut().filter(|judged| judged.named && judged.size < SMALL) {
+            let own = &self.specs[judged.place];
+            let has_constants = |spec: &EffectSpec| spec.joints == own.joints && !spec.constants.is_empty();
+            let mut others = self.specs.iter().enumerate().filter(|(place, _)| *place != judged.place);
+            if !others.any(|(_, spec)| has_constants(spec)) || self.fixed.absent(own)?.is_some() {
+                continue;
+            }
+            let mut branch = self.clone();
+            branch.remove(judged.place)?;
+            branch.refine()?;
+            let refined = branch.trial()?;
+            let squares = Squares {
+                initial: initial.clone(),
+                without: refined.held_out_squares(&refined.fit),
+                with: trial.held_out_squares(&trial.fit),
+            };
+            let member = trial.member(judged.place);
+            judged.named = member.is_some_and(|member| self.is_material(trial, member, &squares));
+        }
+        Ok(())
+    }
+
+    fn remove(&mut self, place: usize) -> Result<(), IdentificationError> {
+        let design = self.design()?;
+        self.parameters.drain(design.effect_parameters(place));
+        self.specs.remove(place);
+        self.chosen.alternatives.remove(place - self.declared);
+        Ok(())
+    }
+
+    fn trial(&self) -> Result<Trial, IdentificationError> {
+        let present = Present { specs: &self.specs, declared: self.declared };
+        let mut candidates = Candidates::of_model(self.fixed, present);
+        let folds: Vec<_> = self.folds.iter().chain(&self.fixed.data.held_out).copied().collect();
+        let reference = self.fixed.reference(&self.specs, &self.parameters)?;
+        let mut stage = self.fixed.pass(&self.specs, Vec::new(), reference, &folds)?;
+        let held_out = stage.folds.split_off(self.folds.len());
+        let problem = self.fixed.problem(&stage, &mut candidates)?;
+        let fit = Fit::new(&problem, problem.active(&candidates.present), &self.chosen.rows, None);
+        Ok(Trial {
+            held_out: products(&stage, &held_out),
+            places: candidates.list.iter().map(|candidate| candidate.effects[0]).collect(),
+            rows: self.chosen.rows.clone(),
+            members: candidates.present,
+            problem,
+            fit,
+        })
+    }
+
+    fn judge(&self, whole: &Trial) -> Result<Vec<Judged>, IdentificationError> {
+        let limit = self.options.false_name_probability / self.chosen.hypotheses.max(1) as f64;
+        let levels = self.levels(whole);
+        let simpler = self.simpler(&levels)?;
+        let all = whole.held_out_squares(&whole.fit);
+        let mut judged = Vec::new();
+        for (&member, &place) in whole.members.iter().zip(&whole.places) {
+            if place < self.declared {
+                continue;
+            }
+            let level = levels.get(&place).copied();
+            // What others are forms of is judged without these; a form beside the simpler ones only.
+            let beside = match level {
+                Some(level) => simpler.get(level),
+                None if whole.is_required(&member) => simpler.first(),
+                None => None,
+            };
+            let (trial, own) = match beside {
+                Some(beside) => (&beside.trial, beside.place(place)),
+                None => (whole, place),
+            };
+            let Some(own_member) = trial.member(own) else { continue };
+            let with = trial.held_out_squares(&trial.fit);
+            let mut without = trial.held_out_squares(&trial.fit_with(|other| other != own));
+            if let Some(simpler) = level.map(|level| &simpler[level - 1]) {
+                // With constants as they are without it, and as they are with it: what is less.
+                without.iter_mut().zip(&simpler.squares).for_each(|(own, other)| *own = own.min(*other));
+            }
+            let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
+            let squares = Squares { initial, without, with };
+            let material = match level {
+                Some(_) => self.is_form_material(trial, own_member, &squares),
+                None => self.is_material(trial, own_member, &squares),
+            };
+            let certainty = certainty(&trial.problem, &trial.fit, own_member);
+            let without = whole.fit_with(|other| other != place);
+            judged.push(Judged {
+                place,
+                size: trial.size(own_member, &squares),
+                significance: certainty.significance,
+                gain: whole.gain(&whole.held_out_squares(&without), &all),
+                folds: whole.better_folds(&without),
+                named: certainty.tail <= limit && material,
+            });
+        }
+        Ok(judged)
+    }
+
+    /// Whether a form of something simpler is worth a name of its own: it must take away most of what the
+    /// simpler ones leave, be a share of the torque, and a share of what it is a form of.
+    fn is_form_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
+        let hypothesis = &trial.problem.hypotheses[member.hypothesis];
+        hypothesis.torques.iter().any(|&torque| {
+            let whole = trial.held_out[torque].right_hand_side().max(f64::MIN_POSITIVE);
+            let (without, with) = (squares.without[torque], squares.with[torque]);
+            let taken = (without - with).max(0.0);
+            let simpler =
+                trial.members.iter().filter(|other| hypothesis.requires.contains(&other.hypothesis));
+            let simpler: Vec<(usize, f64)> =
+                simpler.flat_map(|&other| trial.values_of(other, torque)).collect();
+            let of_simpler = trial.held_out[torque].size_of(&simpler);
+            !self.is_as_it_was(torque, (without / trial.held_out[torque].rows().max(1.0)).sqrt())
+                && taken >= self.options.least_share_of_kin * without
+                && taken >= self.options.least_of_simpler * of_simpler
+                && (taken / whole).sqrt() >= self.options.least_size
+        })
+    }
+
+    /// Whether a torque's residual is no larger than it was when the held model was fitted: then nothing has
+    /// changed there since.
+    pub(super) fn is_as_it_was(&self, torque: usize, rmse: f64) -> bool {
+        self.input.held.as_ref().is_some_and(|held| rmse <= AS_IT_WAS * held.residual_std[torque])
+    }
+
+    /// Whether what an effect takes away on motion held out is worth a name.
+    ///
+    /// It must take away a share of the residual of a torque that it acts on, and be a share of that torque.
+    /// Where the other parameters have taken up most of it, it is to be seen on any torque, and must be a
+    /// share of its torque by itself.
+    fn is_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
+        let options = self.options;
+        let Squares { initial, without, with } = squares;
+        let hypothesis = &trial.problem.hypotheses[member.hypothesis];
+        let (mut largest_share, mut size): (f64, f64) = (0.0, 0.0);
+        let mut seen = false;
+        for (torque, held_out) in trial.held_out.iter().enumerate() {
+            let (before, after) = (without[torque], with[torque]);
+            let rmse = (initial[torque] / held_out.rows().max(1.0)).sqrt();
+            if held_out.rows() == 0.0 || self.is_as_it_was(torque, rmse) {
+                continue;
+            }
+            let whole = held_out.right_hand_side().max(f64::MIN_POSITIVE);
+            let taken = (before - after).max(0.0);
+            let share = taken / before;
+            largest_share = largest_share.max(share);
+            let by_others = (initial[torque] - before).max(0.0);
+            let together = ((initial[torque] - with[torque]).max(0.0) / whole).sqrt();
+            seen |= hypothesis.torques.contains(&torque)
+                && together >= options.least_size
+                && share >= options.least_share
+                && taken >= options.least_of_others * by_others
+                && (taken / whole).sqrt() >= options.least_size;
+            size = size.max((held_out.size_of(&trial.values_of(member, torque)) / whole).sqrt());
+        }
+        seen || largest_share >= options.least_share && size >= ABSORBED_SIZE * options.least_size
+    }
+
+    /// Puts the effects into the order in which they count, and says what each has explained.
+    fn in_order(
+        &mut self,
+        trial: &Trial,
+        mut judged: Vec<Judged>,
+    ) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
+        // A kind on each of several joints is one family, which stands together.
+        let family = |judged: &Judged| -> (bool, String, Vec<String>) {
+            let spec = &self.specs[judged.place];
+            let joints = if spec.joints.len() > 1 { spec.joints.clone() } else { Vec::new() };
+            (judged.named, spec.kind.clone(), joints)
+        };
+        let mut gains: BTreeMap<(bool, String, Vec<String>), f64> = BTreeMap::new();
+        judged.iter().for_each(|judged| *gains.entry(family(judged)).or_default() += judged.gain);
+        judged.sort_by(|a, b| {
+            let (of_a, of_b) = (family(a), family(b));
+            let by_family = b.named.cmp(&a.named).then(gains[&of_b].total_cmp(&gains[&of_a]));
+            by_family.then(of_a.cmp(&of_b)).then(a.place.cmp(&b.place))
+        });
+        let named = judged.iter().filter(|judged| judged.named).count();
+        let declared = self.declared;
+        let mut found: Vec<FoundEffect> = Vec::new();
+        let mut inside: Vec<usize> = Vec::new();
+        let account = |inside: &[usize]| {
+            let fit = trial.fit_with(|place| place < declared || inside.contains(&place));
+            let squares = trial.held_out_squares(&fit);
+            let torque: f64 = trial.held_out.iter().map(Products::right_hand_side).sum();
+            let excess: f64 = squares
+                .iter()
+                .zip(&trial.held_out)
+                .zip(&self.input.noise_floor)
+                .map(|((squares, held_out), floor)| (squares - held_out.rows() * floor * floor).max(0.0))
+                .sum();
+            ((squares.iter().sum::<f64>() / torque).sqrt(), excess)
+        };
+        let mut before = account(&inside);
+        for judged in &judged {
+            inside.push(judged.place);
+            let after = account(&inside);
+            let (confidence, rivals) = odds(&self.chosen.alternatives[judged.place - declared]);
+            found.push(FoundEffect {
+                spec: self.specs[judged.place].clone(),
+                relative: after.0,
+                relative_before: before.0,
+                explains: match before.1 > 0.0 {
+                    true => (1.0 - after.1 / before.1).clamp(0.0, 1.0),
+                    false => 0.0,
+                },
+                confidence,
+                stability: judged.folds,
+                significance: judged.significance,
+                rivals,
+                ranking: Vec::new(),
+            });
+            before = after;
+        }
+        let order: Vec<usize> = (0..declared).chain(judged.iter().map(|judged| judged.place)).collect();
+        self.reorder(&order)?;
+        Ok((found, named))
+    }
+
+    /// Puts the effects, with their parameters, into another order.
+    fn reorder(&mut self, order: &[usize]) -> Result<(), IdentificationError> {
+        let design = self.design()?;
+        let of_effects = order.iter().flat_map(|&place| design.effect_parameters(place));
+        self.parameters = (0..self.fixed.base.count())
+            .chain(of_effects)
+            .map(|parameter| self.parameters[parameter])
+            .collect();
+        self.specs = order.iter().map(|&place| self.specs[place].clone()).collect();
+        Ok(())
+    }
+}
+
+impl Simpler {
+    /// The place in it of an effect at `place` in the whole model.
+    fn place(&self, place: usize) -> usize {
+        place - self.left_out.iter().filter(|left_out| **left_out < place).count()
+    }
+}
+
+impl Trial {
+    /// The member at a place among the model's effects.
+    fn member(&self, place: usize) -> Option<Member> {
+        self.places.iter().position(|other| *other == place).map(|at| self.members[at])
+    }
+
+    /// Whether another effect is a form of it.
+    fn is_required(&self, member: &Member) -> bool {
+        let requires = |other: &Member| &self.problem.hypotheses[other.hypothesis].requires;
+        self.members.iter().any(|other| requires(other).contains(&member.hypothesis))
+    }
+
+    /// What the logarithms of the errors held out gain: Σ rows·log(without/with).
+    fn gain(&self, without: &[f64], with: &[f64]) -> f64 {
+        let of_torque = |torque: usize| self.held_out[torque].rows() * (without[torque] / with[torque]).ln();
+        (0..self.held_out.len()).map(of_torque).sum()
+    }
+
+    /// RMS of what a member takes over the RMS of a torque that it acts on, the largest.
+    fn size(&self, member: Member, squares: &Squares) -> f64 {
+        let of_torque = |&torque: &usize| {
+            let whole = self.held_out[torque].right_hand_side().max(f64::MIN_POSITIVE);
+            ((squares.without[torque] - squares.with[torque]).max(0.0) / whole).sqrt()
+        };
+        self.problem.hypotheses[member.hypothesis].torques.iter().map(of_torque).fold(0.0, f64::max)
+    }
+
+    /// The fit with the declared members and those found that `stays` keeps, by their place among the model's
+    /// effects.
+    fn fit_with(&self, stays: impl Fn(usize) -> bool) -> Fit {
+        let members: Vec<Member> = self
+            .members
+            .iter()
+            .zip(&self.places)
+            .filter(|(member, place)| self.problem.hypotheses[member.hypothesis].declared || stays(**place))
+            .map(|(member, _)| *member)
+            .collect();
+        Fit::new(&self.problem, self.problem.active(&members), &self.rows, Some(&self.fit))
+    }
+
+    fn held_out_squares(&self, fit: &Fit) -> Vec<f64> {
+        let of_torque = |(torque, held_out): (usize, &Products)| match held_out.rows() > 0.0 {
+            true => held_out.residual(&fit.columns(torque)),
+            false => 1.0,
+        };
+        self.held_out.iter().enumerate().map(of_torque).collect()
+    }
+
+    /// What a member adds to a torque, as (column, value) pairs.
+    fn values_of(&self, member: Member, torque: usize) -> Vec<(usize, f64)> {
+        let rows = &self.problem.torques[torque];
+        let value = |parameter: usize| self.fit.values[parameter] - self.problem.absent[parameter];
+        let parameters = &self.problem.variant(member).parameters;
+        parameters.iter().filter_map(|&parameter| Some((rows.column(parameter)?, value(parameter)))).collect()
+    }
+
+    /// Share of the stretches of training motion in which the error of `without` is larger than the model's.
+    fn better_folds(&self, without: &Fit) -> f64 {
+        let count = self.problem.torques.first().map_or(0, |torque| torque.folds.len());
+        let loss = |fit: &Fit, fold: usize| -> f64 {
+            (0..self.problem.torques.len())
+                .map(|torque| {
+                    let rows = &self.problem.torques[torque].folds[fold];
+                    let squares = rows.residual(&fit.columns(torque));
+                    self.fit.weights[torque] * squares
+                })
+                .sum()
+        };
+        let better = (0..count).filter(|&fold| loss(&self.fit, fold) < loss(without, fold)).count();
+        better as f64 / count.max(1) as f64
+    }
+}
+
+fn products(stage: &Stage, folds: &[GroupedFactor]) -> Vec<Products> {
+    let of_torque = |torque: usize| {
+        let mut sum = Products::zero(stage.design.rows()[torque].parameters.len() + 1);
+        folds.iter().for_each(|fold| sum.add(&Products::of_factor(&fold.groups()[torque].factor)));
+        sum
+    };
+    (0..stage.design.rows().len()).map(of_torque).collect()
+}
+
+/// The probability of the chosen one, and the rivals with theirs: e^(−excess/2), the criterion being twice a
+/// negative log-likelihood.
+fn odds(alternatives: &[(EffectSpec, f64)]) -> (f64, Vec<RivalEffect>) {
+    let weigh = |excess: f64| (-0.5 * excess.max(0.0)).exp();
+    let sum: f64 = 1.0 + alternatives.iter().map(|(_, excess)| weigh(*excess)).sum::<f64>();
+    let rival = |(spec, excess): &(EffectSpec, f64)| RivalEffect {
+        spec: spec.clone(),
+        confidence: weigh(*excess) / sum,
+    };
+    let rivals = alternatives.iter().map(rival).filter(|rival| rival.confidence >= LEAST_RIVAL).collect();
+    (1.0 / sum, rivals)
+}
