@@ -1,7 +1,7 @@
 //! The catalogue finds kinds of effects by name, declares them for a robot, and builds them from a model's
 //! file.
 
-use crate::{EffectKind, FittedEffect, SignalRanges};
+use crate::{EffectKind, FittedEffect, Mechanisms, SignalRanges};
 use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};
 use phiw_dynamics::Tree;
 use phiw_identification::effect::{EffectError, EffectParameter, JointProperty};
@@ -68,6 +68,18 @@ impl Catalogue {
             let nearest = known.iter().min_by_key(distance).filter(|other| distance(other) <= 5).cloned();
             EffectError::UnknownKind { kind: name.to_owned(), nearest, known }
         })
+    }
+
+    /// What in a simulator's model does what an effect does, with its fitted values; nothing for a kind that
+    /// is unknown here.
+    pub fn mechanisms(
+        &self,
+        spec: &EffectSpec,
+        parameters: &[EffectParameter],
+        fitted: &[f64],
+    ) -> Mechanisms {
+        let found = FittedEffect::new(spec, parameters, fitted);
+        self.kind(&spec.kind).map(|kind| kind.mechanisms(&found)).unwrap_or_default()
     }
 
     /// What an effect means, with its fitted values; a kind that is unknown here gets its name and numbers.

@@ -5,8 +5,11 @@ use crate::columns::{ParameterKind, smooth_sign};
 use crate::fitted::FittedEffect;
 use crate::friction::WIDTH;
 use crate::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
+use crate::mechanism::{Mechanism, Mechanisms};
 use phiw_dynamics::Tree;
-use phiw_identification::effect::{EffectParameter, Entry, Evaluator, QuadraticForm, QuadraticTerm, Sample};
+use phiw_identification::effect::{
+    EffectParameter, Entry, Evaluator, JointProperty, QuadraticForm, QuadraticTerm, Sample,
+};
 use phiw_identification::{Effect, EffectSpec};
 
 /// Torque at one joint from the motion of another, both ways or one way.
@@ -153,6 +156,33 @@ impl EffectKind for TransmissionCoupling {
         });
         let terms: Vec<String> = terms.collect();
         format!("{} share a transmission: {}.", found.joints(), terms.join(", "))
+    }
+    /// A transmission that turns with the sum or the difference of the two; what is felt one way only is the
+    /// work of none.
+    fn mechanisms(&self, found: &FittedEffect<'_>) -> Mechanisms {
+        let [first, second] = found.joint_names() else { return Mechanisms::default() };
+        let mut mechanisms = Mechanisms::default();
+        for (name, value) in found.named_values() {
+            // c·q̇ of the other is what crosses over of c·(q̇ + q̇ of the other), or of −c·(q̇ − …).
+            let (property, sign, crossing_only) = match name {
+                "fv_cross" => (JointProperty::Damping, value.signum(), true),
+                "Ia_cross" => (JointProperty::Armature, value.signum(), true),
+                "fc_sum" => (JointProperty::Friction, 1.0, false),
+                "fc_difference" => (JointProperty::Friction, -1.0, false),
+                _ => {
+                    mechanisms.left_out.push(name.to_owned());
+                    continue;
+                }
+            };
+            mechanisms.parts.push(Mechanism::Transmission {
+                joints: [first.clone(), second.clone()],
+                factors: [1.0, sign],
+                property,
+                value: if crossing_only { value.abs() } else { value },
+                crossing_only,
+            });
+        }
+        mechanisms
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let chosen = constant(constants, TERMS_CONSTANT, 7.0) as u32;

@@ -3,6 +3,7 @@
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal};
+use crate::mechanism::{Mechanism, Mechanisms};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
 use phiw_identification::effect::{JointProperty, Needs, QuadraticForm, Sample};
@@ -55,6 +56,10 @@ impl EffectKind for TorqueOffset {
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         format!("The torque of {} is off by a constant {}.", found.joints(), found.quantity(0))
     }
+    /// The drive must ask for the offset, too, so that is what its motor takes off.
+    fn mechanisms(&self, found: &FittedEffect<'_>) -> Mechanisms {
+        motor(found, 1.0, -found.value(0))
+    }
     fn seen_against(&self) -> Signal {
         Signal::Position
     }
@@ -86,6 +91,9 @@ impl EffectKind for TorqueGain {
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         format!("The torque of {} is measured {:+.1} % too large.", found.joints(), 100.0 * found.value(0))
     }
+    fn mechanisms(&self, found: &FittedEffect<'_>) -> Mechanisms {
+        motor(found, 1.0 / (1.0 + found.value(0)), 0.0)
+    }
     fn seen_against(&self) -> Signal {
         Signal::Torque
     }
@@ -99,4 +107,10 @@ impl EffectKind for TorqueGain {
         let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
         Box::new(effect.needing(needs).at_most(LARGEST_GAIN_ERROR))
     }
+}
+
+/// A motor of this gain and bias at the effect's joint.
+fn motor(found: &FittedEffect<'_>, gain: f64, bias: f64) -> Mechanisms {
+    let joint = found.joint_names().first().cloned().unwrap_or_default();
+    Mechanisms::of(Mechanism::Motor { joint, gain, bias })
 }

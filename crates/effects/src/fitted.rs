@@ -23,6 +23,16 @@ impl<'a> FittedEffect<'a> {
         self.spec.joints.join(" and ")
     }
 
+    /// The names of its joints.
+    pub fn joint_names(&self) -> &'a [String] {
+        &self.spec.joints
+    }
+
+    /// Names and values of its parameters, in their own units.
+    pub fn named_values(&self) -> impl Iterator<Item = (&'a str, f64)> {
+        self.parameters.iter().zip(self.values).map(|(info, value)| (info.name.as_str(), *value))
+    }
+
     /// One of its constants (SI units), zero if it has none of that name.
     pub fn constant(&self, name: &str) -> f64 {
         self.spec.constants.get(name).copied().unwrap_or_default()

@@ -1,6 +1,7 @@
 //! The description of a kind of effect in the catalogue.
 
 use crate::FittedEffect;
+use crate::mechanism::{Mechanism, Mechanisms};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
 use phiw_identification::effect::JointProperty;
@@ -107,6 +108,18 @@ pub trait EffectKind: Send + Sync {
     /// express it.
     fn joint_property(&self) -> Option<JointProperty> {
         None
+    }
+
+    /// What in a simulator's model does what it does, with its fitted values; by default its
+    /// [`joint_property`](Self::joint_property).
+    fn mechanisms(&self, found: &FittedEffect<'_>) -> Mechanisms {
+        let of_joint = |(property, joint): (JointProperty, &String)| Mechanism::Joint {
+            joint: joint.clone(),
+            property,
+            value: found.value(0),
+        };
+        let parts = self.joint_property().into_iter().zip(found.joint_names()).map(of_joint);
+        Mechanisms { parts: parts.collect(), left_out: Vec::new() }
     }
 
     /// Whether it always takes energy from the motion: its power is that of a brake at every moment, whatever

@@ -11,6 +11,7 @@ mod fitted;
 mod friction;
 mod hysteresis;
 mod kind;
+mod mechanism;
 mod position;
 mod sensing;
 
@@ -18,3 +19,4 @@ pub use catalogue::{Catalogue, sentence};
 pub use columns::{Formula, OwnTorque, ParameterKind, smooth_sign};
 pub use fitted::FittedEffect;
 pub use kind::{Constants, EffectKind, JointRange, Signal, SignalRanges};
+pub use mechanism::{Mechanism, Mechanisms};

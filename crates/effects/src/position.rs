@@ -3,6 +3,7 @@
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant, product, values};
+use crate::mechanism::{Mechanism, Mechanisms};
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::Effect;
 use phiw_identification::effect::Sample;
@@ -19,6 +20,18 @@ impl EffectKind for JointSpring {
     }
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         format!("A spring pulls {} back: {}.", found.joints(), found.quantity(0))
+    }
+    fn mechanisms(&self, found: &FittedEffect<'_>) -> Mechanisms {
+        let (stiffness, torque) = (found.value(0), found.value(1));
+        let joint = found.joint_names().first().cloned().unwrap_or_default();
+        if stiffness > 0.0 {
+            Mechanisms::of(Mechanism::Spring { joint, stiffness, reference: torque / stiffness })
+        } else if stiffness == 0.0 {
+            // A constant torque is left of it.
+            Mechanisms::of(Mechanism::Motor { joint, gain: 1.0, bias: torque })
+        } else {
+            Mechanisms::default()
+        }
     }
     fn seen_against(&self) -> Signal {
         Signal::Position

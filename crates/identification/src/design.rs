@@ -150,6 +150,12 @@ impl Design {
         self
     }
 
+    /// For each torque the speed of its joint below which it stands still \[rad/s, m/s\]; empty where all rows
+    /// count.
+    pub fn rest_speeds(&self) -> &[f64] {
+        &self.rest_speeds
+    }
+
     /// The same with the effects from `first` on as candidates: where one's columns are not finite on the
     /// logs, they count as zero and [`not_finite`](Design::not_finite) says so, instead of an error. `first`
     /// is at most the number of effects.
@@ -279,6 +285,11 @@ impl DesignScratch<'_> {
             self.evaluate_effects(block, sample);
         }
         Ok(())
+    }
+
+    /// Takes torques of a simulation in the place of the reference model's.
+    pub(crate) fn set_reference(&mut self, reference: BlockReference) {
+        self.reference = reference;
     }
 
     /// All rows of one sample, side by side as [`RowLayout::range`] says: columns, then the measured torque.

@@ -1,6 +1,7 @@
 //! The fit of a design to its training folds, and its error on those held out.
 
 use crate::checks::InputError;
+use crate::covariance::{Covariance, CovarianceSource};
 use crate::{Design, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::Factor;
@@ -20,6 +21,9 @@ pub struct Fit {
     pub residual_std: Vec<f64>,
     /// The weighted factor of \[Φ f\] that gave the parameters, over `determined()` parameters.
     pub factor: Factor,
+    /// Covariance of the `determined()` parameters; its diagonal holds the squares of
+    /// `standard_deviations` where these are numbers.
+    pub covariance: Covariance,
 }
 
 impl Fit {
@@ -57,7 +61,21 @@ pub fn fit(design: &Design, folds: &[GroupedFactor]) -> Result<Fit, Identificati
     let kept = all.select(&determined)?;
     let solution = weighted_least_squares(&kept)?;
     let weights: Vec<f64> = solution.group_std.iter().map(|std| 1.0 / std).collect();
-    let standard_deviations = jackknife(folds, &determined, &weights)?;
+    let factor = kept.combine(&weights)?;
+    let deviations = jackknife(folds, &determined, &weights)?;
+    let standard_deviations = match &deviations {
+        Some(deviations) => (0..determined.len()).map(|parameter| spread_of(deviations, parameter)).collect(),
+        None => vec![f64::NAN; determined.len()],
+    };
+    let covariance = match &deviations {
+        Some(deviations) => Covariance::of_left_out_folds(&determined, deviations),
+        None => {
+            let unit = factor.unit_covariance()?;
+            Covariance::of_entries(CovarianceSource::LeastSquares, &determined, |row, column| {
+                unit[(row, column)]
+            })
+        }
+    };
     let spread = |values: &[f64], absent: f64| {
         let mut all = vec![absent; design.parameter_count()];
         determined.iter().zip(values).for_each(|(&parameter, value)| all[parameter] = *value);
@@ -68,7 +86,8 @@ pub fn fit(design: &Design, folds: &[GroupedFactor]) -> Result<Fit, Identificati
         standard_deviations: spread(&standard_deviations, f64::NAN),
         undetermined,
         residual_std: solution.group_std,
-        factor: kept.combine(&weights)?,
+        factor,
+        covariance,
     })
 }
 
@@ -137,16 +156,16 @@ pub(crate) fn undetermined(all: &GroupedFactor) -> Result<Vec<usize>, RegressorE
     Ok(all.combine(&weights)?.undetermined_columns())
 }
 
-/// Standard deviations by the delete-one-fold jackknife (Efron & Stein 1981): folds are long against the
-/// residual's correlation, so correlated samples are not counted as independent ones.
+/// By how much the solutions that leave out one fold each deviate from their mean, for the delete-one-fold
+/// jackknife (Efron & Stein 1981): folds are long against the residual's correlation, so correlated samples
+/// are not counted as independent ones. `None` where there are too few folds.
 fn jackknife(
     folds: &[GroupedFactor],
     determined: &[usize],
     weights: &[f64],
-) -> Result<Vec<f64>, RegressorError> {
-    let absent = vec![f64::NAN; determined.len()];
+) -> Result<Option<Vec<Vec<f64>>>, RegressorError> {
     if folds.len() < 4 {
-        return Ok(absent);
+        return Ok(None);
     }
     let weighted: Result<Vec<Factor>, RegressorError> =
         folds.iter().map(|fold| fold.select(determined)?.combine(weights)).collect();
@@ -156,16 +175,23 @@ fn jackknife(
             Ok(solution) => solutions.push(solution.parameters),
             // Without this fold some parameter is not determined, so the folds say nothing about its standard
             // deviation.
-            Err(RegressorError::RankDeficient { .. }) => return Ok(absent),
+            Err(RegressorError::RankDeficient { .. }) => return Ok(None),
             Err(error) => return Err(error),
         }
     }
     let count = solutions.len() as f64;
-    Ok((0..determined.len())
-        .map(|parameter| {
-            let mean = solutions.iter().map(|solution| solution[parameter]).sum::<f64>() / count;
-            let square: f64 = solutions.iter().map(|solution| (solution[parameter] - mean).powi(2)).sum();
-            (square * (count - 1.0) / count).sqrt()
-        })
-        .collect())
+    let means: Vec<f64> = (0..determined.len())
+        .map(|parameter| solutions.iter().map(|solution| solution[parameter]).sum::<f64>() / count)
+        .collect();
+    for solution in &mut solutions {
+        solution.iter_mut().zip(&means).for_each(|(value, mean)| *value -= mean);
+    }
+    Ok(Some(solutions))
+}
+
+/// One parameter's standard deviation, from the deviations of the solutions that leave out a fold each.
+fn spread_of(deviations: &[Vec<f64>], parameter: usize) -> f64 {
+    let square: f64 = deviations.iter().map(|deviation| deviation[parameter].powi(2)).sum();
+    let count = deviations.len() as f64;
+    (square * (count - 1.0) / count).sqrt()
 }

@@ -9,15 +9,20 @@ pub mod effect;
 pub mod model;
 
 mod accumulate;
+mod covariance;
 mod error;
 mod factor_rows;
 mod fit;
+pub mod held_joints;
 mod identify;
 mod kept_blocks;
 mod log_set;
+mod model_sources;
 mod predict;
+mod prediction_errors;
 mod rates;
 mod reference;
+pub mod reproduction;
 mod robot_findings;
 mod sample;
 
@@ -38,4 +43,12 @@ pub mod fitting {
     pub use crate::accumulate::accumulate;
     pub use crate::factor_rows::FactorRows;
     pub use crate::fit::{Fit, TorqueError, fit, merge, torque_error, torques_with_enough_rows};
+}
+
+/// What a model's torques are worth: the parameters' covariance, each effect's share, bands, and the errors
+/// summed up.
+pub mod prediction {
+    pub use crate::covariance::{Covariance, CovarianceSource};
+    pub use crate::predict::{EffectShare, PredictionParts, predict_in_parts};
+    pub use crate::prediction_errors::{BAND_95, PredictionErrors};
 }

@@ -55,15 +55,36 @@ impl LogSet {
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
+        Self::surveyed(tree, [train, validate], TorqueColumns::Required, options, progress)
+    }
+
+    /// The same of logs that a model is used on: they need no torques.
+    ///
+    /// # Errors
+    /// A log that cannot be read or does not fit the robot.
+    pub fn open_for_prediction(
+        tree: &Tree,
+        logs: &[PathBuf],
+        options: &ConditioningOptions,
+        progress: Progress<'_>,
+    ) -> Result<Self, IdentificationError> {
+        Self::surveyed(tree, [logs, &[]], TorqueColumns::Optional, options, progress)
+    }
+
+    fn surveyed(
+        tree: &Tree,
+        [train, validate]: [&[PathBuf]; 2],
+        torque: TorqueColumns,
+        options: &ConditioningOptions,
+        progress: Progress<'_>,
+    ) -> Result<Self, IdentificationError> {
         let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
-        let mut surveys = train
-            .iter()
-            .chain(validate)
-            .map(|path| {
-                let mut report = |done: u64, total: u64| progress(&reading("surveying", path), done, total);
-                phiw_telemetry::survey(path, &joints, TorqueColumns::Required, &mut report)
-            })
-            .collect::<Result<Vec<Survey>, LogError>>()?;
+        let survey = |path: &PathBuf| {
+            let mut report = |done: u64, total: u64| progress(&reading("surveying", path), done, total);
+            phiw_telemetry::survey(path, &joints, torque, &mut report)
+        };
+        let mut surveys =
+            train.iter().chain(validate).map(survey).collect::<Result<Vec<Survey>, LogError>>()?;
         phiw_telemetry::arrange_session(&mut surveys);
         let (training, held_out) = surveys.split_at(train.len());
         check_logs(tree, training, held_out)?;

@@ -2,9 +2,11 @@
 
 use crate::checks::check_size_of_robot;
 use crate::consistent::Consistent;
+use crate::covariance::Covariance;
 use crate::effect::EffectError;
 use crate::factor_rows::FactorRows;
 use crate::fit::Fit;
+pub use crate::model_sources::{BaseMap, DataFingerprint, DataRole};
 use crate::reference::ReferenceModel;
 use crate::{Design, Effect, EffectCatalogue, EffectSpec, IdentificationError};
 use phiw_dynamics::Tree;
@@ -14,8 +16,10 @@ use phiw_limits::Limits;
 use phiw_regressor::BaseParameters;
 use serde::{Deserialize, Serialize};
 
-/// Version of the file's form.
-const SCHEMA: u32 = 1;
+/// Version of the file's form. Version 1 had neither the robot nor the covariance.
+const SCHEMA: u32 = 2;
+/// Versions that are read.
+const READ: std::ops::RangeInclusive<u32> = 1..=SCHEMA;
 /// Beyond this magnitude a number of a model is none: its square times another's has no double.
 const LARGEST: f64 = 1e100;
 
@@ -46,6 +50,23 @@ pub struct Model {
     pub factor: FactorRows,
     /// Cut-offs of the low-pass over positions and of the parallel filter \[Hz\].
     pub cutoff_hz: (f64, f64),
+    /// For each torque, the speed below which its joint stands still and its rows do not count
+    /// \[rad/s, m/s\]. Empty in a model of schema 1, or where all rows count.
+    #[serde(default)]
+    pub rest_speeds: Vec<f64>,
+    /// Covariance of the parameters, base parameters first, then those of the effects; absent from a model of
+    /// schema 1.
+    #[serde(default)]
+    pub covariance: Option<Covariance>,
+    /// The map from standard to base parameters; absent from a model of schema 1.
+    #[serde(default)]
+    pub base_map: Option<BaseMap>,
+    /// The logs that the model comes from.
+    #[serde(default)]
+    pub data: Vec<DataFingerprint>,
+    /// Text of the robot's URDF; absent from a model of schema 1.
+    #[serde(default)]
+    pub urdf: Option<String>,
     /// The same fit over bodies that can exist: what a simulator or a controller should be given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub consistent: Option<ConsistentModel>,
@@ -158,8 +179,18 @@ impl Model {
             residual_std: fit.residual_std.clone(),
             factor: FactorRows::of(&fit.factor, fit.determined()),
             cutoff_hz,
+            rest_speeds: design.rest_speeds().to_vec(),
+            covariance: Some(fit.covariance.clone()),
+            base_map: Some(BaseMap::of(base)),
+            data: Vec::new(),
+            urdf: None,
             consistent: None,
         })
+    }
+
+    /// The same with the robot that it is of and the logs that it comes from, so that it can be used by itself.
+    pub fn with_sources(self, urdf: &str, data: Vec<DataFingerprint>) -> Self {
+        Model { urdf: Some(urdf.to_owned()), data, ..self }
     }
 
     /// The same with the fit over possible bodies beside it.
@@ -202,8 +233,12 @@ impl Model {
             Err(IdentificationError::Model(format!("the model's {what}; write it again with phiw")))
         };
         let usable = |value: &f64| value.abs() < LARGEST;
-        if self.schema != SCHEMA {
-            return wrong(format!("schema {} is not {SCHEMA}, which this phiw reads", self.schema));
+        if !READ.contains(&self.schema) {
+            return wrong(format!(
+                "schema {} is not one of {} to {SCHEMA}, which this phiw reads",
+                self.schema,
+                READ.start()
+            ));
         }
         let values =
             self.base_parameters.iter().chain(self.effects.iter().flat_map(|effect| &effect.parameters));
@@ -244,6 +279,22 @@ impl Model {
         if self.factor.entries.len() != size * (size + 1) / 2 || !self.factor.entries.iter().all(usable) {
             return wrong(format!("factor is no triangle of {size} finite columns"));
         }
+        if !self.rest_speeds.is_empty()
+            && (self.rest_speeds.len() != self.joints.len() || !self.rest_speeds.iter().all(usable))
+        {
+            return wrong(format!("rest_speeds is not a list of {} speeds", self.joints.len()));
+        }
+        if let Some(covariance) = &self.covariance {
+            let size = covariance.parameters.len();
+            if !covariance.parameters.is_sorted_by(|a, b| a < b)
+                || covariance.parameters.last().is_some_and(|&last| last >= parameters)
+            {
+                return wrong(format!("covariance names parameters that are not among its {parameters}"));
+            }
+            if covariance.entries.len() != size * (size + 1) / 2 || !covariance.entries.iter().all(usable) {
+                return wrong(format!("covariance is no triangle of {size} finite columns"));
+            }
+        }
         Ok(())
     }
 
@@ -276,13 +327,11 @@ impl Model {
         let of_effects = effects.iter().map(|effect| effect.as_ref());
         check_size_of_robot(tree, of_effects, 1, &Limits::default())?;
         let base = BaseParameters::of_tree(tree, Default::default())?;
-        if base.count() != self.base_parameters.len() {
-            let own: Vec<&str> =
-                self.base_parameters.iter().map(|parameter| parameter.name.as_str()).collect();
-            let names: Vec<String> =
-                base.independent().iter().map(|&column| parameter_name(tree, column)).collect();
-            let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            let difference = first_difference("base parameter", &own, &names).unwrap_or_default();
+        let own: Vec<&str> = self.base_parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+        let names: Vec<String> =
+            base.independent().iter().map(|&column| parameter_name(tree, column)).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        if let Some(difference) = first_difference("base parameter", &own, &names) {
             let message =
                 format!("the kinematics differ, {difference}: use the URDF that the model was made with");
             return Err(IdentificationError::Model(message));

@@ -72,6 +72,10 @@ fn a_model_of_another_robot_is_refused() {
     let mut other = model.clone();
     other.base_parameters.pop();
     assert!(refused(&other, &tree).contains("the kinematics differ"));
+    // As many, but not the same: each number went to another parameter.
+    let mut swapped = model.clone();
+    swapped.base_parameters.swap(0, 1);
+    assert!(refused(&swapped, &tree).contains("base parameter 1 is"));
     assert!(refused(&Model { schema: 99, ..model.clone() }, &tree).contains("schema 99"));
     let mut cut = model.clone();
     cut.effects[0].parameters.clear();

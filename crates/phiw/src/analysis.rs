@@ -2,7 +2,7 @@
 
 use crate::session::Session;
 use crate::traces::Traces;
-use crate::{Error, possible_bodies, warnings};
+use crate::{Error, fingerprint, possible_bodies, warnings};
 use phiw_identification::consistent::{Consistent, ConsistentSettings, consistent};
 use phiw_identification::effect::JointProperty;
 use phiw_identification::fitting::merge;
@@ -40,7 +40,8 @@ impl<'a> Analysis<'a> {
         let at_rest = session.joints_without_held_out_motion(&identified.held_out_folds)?;
         let conditioning = session.logs.conditioning();
         let cutoffs = (conditioning.cutoff_hz, conditioning.parallel_cutoff_hz);
-        let model = Model::of_fit(design, fit, &session.declared, &session.arguments.hold, cutoffs)?;
+        let model = Model::of_fit(design, fit, &session.declared, &session.arguments.hold, cutoffs)?
+            .with_sources(&session.xml, fingerprint::of_session(session)?);
         let settings = ConsistentSettings::default();
         let consistent =
             consistent(design, fit, &identified.train_folds, &identified.held_out_folds, &settings)?;

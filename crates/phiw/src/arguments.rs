@@ -15,11 +15,18 @@ pub struct Arguments {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Fit the declared model to logs: model.json, report.json, report.html, identified.urdf.
+    /// Fit the declared model to logs: model.json, report.json, report.html, identified.urdf,
+    /// identified.xml (MJCF).
     Identify(IdentifyArguments),
     /// The same, then close the loop: find what the model lacks, add it, and report the error before and
     /// after.
     Explain(ExplainArguments),
+    /// Predict the torques of logs with an identified model: per row the torque, its standard deviation, what
+    /// was measured beyond it, and each effect's share.
+    Predict(PredictArguments),
+    /// Reproduce logs with an identified model and with its URDF, driven by the measured torque: how fast they
+    /// go another way than the robot.
+    Simulate(SimulateArguments),
     /// Say what is in logs before anything is fitted: late velocities, torques that are missing or clipped,
     /// units, clocks, and what to do about it.
     Check(CheckArguments),
@@ -37,6 +44,8 @@ impl Command {
         match self {
             Command::Identify(identify) => identify.session.quiet,
             Command::Explain(explain) => explain.session.quiet,
+            Command::Predict(predict) => predict.quiet,
+            Command::Simulate(simulate) => simulate.quiet,
             Command::Check(check) => check.quiet,
             Command::Retarget(retarget) => retarget.quiet,
             Command::Next(next) => next.quiet,
@@ -66,6 +75,53 @@ pub struct ExplainArguments {
     /// named.
     #[arg(long, value_name = "COUNT", default_value_t = 0)]
     pub draws: u32,
+}
+
+/// Arguments of `phiw predict`.
+#[derive(Clone, Debug, Default, Args)]
+pub struct PredictArguments {
+    /// A model.json of `phiw identify` or `phiw explain`; it holds the robot, too.
+    #[arg(long, value_name = "MODEL.json")]
+    pub model: PathBuf,
+    /// Logs (CSV); torques are compared where a log has them.
+    #[arg(value_name = "LOG", required = true)]
+    pub logs: Vec<PathBuf>,
+    /// Joints that stand still in the logs, at 0 or at a value (rad, m); they need no column. What the model
+    /// holds need not be named.
+    #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
+    pub hold: Vec<(String, f64)>,
+    /// Cut-off of the low-pass over positions (Hz); by default the model's.
+    #[arg(long, value_name = "HZ")]
+    pub cutoff_hz: Option<f64>,
+    /// Cut-off of the low-pass over the model's columns and the torque alike (Hz); by default the model's.
+    #[arg(long, value_name = "HZ")]
+    pub parallel_cutoff_hz: Option<f64>,
+    /// The predictions, one row for each row of the logs that can be used (CSV).
+    #[arg(long, value_name = "FILE.csv")]
+    pub out: PathBuf,
+    /// Print nothing but errors.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// Arguments of `phiw simulate`.
+#[derive(Clone, Debug, Default, Args)]
+pub struct SimulateArguments {
+    /// A model.json of `phiw identify` or `phiw explain`; it holds the robot, too.
+    #[arg(long, value_name = "MODEL.json")]
+    pub model: PathBuf,
+    /// Logs (CSV) with measured torques.
+    #[arg(value_name = "LOG", required = true)]
+    pub logs: Vec<PathBuf>,
+    /// Joints that stand still, as the model was made with; they need not be named.
+    #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
+    pub hold: Vec<(String, f64)>,
+    /// Folder for simulation.json, simulation.csv and the picture simulation.svg; it is made if it is absent.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Print nothing but errors.
+    #[arg(long)]
+    pub quiet: bool,
 }
 
 /// Arguments of `phiw check`.

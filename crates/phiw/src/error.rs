@@ -69,6 +69,75 @@ pub enum Error {
         /// What is wrong with it.
         source: Box<IdentificationError>,
     },
+    /// A model file that holds no robot.
+    #[error(
+        "{}: this model.json holds no robot, since an earlier phiw wrote it; write it again with `phiw identify` or `phiw explain`",
+        path.display()
+    )]
+    ModelWithoutRobot {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The robot in a model file is not one that can be worked with.
+    #[error("{}: the robot in it: {source}", path.display())]
+    RobotOfModel {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: Box<UrdfError>,
+    },
+    /// A joint that the model holds elsewhere.
+    #[error(
+        "--hold {joint}={asked}: {} is of the robot with this joint held at {held}; identify a model with it held at {asked}", path.display()
+    )]
+    HeldElsewhere {
+        /// The file.
+        path: PathBuf,
+        /// The joint.
+        joint: String,
+        /// Where it should be held \[rad, m\].
+        asked: f64,
+        /// Where the model holds it \[rad, m\].
+        held: f64,
+    },
+    /// A joint that is held in the logs, but moves in the model that is simulated.
+    #[error(
+        "--hold {joint}: {} moves this joint, so a simulation needs its torque; identify a model with it held", path.display()
+    )]
+    HeldInSimulation {
+        /// The model.
+        path: PathBuf,
+        /// The joint.
+        joint: String,
+    },
+    /// A model that no motion follows from.
+    #[error(
+        "{}: it cannot be simulated: M(q) is not positive definite at {t:.3} s of {}{bodies}; predict torques with it, or identify it from motion \
+         that tells more", path.display(), log.display()
+    )]
+    NotPositiveDefinite {
+        /// The model.
+        path: PathBuf,
+        /// The log.
+        log: PathBuf,
+        /// Where in the log \[s\].
+        t: f64,
+        /// Which bodies cannot exist, in words.
+        bodies: String,
+    },
+    /// Logs without a stretch to reproduce.
+    #[error(
+        "{logs}: no stretch of {needed} s without a gap, which a reproduction needs; record longer motion"
+    )]
+    NothingToReproduce {
+        /// The logs.
+        logs: String,
+        /// The shortest window \[s\].
+        needed: f64,
+    },
+    /// A model that cannot be moved on.
+    #[error("the simulation failed: {0}")]
+    Simulation(phiw_identification::reproduction::PlantError),
     /// A model file of another robot.
     #[error("{} does not fit {}: {source}", path.display(), urdf.display())]
     ModelOfAnother {
@@ -94,7 +163,7 @@ pub enum Error {
         file: PathBuf,
     },
     /// The file for the result is a folder.
-    #[error("--out {}: this is a folder; name a file in it, such as {}", out.display(), out.join("next.csv").display())]
+    #[error("--out {}: this is a folder; name a file in it, such as {}", out.display(), out.join("result.csv").display())]
     OutIsFolder {
         /// What was asked for.
         out: PathBuf,
@@ -210,6 +279,9 @@ pub enum Error {
     /// The identified parameters cannot be written as a URDF.
     #[error("identified.urdf: {0}")]
     IdentifiedUrdf(Box<UrdfError>),
+    /// The identified parameters cannot be written as MJCF.
+    #[error("identified.xml: {0}")]
+    IdentifiedMjcf(phiw_mjcf::MjcfError),
     /// All logs of the training together.
     #[error("{logs}: {source}")]
     TrainingLogs {
@@ -244,6 +316,12 @@ impl Error {
             | Error::NotAModel { .. }
             | Error::Model { .. }
             | Error::ModelOfAnother { .. }
+            | Error::ModelWithoutRobot { .. }
+            | Error::RobotOfModel { .. }
+            | Error::HeldElsewhere { .. }
+            | Error::HeldInSimulation { .. }
+            | Error::NotPositiveDefinite { .. }
+            | Error::NothingToReproduce { .. }
             | Error::Map { .. }
             | Error::Robot { .. }
             | Error::Recording(_)
@@ -264,7 +342,12 @@ impl Error {
             | Error::OutIsFile { .. } => 2,
             Error::Identification(IdentificationError::Regressor(_)) => 1,
             Error::Identification(_) => 2,
-            Error::Curriculum(_) | Error::Output(_) | Error::IdentifiedUrdf(_) | Error::Json { .. } => 1,
+            Error::Curriculum(_)
+            | Error::Simulation(_)
+            | Error::Output(_)
+            | Error::IdentifiedUrdf(_)
+            | Error::IdentifiedMjcf(_)
+            | Error::Json { .. } => 1,
         }
     }
 }

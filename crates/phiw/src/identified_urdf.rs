@@ -2,10 +2,10 @@
 
 use crate::Error;
 use crate::analysis::Analysis;
+use crate::exported::{LeftOut, MARK, fitted, header};
 use phiw_dynamics::urdf::{JointFriction, write_identified_urdf};
-
+use phiw_identification::EffectCatalogue;
 use phiw_identification::effect::JointProperty;
-use phiw_identification::{EffectCatalogue, EffectSpec};
 
 /// Properties of a joint that URDF's `<dynamics>` has: damping and friction.
 const EXPRESSED: [JointProperty; 2] = [JointProperty::Damping, JointProperty::Friction];
@@ -28,28 +28,56 @@ pub fn identified_urdf(analysis: &Analysis<'_>) -> Result<String, Error> {
         })
     };
     let declared: Vec<JointFriction> = (0..tree.joint_count()).filter_map(friction).collect();
-    write_identified_urdf(&analysis.session.xml, &tree, &declared)
-        .map_err(|source| Error::IdentifiedUrdf(Box::new(source)))
+    let text = write_identified_urdf(&analysis.session.xml, &tree, &declared)
+        .map_err(|source| Error::IdentifiedUrdf(Box::new(source)))?;
+    Ok(with_header(&text, &header(analysis, FILE, &not_expressed(analysis))))
 }
 
-/// Kinds of effects in the model that the URDF lacks.
+/// Name of the file.
+const FILE: &str = "identified.urdf";
+
+/// What of the model the URDF lacks, in words.
 pub fn not_expressed(analysis: &Analysis<'_>) -> Vec<String> {
-    let mut kinds: Vec<String> = Vec::new();
+    let mut left_out = LeftOut::default();
     for effect in &analysis.model.effects {
         let property = analysis.session.catalogue.joint_property(&effect.spec);
-        let is_expressed = property.is_some_and(|property| EXPRESSED.contains(&property));
-        if !is_expressed && !kinds.contains(&effect.spec.kind) {
-            kinds.push(effect.spec.kind.clone());
+        if !property.is_some_and(|property| EXPRESSED.contains(&property)) {
+            left_out.add(effect.spec.kind.clone(), &effect.spec.joints);
         }
     }
-    kinds
+    left_out.in_words()
 }
 
-/// The parameter of the effect on one joint that is this property of it.
-fn fitted(analysis: &Analysis<'_>, property: JointProperty, joint: &str) -> Option<f64> {
-    let catalogue = &analysis.session.catalogue;
-    let is_it =
-        |spec: &EffectSpec| spec.joints == [joint] && catalogue.joint_property(spec) == Some(property);
-    let effect = analysis.model.effects.iter().position(|effect| is_it(&effect.spec))?;
-    analysis.model.consistent_effect(effect, 0)
+/// The text with a comment before its root element, in the place of one that an earlier run has put there.
+fn with_header(text: &str, lines: &[String]) -> String {
+    // Nothing may stand before the XML declaration, nor the mark of the byte order before that.
+    let start = text.len() - text.trim_start_matches('\u{feff}').len();
+    let declared = text[start..].starts_with("<?xml").then(|| text[start..].find("?>")).flatten();
+    let head = declared.map_or(start, |end| start + end + 2);
+    let (before, mut after) = text.split_at(head);
+    let old = after.trim_start().strip_prefix("<!--").filter(|old| old.trim_start().starts_with(MARK));
+    if let Some((_, rest)) = old.and_then(|old| old.split_once("-->")) {
+        after = rest;
+    }
+    let gap = if declared.is_some() { "\n" } else { "" };
+    format!("{before}{gap}{}{}", phiw_mjcf::comment(lines), after.trim_start_matches(['\n', '\r']))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_header;
+
+    #[test]
+    fn a_header_stands_before_the_root_once() {
+        let line = |text: &str| vec![format!("{} from {text}.", super::MARK)];
+        for declaration in ["", "<?xml version=\"1.0\"?>\n", "\u{feff}<?xml version=\"1.0\"?>\n"] {
+            let text = format!("{declaration}<!-- mine --><robot/>\n");
+            let once = with_header(&text, &line("a -- b"));
+            let again = with_header(&once, &line("c"));
+            let expected =
+                format!("{declaration}<!--\n  Identified by phiw from c.\n-->\n<!-- mine --><robot/>\n");
+            assert_eq!(again, expected);
+            assert!(once.contains("a - - b"));
+        }
+    }
 }

@@ -3,6 +3,7 @@
 use crate::analysis::Analysis;
 use crate::arguments::SessionArguments;
 use crate::console::Console;
+use crate::identified_mjcf::{self, identified_mjcf};
 use crate::identified_urdf::identified_urdf;
 use crate::output::take_folder;
 use crate::report_json::report_json;
@@ -24,7 +25,8 @@ pub struct Outcome {
     pub report: ReportJson,
 }
 
-/// Fits the declared model and writes `model.json`, `report.json`, `report.html` and `identified.urdf`.
+/// Fits the declared model and writes `model.json`, `report.json`, `report.html`, `identified.urdf` and
+/// `identified.xml`.
 ///
 /// Nothing is written before everything has been computed.
 ///
@@ -65,5 +67,6 @@ pub fn outputs(analysis: &Analysis<'_>, report: &ReportJson, page: String) -> Re
         ResultFile::new("report.json", report.to_json().map_err(json("report.json"))?),
         ResultFile::new("report.html", page),
         ResultFile::new("identified.urdf", identified_urdf(analysis)?),
+        ResultFile::new(identified_mjcf::FILE, identified_mjcf(analysis)?),
     ])
 }

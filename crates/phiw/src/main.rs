@@ -64,6 +64,14 @@ fn told(command: &Command, console: &Console) -> Result<Told, Error> {
             let outcome = phiw::explain::explain(arguments, console)?;
             Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
         }
+        Command::Predict(arguments) => {
+            let outcome = phiw::predict::predict(arguments, console)?;
+            Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
+        }
+        Command::Simulate(arguments) => {
+            let outcome = phiw::simulate::simulate(arguments, console)?;
+            Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
+        }
         Command::Check(arguments) => {
             let outcome = phiw::check::check(arguments, console)?;
             Told { summary: outcome.summary, warnings: Vec::new(), failures: no_failures }

@@ -54,6 +54,18 @@ impl ModelFile {
         })
     }
 
+    /// The model's columns and parameters on its own robot.
+    ///
+    /// # Errors
+    /// The file does not fit the robot in it.
+    pub fn own_design(
+        &self,
+        tree: &Tree,
+        catalogue: &dyn EffectCatalogue,
+    ) -> Result<(Design, Vec<f64>), Error> {
+        self.model.design(tree, catalogue).map_err(|source| self.wrong(source))
+    }
+
     /// What was known when the model was fitted.
     ///
     /// # Errors

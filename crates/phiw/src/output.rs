@@ -5,7 +5,8 @@ use phiw_result_folder::{Lock, check_inputs};
 use std::path::{Path, PathBuf};
 
 /// Names of the files that `identify` and `explain` write.
-pub const RESULT_FILES: [&str; 4] = ["model.json", "report.json", "report.html", "identified.urdf"];
+pub const RESULT_FILES: [&str; 5] =
+    ["model.json", "report.json", "report.html", "identified.urdf", "identified.xml"];
 
 /// Takes a folder for the results of `command`: it can be there, none of its results is an input, and nobody
 /// else writes to it.

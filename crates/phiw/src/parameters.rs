@@ -1,6 +1,7 @@
 //! The parameters as the report lists them.
 
 use crate::analysis::Analysis;
+use crate::summary;
 use phiw_dynamics::inertia::Inertia;
 use phiw_identification::model::{BodyParameters, NamedParameter, parameter_name};
 use phiw_report::number::significant;
@@ -37,6 +38,14 @@ fn rows(analysis: &Analysis<'_>) -> Vec<ParameterRow> {
 }
 
 fn note(analysis: &Analysis<'_>) -> String {
+    let mut sentences = vec![consistency(analysis)];
+    sentences.extend(
+        summary::file_notes(analysis).into_iter().map(|note| note.trim_end_matches('.').to_owned() + "."),
+    );
+    sentences.join(" ")
+}
+
+fn consistency(analysis: &Analysis<'_>) -> String {
     let bodies = &analysis.model.bodies;
     let is_physical = |body: &&BodyParameters| Inertia::<f64>::from_parameters(&body.inertial).is_physical();
     let consistent = bodies.iter().filter(is_physical).count();
@@ -44,8 +53,8 @@ fn note(analysis: &Analysis<'_>) -> String {
         "Least squares, each torque weighted by its residual; standard deviations by leaving out one twelfth of the training motion after \
          the other, so that correlated samples are not counted as independent. cond of the weighted regressor {}. Logs determine base \
          parameters only; model.json holds the standard parameters nearest to the URDF's that have them ({consistent} of {} \
-         bodies are physically consistent: positive definite pseudo-inertia), and beside them, as identified.urdf does, the parameters of \
-         possible bodies and dissipative friction that fit best, with the URDF as prior.",
+         bodies are physically consistent: positive definite pseudo-inertia), and beside them, as identified.urdf and identified.xml do, the \
+         parameters of possible bodies and dissipative friction that fit best, with the URDF as prior.",
         significant(analysis.condition_number(), 3),
         bodies.len(),
     )

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::arguments::SessionArguments;
 use crate::input::read_text;
 use phiw_dynamics::urdf::{Finding, UrdfOptions, read_urdf};
-use phiw_dynamics::{JointType, Tree};
+use phiw_dynamics::{DimensionError, JointType, Tree};
 use phiw_effects::{Catalogue, SignalRanges};
 use phiw_identification::checks::{InputError, check_excitation};
 use phiw_identification::effect::EffectError;
@@ -101,8 +101,18 @@ impl Session {
 
     /// Unit of a joint's torque.
     pub fn torque_unit(&self, joint: usize) -> &'static str {
-        if self.tree.joint(joint).joint_type == JointType::Prismatic { "N" } else { "N·m" }
+        torque_unit(&self.tree, joint)
     }
+}
+
+/// Unit of the torque of a robot's joint.
+pub(crate) fn torque_unit(tree: &Tree, joint: usize) -> &'static str {
+    if tree.joint(joint).joint_type == JointType::Prismatic { "N" } else { "N·m" }
+}
+
+/// Numbers that do not fit each other.
+pub(crate) fn of_numbers(error: DimensionError) -> Error {
+    IdentificationError::from(error).into()
 }
 
 /// The same error, with the names of `logs` if it is about all of them.

@@ -1,10 +1,10 @@
 //! The result in a terminal.
 
 use crate::analysis::Analysis;
-use crate::identified_urdf::not_expressed;
 use crate::page::{counted, declared_in_words};
 use crate::possible_bodies;
 use crate::traces::Role;
+use crate::{identified_mjcf, identified_urdf};
 use phiw_identification::LogSet;
 use phiw_report::number::{percent, significant};
 use phiw_result_folder::ResultFile;
@@ -99,16 +99,33 @@ fn closing(
         counted(base, "base parameter"),
         significant(analysis.condition_number(), 3)
     )?;
-    let not_expressed = not_expressed(analysis);
-    if !not_expressed.is_empty() {
-        writeln!(text, "identified.urdf cannot express {}: model.json has all", not_expressed.join(", "))?;
+    for line in file_notes(analysis) {
+        writeln!(text, "{line}")?;
     }
     let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
     writeln!(text, "{} in {}", names.join(", "), folder.display())
 }
 
+/// What the files for other programs lack, and who will refuse them.
+pub fn file_notes(analysis: &Analysis<'_>) -> Vec<String> {
+    let lacking = [
+        ("identified.urdf", identified_urdf::not_expressed(analysis)),
+        (identified_mjcf::FILE, identified_mjcf::not_expressed(analysis)),
+    ];
+    let lacking = lacking.iter().filter(|(_, left_out)| !left_out.is_empty());
+    let mut notes: Vec<String> = lacking
+        .map(|(file, left_out)| format!("{file} cannot express {}: model.json has all", left_out.join("; ")))
+        .collect();
+    notes.extend(identified_mjcf::refusal(analysis).ok().flatten());
+    notes
+}
+
 /// Columns as wide as they need to be; those from `numbers` on to the right.
-fn write_table<const N: usize>(text: &mut String, rows: &[[String; N]], numbers: usize) -> std::fmt::Result {
+pub(crate) fn write_table<const N: usize>(
+    text: &mut String,
+    rows: &[[String; N]],
+    numbers: usize,
+) -> std::fmt::Result {
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: [usize; N] = std::array::from_fn(width);
     for row in rows {

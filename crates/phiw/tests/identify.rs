@@ -198,7 +198,7 @@ fn results_are_replaced_and_nothing_else_is_left() {
     };
     assert_eq!(
         names(&identification.arguments.out),
-        ["identified.urdf", "model.json", "report.html", "report.json"]
+        ["identified.urdf", "identified.xml", "model.json", "report.html", "report.json"]
     );
 }
 

@@ -90,6 +90,9 @@ fn a_finished_run_leaves_nothing_but_its_results() {
             names
         };
         assert_eq!(names(scene.path("")), ["out", "robot.urdf", "train.csv"]);
-        assert_eq!(names(scene.path("out")), ["identified.urdf", "model.json", "report.html", "report.json"]);
+        assert_eq!(
+            names(scene.path("out")),
+            ["identified.urdf", "identified.xml", "model.json", "report.html", "report.json"]
+        );
     }
 }

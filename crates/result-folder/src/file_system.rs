@@ -31,6 +31,25 @@ pub trait FileSystem {
         file.sync_all()
     }
 
+    /// Opens a file that must not be there yet, to write it piece by piece. [`sync_file`](Self::sync_file)
+    /// brings it down to the disk.
+    ///
+    /// # Errors
+    /// What the system says.
+    fn open_file(&self, path: &Path) -> io::Result<File> {
+        self.before("create", path)?;
+        OpenOptions::new().write(true).create_new(true).open(path)
+    }
+
+    /// Brings a file down to the disk.
+    ///
+    /// # Errors
+    /// What the system says.
+    fn sync_file(&self, file: &File, path: &Path) -> io::Result<()> {
+        self.before("sync", path)?;
+        file.sync_all()
+    }
+
     /// Makes a folder that must not be there yet.
     ///
     /// # Errors

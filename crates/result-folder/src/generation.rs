@@ -3,6 +3,7 @@
 use crate::error::unwritable;
 use crate::file_system::{remove_leftovers, unique};
 use crate::{FileSystem, ResultError, ResultFile};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// The link that leads to the generation that counts.
@@ -80,7 +81,7 @@ pub fn remove_partial_files(system: &dyn FileSystem, folder: &Path) {
 const PARTIAL: &str = ".partial";
 
 /// A file under a name of its own, until it takes its place.
-struct Aside<'a> {
+pub(crate) struct Aside<'a> {
     system: &'a dyn FileSystem,
     path: PathBuf,
     renamed: bool,
@@ -89,6 +90,20 @@ struct Aside<'a> {
 impl<'a> Aside<'a> {
     /// Writes what is to become the file at `target`. What killed runs have left of it goes.
     fn write(system: &'a dyn FileSystem, target: &Path, content: &[u8]) -> Result<Self, ResultError> {
+        let aside = Aside::named(system, target);
+        system.create_file(&aside.path, content).map_err(unwritable(target))?;
+        Ok(aside)
+    }
+
+    /// The same, opened to be written piece by piece.
+    pub(crate) fn open(system: &'a dyn FileSystem, target: &Path) -> Result<(Self, File), ResultError> {
+        let aside = Aside::named(system, target);
+        let file = system.open_file(&aside.path).map_err(unwritable(target))?;
+        Ok((aside, file))
+    }
+
+    /// A free name for what is to become the file at `target`.
+    fn named(system: &'a dyn FileSystem, target: &Path) -> Self {
         let name = target.file_name().unwrap_or_default().to_string_lossy();
         let prefix = format!(".{name}.");
         let folder =
@@ -100,12 +115,14 @@ impl<'a> Aside<'a> {
             }
         }
         let path = target.with_file_name(format!("{prefix}{}{PARTIAL}", unique()));
-        let aside = Aside { system, path, renamed: false };
-        system.create_file(&aside.path, content).map_err(unwritable(target))?;
-        Ok(aside)
+        Aside { system, path, renamed: false }
     }
 
-    fn rename(mut self, target: &Path) -> Result<(), ResultError> {
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(crate) fn rename(mut self, target: &Path) -> Result<(), ResultError> {
         self.system.rename(&self.path, target).map_err(unwritable(target))?;
         self.renamed = true;
         Ok(())
@@ -120,7 +137,7 @@ impl Drop for Aside<'_> {
     }
 }
 
-fn sync_folder_of(system: &dyn FileSystem, path: &Path) {
+pub(crate) fn sync_folder_of(system: &dyn FileSystem, path: &Path) {
     if let Some(folder) = path.parent() {
         let _ = system.sync_folder(if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
     }

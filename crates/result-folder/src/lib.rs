@@ -6,6 +6,7 @@ mod file_system;
 mod generation;
 mod inputs;
 mod lock;
+mod streamed;
 
 pub use error::ResultError;
 pub use exchange::replace_folder;
@@ -13,6 +14,7 @@ pub use file_system::{Disk, FileSystem};
 pub use generation::{remove_partial_files, replace_file, replace_files, replace_vouched};
 pub use inputs::check_inputs;
 pub use lock::Lock;
+pub use streamed::StreamedFile;
 
 /// A result file: its name in the folder, and its content.
 #[derive(Clone, Debug, PartialEq, Eq)]

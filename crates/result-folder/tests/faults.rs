@@ -2,12 +2,13 @@
 //! up.
 
 use phiw_result_folder::{
-    Disk, FileSystem, Lock, ResultError, ResultFile, check_inputs, replace_file, replace_files,
+    Disk, FileSystem, Lock, ResultError, ResultFile, StreamedFile, check_inputs, replace_file, replace_files,
     replace_folder, replace_vouched,
 };
 use std::cell::Cell;
 use std::fs;
 use std::io;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -240,4 +241,40 @@ fn what_vouches_for_a_file_belongs_to_it_and_killed_runs_leave_nothing() {
         assert_eq!(entries(folder.path()), ["a.csv", "a.json"], "operation {operation}");
         assert_eq!(fs::read_to_string(&log).unwrap(), "newer");
     }
+}
+
+/// Whatever fails, and when the writer gives up: what was there is there, and nothing else.
+#[test]
+fn a_file_that_is_written_piece_by_piece_is_old_or_new() {
+    let write = |system: &dyn FileSystem, path: &Path| -> Result<(), ResultError> {
+        let mut file = StreamedFile::create(system, path)?;
+        for _ in 0..10_000 {
+            file.write_all(b"a line\n").map_err(|source| file.unwritable(source))?;
+        }
+        file.commit()
+    };
+    for killed in [false, true] {
+        let mut commits = 0;
+        for operation in 1.. {
+            let place = TempDir::new().unwrap();
+            let path = place.path().join("a.csv");
+            fs::write(&path, "old").unwrap();
+            let system = Faulty { left: Cell::new(operation), killed, no_exchange: false };
+            let outcome = write(&system, &path);
+            let now = fs::read_to_string(&path).unwrap();
+            assert!(now == "old" || now.len() == 70_000, "operation {operation}");
+            assert!(outcome.is_err() || now != "old", "operation {operation}: called done");
+            commits += usize::from(now != "old");
+            write(&Disk, &path).unwrap();
+            assert_eq!(entries(place.path()), ["a.csv"], "operation {operation}");
+            if system.left.get() > 0 {
+                assert!(operation > 4 && commits > 0, "the faults were never reached");
+                break;
+            }
+        }
+    }
+    let place = TempDir::new().unwrap();
+    let given_up = StreamedFile::create(&Disk, &place.path().join("new/b.csv")).unwrap();
+    drop(given_up);
+    assert!(entries(&place.path().join("new")).is_empty());
 }

@@ -61,15 +61,33 @@ impl Simulation {
     pub fn new(mjcf: &str, sizes: Sizes, inertias: &[PrincipalInertia]) -> Result<Self, MujocoError> {
         let functions = functions()?;
         let compiled = compile(functions, mjcf)?;
+        check_sizes(compiled.1, sizes)?;
         check_model(compiled.1, sizes)?;
+        let mut simulation = Self::of_model(functions, compiled, sizes)?;
+        simulation.set_inertias(inertias);
+        Ok(simulation)
+    }
+
+    /// Compiles a text of somebody else's, which must have these sizes.
+    pub fn of_text(mjcf: &str, sizes: Sizes) -> Result<Self, MujocoError> {
+        let functions = functions()?;
+        let compiled = compile(functions, mjcf)?;
+        check_sizes(compiled.1, sizes)?;
+        Self::of_model(functions, compiled, sizes)
+    }
+
+    fn of_model(
+        functions: &'static Functions,
+        compiled: Compiled,
+        sizes: Sizes,
+    ) -> Result<Self, MujocoError> {
         // SAFETY: a model that the library has just made.
         let data = NonNull::new(unsafe { (functions.mj_makeData)(compiled.1.as_ptr()) })
             .ok_or_else(|| MujocoError::Refused { message: "there is not enough memory".into() })?;
         let model = compiled.1;
         std::mem::forget(compiled); // handed over to the simulation
-        let mut simulation = Simulation { functions, model, data, sizes };
+        let simulation = Simulation { functions, model, data, sizes };
         simulation.check_data()?;
-        simulation.set_inertias(inertias);
         Ok(simulation)
     }
 
@@ -406,18 +424,25 @@ fn compile(functions: &'static Functions, mjcf: &str) -> Result<Compiled, Mujoco
     }
 }
 
-/// The fields of the model hold what the text has put into them: its sizes, its time step, and the inertias
-/// that only this crate's text has.
+/// The model has the coordinates and bodies that it should have.
+fn check_sizes(compiled: NonNull<Model>, sizes: Sizes) -> Result<(), MujocoError> {
+    let structure = compiled.as_ptr();
+    // SAFETY: numbers inside the model, which the library made and whose version has been checked.
+    let size = |offset| unsafe { field::<i64>(structure, offset).read() as usize };
+    let check = |what, right: bool| if right { Ok(()) } else { Err(MujocoError::Layout { what }) };
+    check("mjModel.nq", size(model::NQ) == sizes.positions)?;
+    check("mjModel.nv", size(model::NV) == sizes.velocities)?;
+    check("mjModel.nbody", size(model::NBODY) == sizes.bodies + 1)
+}
+
+/// The fields of the model hold what this crate's text has put into them: its time step, and the inertias
+/// that no other text has.
 fn check_model(compiled: NonNull<Model>, sizes: Sizes) -> Result<(), MujocoError> {
     let structure = compiled.as_ptr();
     let check = |what, right: bool| if right { Ok(()) } else { Err(MujocoError::Layout { what }) };
     // SAFETY: numbers inside the model, which the library made and whose version has been checked; the arrays
     // are read only once they are known to lie inside the model's own buffer.
     unsafe {
-        let size = |offset| field::<i64>(structure, offset).read() as usize;
-        check("mjModel.nq", size(model::NQ) == sizes.positions)?;
-        check("mjModel.nv", size(model::NV) == sizes.velocities)?;
-        check("mjModel.nbody", size(model::NBODY) == sizes.bodies + 1)?;
         let time_step = field::<f64>(structure, model::TIMESTEP).read();
         check("mjModel.opt.timestep", time_step == placeholder::TIME_STEP)?;
         check("mjModel.opt.integrator", field::<i32>(structure, model::INTEGRATOR).read() == 1)?;

@@ -91,9 +91,11 @@ impl Conditioning {
     pub(crate) fn check(&self, survey: &Survey) -> Result<(), LogError> {
         let highest_hz = HIGHEST_SHARE_BY_HAND * survey.rate_hz();
         for cutoff_hz in [self.cutoff_hz, self.parallel_cutoff_hz] {
-            if !(cutoff_hz > 0.0 && cutoff_hz <= highest_hz) {
-                let rate_hz = survey.rate_hz();
-                return Err(LogError::Cutoff { path: survey.path.clone(), cutoff_hz, rate_hz, highest_hz });
+            let rate_hz = survey.rate_hz();
+            let lowest_hz = LOWEST_SHARE_BY_HAND * rate_hz;
+            if !(lowest_hz..=highest_hz).contains(&cutoff_hz) {
+                let path = survey.path.clone();
+                return Err(LogError::Cutoff { path, cutoff_hz, rate_hz, lowest_hz, highest_hz });
             }
         }
         Ok(())
@@ -102,6 +104,10 @@ impl Conditioning {
 
 /// What friction does at a reversal lies below this, however slow the motion is otherwise.
 const LEAST_PARALLEL_HZ: f64 = 10.0;
+
+/// Below this share of the sample rate the low-pass is longer than a hundred thousand samples, and no number of
+/// its length need exist.
+const LOWEST_SHARE_BY_HAND: f64 = 1e-5;
 
 /// The low-pass ends at 1.4 times the cut-off; that must stay below half the sample rate.
 const HIGHEST_SHARE_BY_HAND: f64 = 0.35;

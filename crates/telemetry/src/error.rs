@@ -158,7 +158,7 @@ pub enum LogError {
     },
     /// A cut-off that the log's sample rate can't carry.
     #[error(
-        "{}: a cut-off of {cutoff_hz} Hz does not fit a sample rate of {rate_hz:.1} Hz; choose one above 0 and up to {highest_hz:.1} Hz",
+        "{}: a cut-off of {cutoff_hz} Hz does not fit a sample rate of {rate_hz:.1} Hz; choose one above {lowest_hz:.3} and up to {highest_hz:.1} Hz",
         path.display()
     )]
     Cutoff {
@@ -168,6 +168,8 @@ pub enum LogError {
         cutoff_hz: f64,
         /// The log's sample rate, in Hz.
         rate_hz: f64,
+        /// The lowest cut-off that fits, in Hz.
+        lowest_hz: f64,
         /// The highest cut-off that fits, in Hz.
         highest_hz: f64,
     },

@@ -100,11 +100,24 @@ fn wrong_rows() {
 fn cutoffs_that_do_not_fit() {
     let file = written(&format!("{HEADER}{}", rows(0, 200)));
     let survey = survey(file.path(), &joints(), TorqueColumns::Required, &mut |_, _| {}).unwrap();
-    for cutoff in [0.0, -1.0, 36.0, f64::NAN] {
+    check_cutoffs(&survey, &[0.0, -1.0, 36.0, f64::NAN]);
+}
+
+/// The length of the low-pass overflowed.
+#[test]
+fn a_cutoff_of_next_to_nothing_asked_for_a_filter_of_no_length() {
+    let file = written(&format!("{HEADER}{}", rows(0, 200)));
+    let survey = survey(file.path(), &joints(), TorqueColumns::Required, &mut |_, _| {}).unwrap();
+    check_cutoffs(&survey, &[1e-320, 1e-12, 9e-4]);
+}
+
+/// All of these are refused, with the range that fits.
+fn check_cutoffs(survey: &phiw_telemetry::Survey, cutoffs: &[f64]) {
+    for &cutoff in cutoffs {
         let options = ConditioningOptions { cutoff_hz: Some(cutoff), ..Default::default() };
-        let message = Conditioning::choose(std::slice::from_ref(&survey), &options).unwrap_err().to_string();
+        let message = Conditioning::choose(std::slice::from_ref(survey), &options).unwrap_err().to_string();
         assert!(
-            message.contains("sample rate of 100.0 Hz") && message.contains("up to 35.0 Hz"),
+            message.contains("sample rate of 100.0 Hz") && message.contains("above 0.001 and up to 35.0 Hz"),
             "{message}"
         );
     }

@@ -104,6 +104,10 @@ impl Ground {
         ground.files.insert("model.json".to_owned(), model);
         let held = "explain --urdf robot.urdf --train validate.csv --model model.json --out out";
         ground.add("held model", held, &["robot.urdf", "validate.csv", "model.json"])?;
+        let predict = "predict --model model.json validate.csv --out predicted.csv";
+        ground.add("predict", predict, &["validate.csv", "model.json"])?;
+        let simulate = "simulate --model model.json validate.csv --out out";
+        ground.add("simulate", simulate, &["validate.csv", "model.json"])?;
         Ok(ground)
     }
 

@@ -14,6 +14,8 @@ pub fn classes() -> Vec<Class> {
         Class::new("bytes of a model.json damaged", 100, damaged),
         Class::new("fields of a model.json odd or absent", 200, fields),
         Class::new("a model.json of another robot", 10, another_robot),
+        Class::new("bytes of a model.json or of a log damaged, to predict and simulate", 150, damaged_use),
+        Class::new("fields of a model.json odd or absent, to predict and simulate", 200, fields_use),
         Class::new("support files damaged or odd", 80, support),
         Class::new("marker maps damaged or odd", 80, map),
     ]
@@ -44,6 +46,12 @@ fn any_value<'a>(mut value: &'a mut Value, way: &mut String, random: &mut ChaCha
 }
 
 fn fields(ground: &Ground, random: &mut ChaCha8Rng) -> Case {
+    let (story, model) = odd_model(ground, random);
+    Case::new(ground, "held model", Expectation::Orderly, story).file("model.json", model)
+}
+
+/// The good model with one value in it that is odd: which, and the file's text.
+fn odd_model(ground: &Ground, random: &mut ChaCha8Rng) -> (String, String) {
     let mut model: Value = serde_json::from_slice(ground.file("model.json")).unwrap_or_default();
     let mut way = String::new();
     let value = any_value(&mut model, &mut way, random);
@@ -66,7 +74,23 @@ fn fields(ground: &Ground, random: &mut ChaCha8Rng) -> Case {
     let odd = odd.choose(random).cloned().unwrap_or_default();
     let story = format!("{way} is {odd}");
     *value = odd;
-    Case::new(ground, "held model", Expectation::Orderly, story).file("model.json", model.to_string())
+    (story, model.to_string())
+}
+
+/// The commands that use a model by itself.
+const USES: [&str; 2] = ["predict", "simulate"];
+
+fn damaged_use(ground: &Ground, random: &mut ChaCha8Rng) -> Case {
+    let (good, file) =
+        (USES[random.random_range(0..2)], ["model.json", "validate.csv"][random.random_range(0..2)]);
+    let (bytes, story) = bytes::damage(ground.file(file), random);
+    Case::new(ground, good, Expectation::Orderly, format!("{file} of {good}: {story}")).file(file, bytes)
+}
+
+fn fields_use(ground: &Ground, random: &mut ChaCha8Rng) -> Case {
+    let good = USES[random.random_range(0..2)];
+    let (story, model) = odd_model(ground, random);
+    Case::new(ground, good, Expectation::Orderly, format!("{good}: {story}")).file("model.json", model)
 }
 
 fn another_robot(ground: &Ground, random: &mut ChaCha8Rng) -> Case {

@@ -1,0 +1,65 @@
+//! How effects are expressed in the model of a simulator.
+
+use phiw_identification::effect::JointProperty;
+
+/// A part of a simulator's model that does what an effect does. Joints are named.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Mechanism {
+    /// A property of a joint.
+    Joint {
+        /// The joint.
+        joint: String,
+        /// Which property.
+        property: JointProperty,
+        /// Its value, in the property's unit.
+        value: f64,
+    },
+    /// A spring between a joint and what it stands on.
+    Spring {
+        /// The joint.
+        joint: String,
+        /// \[N·m/rad, N/m\].
+        stiffness: f64,
+        /// Where it is slack \[rad, m\].
+        reference: f64,
+    },
+    /// A motor that does not deliver its command: the joint gets `gain`·command + `bias`.
+    Motor {
+        /// The joint.
+        joint: String,
+        /// Torque for each unit of its command.
+        gain: f64,
+        /// Torque under no command \[N·m, N\].
+        bias: f64,
+    },
+    /// A transmission that turns with a sum of two joints' positions.
+    Transmission {
+        /// The joints.
+        joints: [String; 2],
+        /// The factors of their positions.
+        factors: [f64; 2],
+        /// What the transmission has.
+        property: JointProperty,
+        /// Its value, of the sum.
+        value: f64,
+        /// Whether the effect is only what crosses from one joint to the other: the share that each joint
+        /// feels of its own motion has to be taken off the joint's own property.
+        crossing_only: bool,
+    },
+}
+
+/// What in a simulator's model does what an effect does.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mechanisms {
+    /// The parts; none if it can not be expressed at all.
+    pub parts: Vec<Mechanism>,
+    /// Names of the parameters that can not be expressed though others can.
+    pub left_out: Vec<String>,
+}
+
+impl Mechanisms {
+    /// One part that expresses all.
+    pub fn of(part: Mechanism) -> Self {
+        Mechanisms { parts: vec![part], left_out: Vec::new() }
+    }
+}

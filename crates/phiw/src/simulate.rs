@@ -1,0 +1,254 @@
+//! `phiw simulate`: logs reproduced by the model and by its URDF, and how fast they go another way.
+
+mod files;
+
+use crate::Error;
+use crate::arguments::SimulateArguments;
+use crate::console::Console;
+use crate::model_use::{ModelUse, Reading};
+use crate::output::check_folder;
+use crate::warnings::of_log;
+use phiw_dynamics::{AnalyticBackend, Tree};
+use phiw_identification::BlockSource;
+use phiw_identification::reproduction::{
+    ErrorGrowth, Plant, ReproductionSettings, Window, collect_windows, reproduce,
+};
+use phiw_mjcf::impossible_bodies;
+use phiw_result_folder::{Disk, Lock, check_inputs, replace_folder};
+use std::path::PathBuf;
+
+/// Names of the files.
+pub const FILES: [&str; 3] = ["simulation.json", "simulation.csv", "simulation.svg"];
+
+/// Lengths of the windows \[s\]: the longest of which the logs have one.
+const WINDOWS_S: [f64; 3] = [2.0, 1.0, 0.5];
+/// Horizons that are told \[s\].
+const TOLD_S: [f64; 3] = [0.5, 1.0, 2.0];
+/// Distance of the poses at which M(q) is looked at \[s\].
+const BETWEEN_POSES_S: f64 = 0.1;
+/// Speed within which a friction of the URDF turns where the model says nothing of it \[rad/s, m/s\].
+const SIGN_WIDTH: f64 = 1e-3;
+
+/// What the command has done.
+#[derive(Debug)]
+pub struct SimulateOutcome {
+    /// Errors by horizon, as text for a terminal.
+    pub summary: String,
+    /// What a reader should know before trusting a number, and whether the URDF does better.
+    pub warnings: Vec<String>,
+    /// All errors.
+    pub reproduction: Reproduction,
+}
+
+/// Logs as the models reproduce them.
+#[derive(Clone, Debug)]
+pub struct Reproduction {
+    /// Number of windows.
+    pub windows: usize,
+    /// Their length \[s\].
+    pub window_s: f64,
+    /// Travel of each joint in the logs \[rad, m\].
+    pub travel: Vec<f64>,
+    /// Kinds of effects that have no place in a simulation.
+    pub left_out: Vec<String>,
+    /// Why the URDF by itself cannot be simulated, if it cannot.
+    pub nominal_refused: Option<String>,
+    /// The URDF (if it can be simulated) and the model, each in open and in closed loop.
+    pub cases: Vec<Case>,
+}
+
+/// One model in one loop.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// Whether it is the identified model; else it is the URDF.
+    pub identified: bool,
+    /// Whether a PD loop holds it to the log.
+    pub closed: bool,
+    /// Its errors.
+    pub growth: ErrorGrowth,
+}
+
+impl Case {
+    /// `identified, open loop`.
+    pub fn name(&self) -> String {
+        let model = if self.identified { "identified" } else { "nominal" };
+        format!("{model}, {} loop", if self.closed { "closed" } else { "open" })
+    }
+}
+
+impl Reproduction {
+    /// The errors of a model in a loop, if it could be simulated.
+    pub fn growth(&self, identified: bool, closed: bool) -> Option<&ErrorGrowth> {
+        let is_it = |case: &&Case| (case.identified, case.closed) == (identified, closed);
+        self.cases.iter().find(is_it).map(|case| &case.growth)
+    }
+
+    /// The horizons that are told \[s\], each with its place in the errors.
+    pub fn told(&self) -> Vec<(f64, usize)> {
+        let Some(case) = self.cases.first() else { return Vec::new() };
+        let place =
+            |told: &f64| case.growth.horizons.iter().position(|horizon| (horizon - told).abs() < 1e-9);
+        TOLD_S.iter().filter_map(|told| Some((*told, place(told)?))).collect()
+    }
+}
+
+/// Reproduces logs with a model and with the URDF that it was made from, open loop and closed loop.
+///
+/// Nothing is written before everything has been computed.
+///
+/// # Errors
+/// An input is wrong, the model's M(q) is not positive definite, or the results cannot be written:
+/// [`Error::exit_status`] tells them apart.
+pub fn simulate(arguments: &SimulateArguments, console: &Console) -> Result<SimulateOutcome, Error> {
+    check_folder(&arguments.out)?;
+    let inputs: Vec<PathBuf> = std::iter::once(&arguments.model).chain(&arguments.logs).cloned().collect();
+    check_inputs(&inputs, &FILES.map(|name| arguments.out.join(name)))?;
+    let place = Lock::acquire(&arguments.out, "phiw simulate")?;
+    let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
+    let reading = Reading {
+        logs: &arguments.logs,
+        hold: &arguments.hold,
+        complete: true,
+        cutoff_hz: None,
+        parallel_cutoff_hz: None,
+    };
+    let used = ModelUse::open(&arguments.model, &reading, &progress)?;
+    let sources = used.logs.sources(&progress);
+    let sources: Vec<&dyn BlockSource> = sources.iter().map(|source| source as &dyn BlockSource).collect();
+    let (settings, windows) = windows(&used, &sources, arguments)?;
+    let reproduction = reproduced(&used, &windows, &settings, arguments)?;
+    console.finish();
+    let mut warnings: Vec<String> = used.logs.surveys().iter().flat_map(of_log).collect();
+    warnings.extend(files::warnings(&reproduction));
+    let written = files::files(&used, &reproduction, arguments, &warnings)?;
+    replace_folder(&Disk, &place, &written)?;
+    let summary = files::summary(&used, &reproduction, arguments);
+    Ok(SimulateOutcome { summary, warnings, reproduction })
+}
+
+/// The longest windows of which the logs have one.
+fn windows(
+    used: &ModelUse,
+    sources: &[&dyn BlockSource],
+    arguments: &SimulateArguments,
+) -> Result<(ReproductionSettings, Vec<Window>), Error> {
+    let total: f64 = used.logs.surveys().iter().map(|survey| survey.duration()).sum();
+    for window_s in WINDOWS_S {
+        let settings = ReproductionSettings { window_s, ..ReproductionSettings::default() };
+        let windows = collect_windows(sources, window_s, total, settings.most_windows)?;
+        if !windows.is_empty() {
+            return Ok((settings, windows));
+        }
+    }
+    let logs: Vec<String> = arguments.logs.iter().map(|log| log.display().to_string()).collect();
+    Err(Error::NothingToReproduce { logs: logs.join(", "), needed: WINDOWS_S[WINDOWS_S.len() - 1] })
+}
+
+fn reproduced(
+    used: &ModelUse,
+    windows: &[Window],
+    settings: &ReproductionSettings,
+    arguments: &SimulateArguments,
+) -> Result<Reproduction, Error> {
+    // Bodies that can exist, and friction that dissipates: what least squares alone finds often cannot move.
+    let identified_tree = used.model.consistent_tree(&used.tree)?;
+    let mut parameters = used.parameters.clone();
+    for effect in 0..used.design.effects().len() {
+        for (at, parameter) in used.design.effect_parameters(effect).enumerate() {
+            parameters[parameter] = used.model.consistent_effect(effect, at).unwrap_or(parameters[parameter]);
+        }
+    }
+    let widths: Vec<f64> = (0..used.tree.joint_count())
+        .map(|joint| used.model.rest_speeds.get(joint).copied().unwrap_or(SIGN_WIDTH))
+        .collect();
+    let identified = || {
+        let backend = Box::new(AnalyticBackend::new(identified_tree.clone()));
+        Ok(Plant::new(backend).with_effects(&used.design, &parameters)?)
+    };
+    let nominal = || {
+        let backend = Box::new(AnalyticBackend::new(used.tree.clone()));
+        Ok(Plant::new(backend).with_declared_friction(&used.tree, &widths))
+    };
+    let inertia = match inertia(identified().map_err(Error::Simulation)?, windows)? {
+        Ok(inertia) => inertia,
+        Err((log, t)) => {
+            return Err(Error::NotPositiveDefinite {
+                path: arguments.model.clone(),
+                log: arguments.logs[log].clone(),
+                t,
+                bodies: bodies_in_words(&identified_tree),
+            });
+        }
+    };
+    let nominal_refused =
+        inertia_refused(&used.tree, nominal().map_err(Error::Simulation)?, windows, arguments)?;
+    let travel: Vec<f64> = (0..used.tree.joint_count()).map(|joint| travel(used, joint)).collect();
+    let mut cases = Vec::new();
+    for closed in [false, true] {
+        let loop_inertia = closed.then_some(inertia.as_slice());
+        if nominal_refused.is_none() {
+            let growth = reproduce(&nominal, windows, &travel, loop_inertia, settings);
+            cases.push(Case { identified: false, closed, growth: growth.map_err(Error::Simulation)? });
+        }
+        let growth = reproduce(&identified, windows, &travel, loop_inertia, settings);
+        cases.push(Case { identified: true, closed, growth: growth.map_err(Error::Simulation)? });
+    }
+    Ok(Reproduction {
+        windows: windows.len(),
+        window_s: settings.window_s,
+        travel,
+        left_out: Plant::left_out(&used.design),
+        nominal_refused,
+        cases,
+    })
+}
+
+/// Mean of M(q)'s diagonal over the poses of the windows, or the log and time of the first pose in which it is
+/// not positive definite.
+fn inertia(mut plant: Plant<'_>, windows: &[Window]) -> Result<Result<Vec<f64>, (usize, f64)>, Error> {
+    let joints = plant.joints();
+    let (mut sum, mut own, mut count) = (vec![0.0; joints], vec![0.0; joints], 0.0);
+    for window in windows {
+        let stride = (BETWEEN_POSES_S / window.period).ceil().max(1.0) as usize;
+        for sample in (0..window.len()).step_by(stride) {
+            let q = &window.q[sample * joints..(sample + 1) * joints];
+            if !plant.inertia(q, &mut own).map_err(Error::Simulation)? {
+                return Ok(Err((window.log, window.start + sample as f64 * window.period)));
+            }
+            sum.iter_mut().zip(&own).for_each(|(sum, own)| *sum += own);
+            count += 1.0;
+        }
+    }
+    Ok(Ok(sum.iter().map(|sum| sum / count).collect()))
+}
+
+/// Why the URDF cannot be simulated.
+fn inertia_refused(
+    tree: &Tree,
+    plant: Plant<'_>,
+    windows: &[Window],
+    arguments: &SimulateArguments,
+) -> Result<Option<String>, Error> {
+    let said = |(log, t): (usize, f64)| {
+        format!(
+            "the URDF by itself cannot be simulated: its M(q) is not positive definite at {t:.3} s of {}{}",
+            arguments.logs[log].display(),
+            bodies_in_words(tree)
+        )
+    };
+    Ok(inertia(plant, windows)?.err().map(said))
+}
+
+/// `, and no real body has the inertial parameters of link_1, link_2`.
+fn bodies_in_words(tree: &Tree) -> String {
+    match impossible_bodies(tree).as_slice() {
+        [] => String::new(),
+        links => format!(", and no real body has the inertial parameters of {}", links.join(", ")),
+    }
+}
+
+/// The longest way of a joint in the logs.
+fn travel(used: &ModelUse, joint: usize) -> f64 {
+    let ways = used.logs.surveys().iter().map(|survey| survey.joints[joint].travel());
+    ways.fold(f64::MIN_POSITIVE, f64::max)
+}
