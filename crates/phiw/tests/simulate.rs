@@ -105,7 +105,7 @@ fn the_identified_model_goes_with_the_log_longer_than_the_urdf() {
 fn a_model_that_does_worse_than_its_urdf_is_said_to() {
     let scene = Scene::new();
     scene.spoiled(|model| {
-        for body in model["bodies"].as_array_mut().unwrap() {
+        for body in model["consistent"]["bodies"].as_array_mut().unwrap() {
             for number in body["inertial"].as_array_mut().unwrap() {
                 *number = (4.0 * number.as_f64().unwrap()).into();
             }
@@ -122,7 +122,7 @@ fn what_cannot_be_simulated_is_refused_with_the_reason() {
     let scene = Scene::new();
     let line = SIMULATE.replace("out/model.json", "model.json");
     scene.spoiled(|model| {
-        for number in model["bodies"][2]["inertial"].as_array_mut().unwrap() {
+        for number in model["consistent"]["bodies"][2]["inertial"].as_array_mut().unwrap() {
             *number = (-number.as_f64().unwrap()).into();
         }
     });
