@@ -73,11 +73,11 @@ impl Search<'_> {
     /// What makes the error on motion held out larger is left out.
     pub(super) fn name(
         &mut self,
-        declared_relative: f64,
+        most_relative: f64,
     ) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
         let trial = loop {
             let trial = self.trial()?;
-            let harmful = self.harmful(&trial, declared_relative);
+            let harmful = self.harmful(&trial, most_relative);
             if harmful.is_empty() {
                 break trial;
             }
@@ -94,14 +94,14 @@ impl Search<'_> {
     /// The places of the effects, ascending, that make the error on motion held out larger: the worst, the
     /// worst of what is left without it, and so on. What others are forms of stays.
     ///
-    /// Errors count by their logarithms; where the error of all torques together is still larger than
-    /// `declared_relative`, that of the declared model over the torques, by their squares.
-    fn harmful(&self, trial: &Trial, declared_relative: f64) -> Vec<usize> {
+    /// Errors count by their logarithms; while the error of all torques together is larger than `most_relative`
+    /// of the torques (RMS), by their squares.
+    fn harmful(&self, trial: &Trial, most_relative: f64) -> Vec<usize> {
         let mut left_out: Vec<usize> = Vec::new();
         let mut present = trial.held_out_squares(&trial.fit);
         let sum = |squares: &[f64]| squares.iter().sum::<f64>();
         let torque: f64 = trial.held_out.iter().map(Products::right_hand_side).sum();
-        let declared = declared_relative * declared_relative * torque;
+        let most = most_relative * most_relative * torque;
         loop {
             let found = trial.members.par_iter().zip(&trial.places).filter(|(member, place)| {
                 **place >= self.declared && !trial.is_required(member) && !left_out.contains(place)
@@ -114,11 +114,11 @@ impl Search<'_> {
             let mut without: Vec<(f64, usize, Vec<f64>)> = without.collect();
             without.sort_by(|a, b| a.0.total_cmp(&b.0));
             let harms = without.first().is_some_and(|(gain, ..)| *gain <= 0.0);
-            if !harms && sum(&present) > declared {
+            if !harms && sum(&present) > most {
                 without.sort_by(|a, b| sum(&a.2).total_cmp(&sum(&b.2)));
             }
             match without.into_iter().next() {
-                Some((_, place, squares)) if harms || sum(&present) > declared => {
+                Some((_, place, squares)) if harms || sum(&present) > most => {
                     left_out.push(place);
                     present = squares;
                 }

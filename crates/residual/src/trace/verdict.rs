@@ -9,9 +9,23 @@ use phiw_identification::{IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
 
 impl Search<'_> {
-    pub(super) fn finish(mut self) -> Result<Tracing, IdentificationError> {
+    pub(super) fn finish(self) -> Result<Tracing, IdentificationError> {
         let before = self.declared_error()?;
-        let (mut effects, named) = self.name(before.1.relative)?;
+        let tracing = self.clone().finish_with(before.clone(), f64::INFINITY)?;
+        if tracing.model.held_out.relative <= before.1.relative {
+            return Ok(tracing);
+        }
+        // What lowers the error of most torques may raise that of all together: then it is that which counts.
+        let most = before.1.relative;
+        self.finish_with(before, most)
+    }
+
+    fn finish_with(
+        mut self,
+        before: (TorqueError, TorqueError),
+        most_relative: f64,
+    ) -> Result<Tracing, IdentificationError> {
+        let (mut effects, named) = self.name(most_relative)?;
         let refinements = effects.split_off(named);
         if effects.is_empty() && refinements.is_empty() && self.is_worse_than(&before.1)? {
             self.specs.clone_from(&self.input.declared);
