@@ -52,6 +52,16 @@ struct Squares {
     with: Vec<f64>,
 }
 
+/// What speaks against an effect on motion held out.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Harm {
+    /// That the logarithms of the torques' errors grow.
+    EachTorque,
+    /// That, or that the error of all torques together is larger than `most_relative` of the torques (RMS);
+    /// zero stands for the declared model with the weights of the search.
+    AllTorques { most_relative: f64 },
+}
+
 /// What leaving out an effect does.
 struct Judged {
     /// Place among the model's effects.
@@ -71,13 +81,10 @@ impl Search<'_> {
     /// refine. `self.specs` are put in that order.
     ///
     /// What makes the error on motion held out larger is left out.
-    pub(super) fn name(
-        &mut self,
-        most_relative: f64,
-    ) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
+    pub(super) fn name(&mut self, harm: Harm) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
         let trial = loop {
             let trial = self.trial()?;
-            let harmful = self.harmful(&trial, most_relative);
+            let harmful = self.harmful(&trial, harm);
             if harmful.is_empty() {
                 break trial;
             }
@@ -94,14 +101,21 @@ impl Search<'_> {
     /// The places of the effects, ascending, that make the error on motion held out larger: the worst, the
     /// worst of what is left without it, and so on. What others are forms of stays.
     ///
-    /// Errors count by their logarithms; while the error of all torques together is larger than `most_relative`
-    /// of the torques (RMS), by their squares.
-    fn harmful(&self, trial: &Trial, most_relative: f64) -> Vec<usize> {
+    /// Errors count by their logarithms; while that of all torques together is larger than `harm` allows, by
+    /// their squares.
+    fn harmful(&self, trial: &Trial, harm: Harm) -> Vec<usize> {
         let mut left_out: Vec<usize> = Vec::new();
         let mut present = trial.held_out_squares(&trial.fit);
         let sum = |squares: &[f64]| squares.iter().sum::<f64>();
         let torque: f64 = trial.held_out.iter().map(Products::right_hand_side).sum();
-        let most = most_relative * most_relative * torque;
+        let most = match harm {
+            Harm::EachTorque => f64::INFINITY,
+            Harm::AllTorques { most_relative } => {
+                let declared = trial.fit_with(|place| place < self.declared);
+                let least = most_relative * most_relative * torque;
+                if least > 0.0 { least } else { sum(&trial.held_out_squares(&declared)) }
+            }
+        };
         loop {
             let found = trial.members.par_iter().zip(&trial.places).filter(|(member, place)| {
                 **place >= self.declared && !trial.is_required(member) && !left_out.contains(place)

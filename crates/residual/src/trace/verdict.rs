@@ -1,5 +1,6 @@
 //! The end of a search: the final fit, what each effect explained, what remains.
 
+use super::naming::Harm;
 use super::probe::{self, Fit};
 use super::residuals::residual_shape;
 use super::search::Search;
@@ -8,24 +9,31 @@ use phiw_identification::fitting::{TorqueError, accumulate, fit, torque_error};
 use phiw_identification::{IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
 
+/// Error of all torques together on motion held out, over that of the declared model, up to which a model that
+/// lowers the errors of single torques is as good: the largest torque's noise decides over less.
+const AS_GOOD: f64 = 1.1;
+
 impl Search<'_> {
     pub(super) fn finish(self) -> Result<Tracing, IdentificationError> {
         let before = self.declared_error()?;
-        let tracing = self.clone().finish_with(before.clone(), f64::INFINITY)?;
-        if tracing.model.held_out.relative <= before.1.relative {
-            return Ok(tracing);
-        }
-        // What lowers the error of most torques may raise that of all together: then it is that which counts.
         let most = before.1.relative;
-        self.finish_with(before, most)
+        // What lowers the error of most torques may raise that of all together. Then it is that which counts:
+        // first against the declared model with the weights of the search, then against it as it was fitted.
+        for harm in [Harm::EachTorque, Harm::AllTorques { most_relative: 0.0 }] {
+            let tracing = self.clone().finish_with(before.clone(), harm)?;
+            if tracing.model.held_out.relative <= AS_GOOD * most {
+                return Ok(tracing);
+            }
+        }
+        self.finish_with(before, Harm::AllTorques { most_relative: most })
     }
 
     fn finish_with(
         mut self,
         before: (TorqueError, TorqueError),
-        most_relative: f64,
+        harm: Harm,
     ) -> Result<Tracing, IdentificationError> {
-        let (mut effects, named) = self.name(most_relative)?;
+        let (mut effects, named) = self.name(harm)?;
         let refinements = effects.split_off(named);
         if effects.is_empty() && refinements.is_empty() && self.is_worse_than(&before.1)? {
             self.specs.clone_from(&self.input.declared);
