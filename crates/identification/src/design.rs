@@ -150,8 +150,8 @@ impl Design {
         self
     }
 
-    /// For each torque the speed of its joint below which it stands still \[rad/s, m/s\]; empty where all rows
-    /// count.
+    /// For each torque the speed of its joint below which it stands still \[rad/s, m/s\]; empty where all
+    /// rows count.
     pub fn rest_speeds(&self) -> &[f64] {
         &self.rest_speeds
     }

@@ -188,7 +188,8 @@ impl Model {
         })
     }
 
-    /// The same with the robot that it is of and the logs that it comes from, so that it can be used by itself.
+    /// The same with the robot that it is of and the logs that it comes from, so that it can be used by
+    /// itself.
     pub fn with_sources(self, urdf: &str, data: Vec<DataFingerprint>) -> Self {
         Model { urdf: Some(urdf.to_owned()), data, ..self }
     }

@@ -53,7 +53,8 @@ pub struct EffectShare {
 pub struct PredictionParts {
     /// The effects' shares, in the design's order; those of one kind at one joint are one.
     pub shares: Vec<EffectShare>,
-    /// Deviations of all parameters, see [`Covariance::deviations`](crate::covariance::Covariance::deviations).
+    /// Deviations of all parameters, see
+    /// [`Covariance::deviations`](crate::covariance::Covariance::deviations).
     pub deviations: Vec<Vec<f64>>,
 }
 
@@ -207,8 +208,8 @@ struct Outputs {
     log: usize,
     segment: usize,
     t: Vec<f64>,
-    /// For each output what [`Sums::of`] gives, but one standard deviation for each torque in the place of all
-    /// of its deviations.
+    /// For each output what [`Sums::of`] gives, but one standard deviation for each torque in the place of
+    /// all of its deviations.
     values: Vec<f64>,
     /// For each output: positions, velocities, accelerations.
     signals: Vec<f64>,

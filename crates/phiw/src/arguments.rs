@@ -24,8 +24,8 @@ pub enum Command {
     /// Predict the torques of logs with an identified model: per row the torque, its standard deviation, what
     /// was measured beyond it, and each effect's share.
     Predict(PredictArguments),
-    /// Reproduce logs with an identified model and with its URDF, driven by the measured torque: how fast they
-    /// go another way than the robot.
+    /// Reproduce logs with an identified model and with its URDF, driven by the measured torque: how fast
+    /// they go another way than the robot.
     Simulate(SimulateArguments),
     /// Say what is in logs before anything is fitted: late velocities, torques that are missing or clipped,
     /// units, clocks, and what to do about it.

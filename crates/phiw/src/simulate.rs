@@ -203,8 +203,8 @@ fn reproduced(
     })
 }
 
-/// Mean of M(q)'s diagonal over the poses of the windows, or the log and time of the first pose in which it is
-/// not positive definite.
+/// Mean of M(q)'s diagonal over the poses of the windows, or the log and time of the first pose in which it
+/// is not positive definite.
 fn inertia(mut plant: Plant<'_>, windows: &[Window]) -> Result<Result<Vec<f64>, (usize, f64)>, Error> {
     let joints = plant.joints();
     let (mut sum, mut own, mut count) = (vec![0.0; joints], vec![0.0; joints], 0.0);

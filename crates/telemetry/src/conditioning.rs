@@ -105,8 +105,8 @@ impl Conditioning {
 /// What friction does at a reversal lies below this, however slow the motion is otherwise.
 const LEAST_PARALLEL_HZ: f64 = 10.0;
 
-/// Below this share of the sample rate the low-pass is longer than a hundred thousand samples, and no number of
-/// its length need exist.
+/// Below this share of the sample rate the low-pass is longer than a hundred thousand samples, and no number
+/// of its length need exist.
 const LOWEST_SHARE_BY_HAND: f64 = 1e-5;
 
 /// The low-pass ends at 1.4 times the cut-off; that must stay below half the sample rate.

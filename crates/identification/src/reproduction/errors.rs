@@ -15,8 +15,8 @@ pub struct ErrorGrowth {
     pub share_of_travel: Vec<f64>,
     /// For each horizon the windows in which some joint's error had exceeded its travel by then.
     pub lost: Vec<usize>,
-    /// In closed loop, the RMS over windows, joints and time of the loop's torque over the measured one's RMS;
-    /// zero in open loop.
+    /// In closed loop, the RMS over windows, joints and time of the loop's torque over the measured one's
+    /// RMS; zero in open loop.
     pub loop_torque_share: f64,
 }
 

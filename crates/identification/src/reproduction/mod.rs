@@ -16,13 +16,13 @@ pub struct ReproductionSettings {
     pub window_s: f64,
     /// Distance of the horizons at which the error is taken \[s\].
     pub horizon_step_s: f64,
-    /// Longest step of the integration \[s\]. Half of it changes the errors on tx40, emps and kr300 by at most a
-    /// hundredth of themselves.
+    /// Longest step of the integration \[s\]. Half of it changes the errors on tx40, emps and kr300 by at
+    /// most a hundredth of themselves.
     pub longest_step_s: f64,
     /// Windows of all logs together; they are spread evenly over the logs.
     pub most_windows: usize,
-    /// In closed loop, the natural frequency \[rad/s\] of each joint's error under its own inertia; critically
-    /// damped. Slow against a real drive's loop, so that what the model lacks is not hidden.
+    /// In closed loop, the natural frequency \[rad/s\] of each joint's error under its own inertia;
+    /// critically damped. Slow against a real drive's loop, so that what the model lacks is not hidden.
     pub loop_frequency: f64,
 }
 

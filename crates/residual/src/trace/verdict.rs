@@ -9,8 +9,8 @@ use phiw_identification::fitting::{TorqueError, accumulate, fit, torque_error};
 use phiw_identification::{IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
 
-/// Error of all torques together on motion held out, over that of the declared model, up to which a model that
-/// lowers the errors of single torques is as good: the largest torque's noise decides over less.
+/// Error of all torques together on motion held out, over that of the declared model, up to which a model
+/// that lowers the errors of single torques is as good: the largest torque's noise decides over less.
 const AS_GOOD: f64 = 1.1;
 
 impl Search<'_> {
