@@ -18,8 +18,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// The main job: a curriculum with the loop closed, then `phiw explain`, on motions and logs that are
-    /// made on the spot; with reports.
+    /// The main job: a curriculum with the loop closed, then `phiw explain`, on data made on the spot.
     Run(run::Arguments),
     /// A log as long as wanted, to see that memory does not grow with it.
     SyntheticLog(synthetic_log::Arguments),
@@ -32,8 +31,7 @@ enum Task {
     Torture(torture::Arguments),
     /// Fetch MuJoCo's library into the user's cache folder, with Python's pip.
     Mujoco(mujoco::Arguments),
-    /// Compare dynamics with Pinocchio and C3D files with ezc3d, installed from PyPI into a private
-    /// environment.
+    /// Compare with Pinocchio, ezc3d, CVXPY and Clarabel, installed from PyPI into a private environment.
     Oracle(oracle::Arguments),
     /// What it costs that identified bodies can exist, on real logs.
     Consistent(consistent::Arguments),

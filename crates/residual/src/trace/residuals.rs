@@ -147,19 +147,7 @@ pub fn residual_shape(
                         return collector.begin(collector.lags, false);
                     }
                     rows += 1;
-                    for (torque, layout) in design.rows().iter().enumerate() {
-                        let row_of = &row[layout.range.clone()];
-                        let fitted: f64 = layout
-                            .parameters
-                            .iter()
-                            .zip(row_of)
-                            .map(|(&parameter, column)| {
-                                parameters.get(parameter).map_or(0.0, |value| value * column)
-                            })
-                            .sum();
-                        let measured = row_of[layout.parameters.len()];
-                        residual[torque] = if design.counts(row, torque) { measured - fitted } else { 0.0 };
-                    }
+                    residual_of_row(design, parameters, row, &mut residual);
                     collector.add(&residual, &block.q[block.row(outputs[output])], t + block.session_offset);
                 },
             );
@@ -171,20 +159,36 @@ pub fn residual_shape(
     if let Some(error) = failure {
         return Err(error.into());
     }
-    let correlation = |&(product, square): &(f64, f64)| if square > 0.0 { product / square } else { 0.0 };
-    let largest = |sums: &[(f64, f64); STRUCTURE_LAGS.len()]| {
-        let by_size = |a: &f64, b: &f64| a.abs().total_cmp(&b.abs());
-        sums.iter().map(correlation).max_by(by_size).unwrap_or_default()
-    };
-    Ok(ResidualShape {
-        autocorrelation: collector.products.iter().map(largest).collect(),
-        ripple_frequencies: collector.grids.iter().map(Grid::peaks).collect(),
-        time_frequencies: collector.times.iter().map(Grid::peaks).collect(),
-        rows,
-    })
+    Ok(collector.shape(rows))
+}
+
+/// What the parameters leave of each torque in one row; nothing where the row does not count.
+fn residual_of_row(design: &Design, parameters: &[f64], row: &[f64], residual: &mut [f64]) {
+    for (torque, layout) in design.rows().iter().enumerate() {
+        let columns = &row[layout.range.clone()];
+        let value = |parameter: usize| parameters.get(parameter).copied().unwrap_or_default();
+        let own = layout.parameters.iter().zip(columns);
+        let fitted: f64 = own.map(|(&parameter, column)| value(parameter) * column).sum();
+        let measured = columns[layout.parameters.len()];
+        residual[torque] = if design.counts(row, torque) { measured - fitted } else { 0.0 };
+    }
 }
 
 impl Collector {
+    fn shape(&self, rows: u64) -> ResidualShape {
+        let correlation = |&(product, square): &(f64, f64)| if square > 0.0 { product / square } else { 0.0 };
+        let largest = |sums: &[(f64, f64); STRUCTURE_LAGS.len()]| {
+            let by_size = |a: &f64, b: &f64| a.abs().total_cmp(&b.abs());
+            sums.iter().map(correlation).max_by(by_size).unwrap_or_default()
+        };
+        ResidualShape {
+            autocorrelation: self.products.iter().map(largest).collect(),
+            ripple_frequencies: self.grids.iter().map(Grid::peaks).collect(),
+            time_frequencies: self.times.iter().map(Grid::peaks).collect(),
+            rows,
+        }
+    }
+
     fn begin(&mut self, lags: [usize; STRUCTURE_LAGS.len()], continues: bool) {
         if lags != self.lags {
             let longest = lags.into_iter().max().unwrap_or_default();
