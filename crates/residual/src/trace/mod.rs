@@ -16,6 +16,7 @@ mod search;
 mod signal_shapes;
 mod stage;
 mod tracing;
+mod trial;
 mod verdict;
 
 pub use floor::noise_floor;

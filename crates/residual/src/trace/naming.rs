@@ -1,13 +1,11 @@
 //! What of the chosen effects has a name, what only refines the model, and what motion held out speaks
 //! against.
 
-use super::hypotheses::{Candidates, Present};
 use super::search::Search;
-use super::stage::Stage;
 use super::tracing::{FoundEffect, RivalEffect};
-use crate::selection::{Fit, Member, Problem, Products, certainty};
+use super::trial::{Squares, Trial};
+use crate::selection::{Member, Products, certainty};
 use phiw_identification::{EffectSpec, IdentificationError};
-use phiw_regressor::least_squares::GroupedFactor;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -22,17 +20,6 @@ const SMALL: f64 = 0.05;
 /// Times the residual that a held model left when it was fitted.
 const AS_IT_WAS: f64 = 1.25;
 
-/// The chosen model, fitted to the training motion, and motion held out to judge it.
-pub(super) struct Trial {
-    problem: Problem,
-    members: Vec<Member>,
-    rows: Vec<f64>,
-    fit: Fit,
-    held_out: Vec<Products>,
-    /// The place of each member among the model's effects.
-    places: Vec<usize>,
-}
-
 /// The model without the forms of something simpler from a level on, constants refined.
 struct Simpler {
     trial: Trial,
@@ -40,16 +27,6 @@ struct Simpler {
     squares: Vec<f64>,
     /// The places, among the effects of the whole model, of the forms that are left out, ascending.
     left_out: Vec<usize>,
-}
-
-/// What is left of each torque on motion held out.
-struct Squares {
-    /// By the declared effects alone.
-    initial: Vec<f64>,
-    /// Without an effect.
-    without: Vec<f64>,
-    /// With it.
-    with: Vec<f64>,
 }
 
 /// What speaks against an effect on motion held out.
@@ -216,25 +193,6 @@ impl Search<'_> {
         self.specs.remove(place);
         self.chosen.alternatives.remove(place - self.declared);
         Ok(())
-    }
-
-    fn trial(&self) -> Result<Trial, IdentificationError> {
-        let present = Present { specs: &self.specs, declared: self.declared };
-        let mut candidates = Candidates::of_model(self.fixed, present);
-        let folds: Vec<_> = self.folds.iter().chain(&self.fixed.data.held_out).copied().collect();
-        let reference = self.fixed.reference(&self.specs, &self.parameters)?;
-        let mut stage = self.fixed.pass(&self.specs, Vec::new(), reference, &folds)?;
-        let held_out = stage.folds.split_off(self.folds.len());
-        let problem = self.fixed.problem(&stage, &mut candidates)?;
-        let fit = Fit::new(&problem, problem.active(&candidates.present), &self.chosen.rows, None);
-        Ok(Trial {
-            held_out: products(&stage, &held_out),
-            places: candidates.list.iter().map(|candidate| candidate.effects[0]).collect(),
-            rows: self.chosen.rows.clone(),
-            members: candidates.present,
-            problem,
-            fit,
-        })
     }
 
     fn judge(&self, whole: &Trial) -> Result<Vec<Judged>, IdentificationError> {
@@ -423,88 +381,6 @@ impl Simpler {
     fn place(&self, place: usize) -> usize {
         place - self.left_out.iter().filter(|left_out| **left_out < place).count()
     }
-}
-
-impl Trial {
-    /// The member at a place among the model's effects.
-    fn member(&self, place: usize) -> Option<Member> {
-        self.places.iter().position(|other| *other == place).map(|at| self.members[at])
-    }
-
-    /// Whether another effect is a form of it.
-    fn is_required(&self, member: &Member) -> bool {
-        let requires = |other: &Member| &self.problem.hypotheses[other.hypothesis].requires;
-        self.members.iter().any(|other| requires(other).contains(&member.hypothesis))
-    }
-
-    /// What the logarithms of the errors held out gain: Σ rows·log(without/with).
-    fn gain(&self, without: &[f64], with: &[f64]) -> f64 {
-        let of_torque = |torque: usize| self.held_out[torque].rows() * (without[torque] / with[torque]).ln();
-        (0..self.held_out.len()).map(of_torque).sum()
-    }
-
-    /// RMS of what a member takes over the RMS of a torque that it acts on, the largest.
-    fn size(&self, member: Member, squares: &Squares) -> f64 {
-        let of_torque = |&torque: &usize| {
-            let whole = self.held_out[torque].right_hand_side().max(f64::MIN_POSITIVE);
-            ((squares.without[torque] - squares.with[torque]).max(0.0) / whole).sqrt()
-        };
-        self.problem.hypotheses[member.hypothesis].torques.iter().map(of_torque).fold(0.0, f64::max)
-    }
-
-    /// The fit with the declared members and those found that `stays` keeps, by their place among the model's
-    /// effects.
-    fn fit_with(&self, stays: impl Fn(usize) -> bool) -> Fit {
-        let members: Vec<Member> = self
-            .members
-            .iter()
-            .zip(&self.places)
-            .filter(|(member, place)| self.problem.hypotheses[member.hypothesis].declared || stays(**place))
-            .map(|(member, _)| *member)
-            .collect();
-        Fit::new(&self.problem, self.problem.active(&members), &self.rows, Some(&self.fit))
-    }
-
-    fn held_out_squares(&self, fit: &Fit) -> Vec<f64> {
-        let of_torque = |(torque, held_out): (usize, &Products)| match held_out.rows() > 0.0 {
-            true => held_out.residual(&fit.columns(torque)),
-            false => 1.0,
-        };
-        self.held_out.iter().enumerate().map(of_torque).collect()
-    }
-
-    /// What a member adds to a torque, as (column, value) pairs.
-    fn values_of(&self, member: Member, torque: usize) -> Vec<(usize, f64)> {
-        let rows = &self.problem.torques[torque];
-        let value = |parameter: usize| self.fit.values[parameter] - self.problem.absent[parameter];
-        let parameters = &self.problem.variant(member).parameters;
-        parameters.iter().filter_map(|&parameter| Some((rows.column(parameter)?, value(parameter)))).collect()
-    }
-
-    /// Share of the stretches of training motion in which the error of `without` is larger than the model's.
-    fn better_folds(&self, without: &Fit) -> f64 {
-        let count = self.problem.torques.first().map_or(0, |torque| torque.folds.len());
-        let loss = |fit: &Fit, fold: usize| -> f64 {
-            (0..self.problem.torques.len())
-                .map(|torque| {
-                    let rows = &self.problem.torques[torque].folds[fold];
-                    let squares = rows.residual(&fit.columns(torque));
-                    self.fit.weights[torque] * squares
-                })
-                .sum()
-        };
-        let better = (0..count).filter(|&fold| loss(&self.fit, fold) < loss(without, fold)).count();
-        better as f64 / count.max(1) as f64
-    }
-}
-
-fn products(stage: &Stage, folds: &[GroupedFactor]) -> Vec<Products> {
-    let of_torque = |torque: usize| {
-        let mut sum = Products::zero(stage.design.rows()[torque].parameters.len() + 1);
-        folds.iter().for_each(|fold| sum.add(&Products::of_factor(&fold.groups()[torque].factor)));
-        sum
-    };
-    (0..stage.design.rows().len()).map(of_torque).collect()
 }
 
 /// The probability of the chosen one, and the rivals with theirs: e^(−excess/2), the criterion being twice a
