@@ -1,6 +1,7 @@
 //! One pass over the logs with a fitted model: what it leaves, sample by sample, in constant memory.
 
-use phiw_identification::{BlockSource, Design, Fold, IdentificationError};
+use phiw_effects::SignalRanges;
+use phiw_identification::{BlockSource, Data, Design, Fold, IdentificationError};
 use phiw_telemetry::filter::FilterScratch;
 
 /// What the residual of each torque looks like on some folds.
@@ -26,6 +27,22 @@ const STRUCTURE_LAGS: [f64; 3] = [0.25, 0.35, 0.5];
 const PEAKS: usize = 4;
 /// Highest spatial frequency that is tried \[1/rad\].
 const HIGHEST_FREQUENCY: f64 = 130.0;
+
+/// What the training motion covers, with the frequencies of what a model leaves of it.
+///
+/// # Errors
+/// A log cannot be read.
+pub fn ranges_of_residual(
+    design: &Design,
+    parameters: &[f64],
+    data: &Data<'_>,
+    mut ranges: SignalRanges,
+) -> Result<SignalRanges, IdentificationError> {
+    let positions: Vec<(f64, f64)> = ranges.joints.iter().map(|joint| joint.position).collect();
+    let shape = residual_shape(design, parameters, &data.train, &data.sources, &positions)?;
+    ranges.ripple_frequencies = shape.ripple_frequencies;
+    Ok(ranges)
+}
 
 struct Collector {
     /// Distances in outputs, ascending.
