@@ -45,7 +45,7 @@ fn joints_of(robot: &Robot, name: &str) -> Result<Vec<usize>, UrdfError> {
     }
     let is_pattern = name.contains(['*', '?']);
     let matching: Vec<usize> = joints()
-        .filter(|(_, joint)| has_position(joint) && joint.mimic.is_none())
+        .filter(|(_, joint)| moves_by_itself(joint))
         .filter(|(_, joint)| is_pattern && matches(name.as_bytes(), joint.name.as_bytes()))
         .map(|(joint, _)| joint)
         .collect();
@@ -53,7 +53,7 @@ fn joints_of(robot: &Robot, name: &str) -> Result<Vec<usize>, UrdfError> {
         (true, true) => Err(UrdfError::NothingToHold {
             pattern: name.to_owned(),
             joints: joints()
-                .filter(|(_, joint)| has_position(joint) && joint.mimic.is_none())
+                .filter(|(_, joint)| moves_by_itself(joint))
                 .map(|(_, joint)| joint.name.clone())
                 .collect(),
         }),
@@ -65,9 +65,9 @@ fn joints_of(robot: &Robot, name: &str) -> Result<Vec<usize>, UrdfError> {
     }
 }
 
-/// Whether a joint is of a type that a single position describes.
-fn has_position(joint: &Joint) -> bool {
-    matches!(joint.kind, JointKind::Revolute | JointKind::Continuous | JointKind::Prismatic)
+/// Whether a joint has a coordinate of its own that can be held: the base does not stand still by a pattern.
+fn moves_by_itself(joint: &Joint) -> bool {
+    !matches!(joint.kind, JointKind::Fixed | JointKind::Floating) && joint.mimic.is_none()
 }
 
 /// Whether a pattern stands for a name. Where letters do not fit, the last `*` takes one letter more.
