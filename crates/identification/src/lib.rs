@@ -10,6 +10,7 @@ pub mod model;
 
 mod accumulate;
 mod covariance;
+mod effect_selector;
 mod error;
 mod factor_rows;
 mod fit;

@@ -40,7 +40,7 @@ impl<'a> Analysis<'a> {
         let at_rest = session.joints_without_held_out_motion(&identified.held_out_folds)?;
         let conditioning = session.logs.conditioning();
         let cutoffs = (conditioning.cutoff_hz, conditioning.parallel_cutoff_hz);
-        let model = Model::of_fit(design, fit, &session.declared, &session.arguments.hold, cutoffs)?
+        let model = Model::of_fit(design, fit, &session.declared, &session.held, cutoffs)?
             .with_sources(&session.xml, fingerprint::of_session(session)?);
         let settings = ConsistentSettings::default();
         let consistent =

@@ -38,7 +38,7 @@ pub fn identify(arguments: &SessionArguments, console: &Console) -> Result<Outco
     let session = Session::open(arguments, &progress)?;
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
-    let identified = phiw_identification::identify(&session.tree, session.effects()?, &data)
+    let identified = phiw_identification::identify(&session.tree, session.effects(&data)?, &data)
         .map_err(|error| session.of_training_logs(error))?;
     let analysis = Analysis::new(&session, &data, &identified)?;
     console.finish();

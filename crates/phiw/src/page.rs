@@ -5,6 +5,7 @@ use crate::traces::Role;
 use crate::warnings::file_name;
 use crate::{date, not_identified, parameters, possible_bodies};
 use phiw_identification::LogSet;
+use phiw_identification::effect::EffectSelector;
 use phiw_report::IdentificationPage;
 use phiw_report::number::{percent, significant};
 use phiw_report::page::{
@@ -43,10 +44,14 @@ pub fn page(analysis: &Analysis<'_>, command_line: String) -> IdentificationPage
     }
 }
 
-/// The declared model in words: `rigid body, viscous friction`.
+/// The declared model in words: `rigid body, viscous friction of j1 and j2`.
 pub fn declared_in_words(analysis: &Analysis<'_>) -> String {
-    let words: Vec<String> = analysis.model.declared.iter().map(|kind| kind.replace('_', " ")).collect();
-    words.join(", ")
+    let in_words = |declared: &String| {
+        let EffectSelector { kind, joints } = EffectSelector::read(declared);
+        let of_joints = joints.map(|joints| format!(" of {}", joints.join(" and "))).unwrap_or_default();
+        kind.replace('_', " ") + &of_joints
+    };
+    analysis.model.declared.iter().map(in_words).collect::<Vec<String>>().join(", ")
 }
 
 fn headline(analysis: &Analysis<'_>) -> Vec<String> {
@@ -83,7 +88,7 @@ fn headline(analysis: &Analysis<'_>) -> Vec<String> {
 
 fn inputs(analysis: &Analysis<'_>) -> Vec<InputFile> {
     let session = analysis.session;
-    let held = &session.arguments.hold;
+    let held = &session.held;
     let mut content = counted(session.tree.joint_count(), "moving joint");
     if !held.is_empty() {
         let names: Vec<String> = held.iter().map(|(joint, value)| format!("{joint} at {value}")).collect();
