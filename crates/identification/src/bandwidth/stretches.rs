@@ -28,7 +28,6 @@ impl Stretches {
         let mut conditioning = logs.conditioning().clone();
         conditioning.parallel_cutoff_hz = lowest_hz;
         conditioning.options.parallel_cutoff_hz = Some(lowest_hz);
-        conditioning.options.block_samples = BLOCK_SAMPLES;
         let read = |survey| {
             let mut blocks = Vec::new();
             LogFile::new(survey, &conditioning, progress).blocks(&mut |block| {
@@ -55,9 +54,6 @@ impl Stretches {
         self.logs.iter().map(|(period, blocks)| Filtered { blocks, filter: filter(*period) }).collect()
     }
 }
-
-/// Short blocks: only those that touch a fold are kept.
-const BLOCK_SAMPLES: usize = 1 << 11;
 
 /// Blocks with another filter.
 pub struct Filtered<'a> {
