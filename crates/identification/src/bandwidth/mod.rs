@@ -6,9 +6,8 @@
 //! conditioned with, in whose band the report's errors are.
 //!
 //! The comparison says what to expect of another cut-off; it does not set one. Least squares are best in the
-//! band that they are fitted in, so another cut-off can only win by its smaller scatter. On six real robots
-//! none does: errors on motion held out are flat above 4 Hz and grow below, in every band that they are
-//! compared in.
+//! band that they are fitted in, so another cut-off can only win there by its smaller scatter, which it does on
+//! none of six real robots (docs/results/bandwidth.md).
 
 mod choice;
 mod stretches;
