@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod accuracy;
+pub mod bandwidth;
 pub mod block_source;
 pub mod checks;
 pub mod consistent;

@@ -10,7 +10,7 @@ use crate::model_file::ModelFile;
 use crate::output::take_folder;
 use crate::report_json::{by_joint, report_json};
 use crate::session::{Session, read_robot};
-use crate::{Error, summary};
+use crate::{Error, bandwidth, summary};
 use phiw_effects::{Catalogue, SignalRanges};
 use phiw_identification::fitting::TorqueError;
 use phiw_identification::{Data, EffectSpec, Identified, Model, identify};
@@ -42,6 +42,10 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
     let excluded = excluded(arguments)?;
     let mut session = Session::open(&arguments.session, &progress)?;
+    let bandwidth = match arguments.model {
+        Some(_) => None,
+        None => bandwidth::of_session(&session, &progress)?,
+    };
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
     let Traced { start, floor, mut tracing } = traced(arguments, &excluded, &session, &data)?;
@@ -60,7 +64,7 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
 
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
-    let mut analysis = Analysis::new(&session, &data, &tracing.model)?;
+    let mut analysis = Analysis::new(&session, &data, &tracing.model)?.with_bandwidth(bandwidth);
     analysis.noise_floor = floor;
     analysis.warnings.extend(tracing.not_judged.iter().map(|(kind, joints)| {
         format!("{kind} of {} could not be judged on these logs (its columns are not finite): not all of it was sought", joints.join(", "))

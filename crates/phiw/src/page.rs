@@ -3,7 +3,7 @@
 use crate::analysis::Analysis;
 use crate::traces::Role;
 use crate::warnings::file_name;
-use crate::{date, not_identified, parameters, possible_bodies};
+use crate::{bandwidth, date, not_identified, parameters, possible_bodies};
 use phiw_identification::LogSet;
 use phiw_identification::effect::EffectSelector;
 use phiw_report::IdentificationPage;
@@ -32,7 +32,10 @@ pub fn page(analysis: &Analysis<'_>, command_line: String) -> IdentificationPage
             .collect(),
         conditioning: ConditioningSection {
             entries: conditioning_entries(analysis),
-            pictures: spectra(analysis),
+            pictures: spectra(analysis)
+                .into_iter()
+                .chain(analysis.bandwidth.as_ref().map(bandwidth::picture))
+                .collect(),
         },
         parameters: parameters::parameters(analysis),
         base_parameters: parameters::base_parameters(analysis),
@@ -195,6 +198,9 @@ pub fn conditioning_entries(analysis: &Analysis<'_>) -> Vec<(String, String)> {
     );
     let parallel = significant(conditioning.parallel_cutoff_hz, 3);
     entry("Low-pass of columns and torque", format!("{zero_phase} {parallel} Hz, the same over both"));
+    if let Some(found) = &analysis.bandwidth {
+        entry("Other cut-offs of columns and torque", bandwidth::in_words(found));
+    }
     for survey in session.logs.surveys() {
         let Ok(plan) = conditioning.plan(survey) else { continue };
         entry(&file_name(&survey.path), log_conditioning(survey, &plan));
