@@ -1,7 +1,7 @@
 //! One case: a robot, its motions, its secrets and its sensors, all from one seed.
 
 use super::draw::{Survey, catalogue, outside};
-use super::friction::Sign;
+use super::friction::{Friction, Sign};
 use super::kind::{Kind, Name};
 use super::plant::{Ordinary, Record, States, record, rigid_torque};
 use super::rng::{CaseRng, Stream};
@@ -162,11 +162,28 @@ impl<'a> Case<'a> {
         };
         if let Name::Catalogue(kind) = name {
             absorber.add_simpler(kind, joint, &records);
+            if kind == Kind::DriveEfficiency {
+                absorber.add(self.of_load(joint, coarse_rate));
+            }
         }
         let visible = absorber.visible(&records);
         let enough = if self.spec.suite == Suite::Outside { VISIBLE_OUTSIDE } else { VISIBLE };
         (visible >= enough && felt_in_every_log(&secret, tree, ordinary, &self.motions, times))
             .then(|| Drawn { material: secret.joints.clone(), secret, size, visible })
+    }
+
+    /// What friction of a joint's load adds along the training motions: samples × joints.
+    fn of_load(&self, joint: usize, rate: f64) -> Vec<f64> {
+        let name = Name::Catalogue(Kind::LoadDependentFriction);
+        let form = Form::Friction(Friction::LoadDependent);
+        let secret = Secret { name, joints: vec![joint], form, scale: 1.0 };
+        let one = |motion: &Trajectory| {
+            let times = even_times(motion, rate);
+            let record = record(&self.robot.tree, &self.ordinary, &[&secret], motion, &times);
+            let added = record.torque.iter().zip(&record.ideal).map(|(torque, ideal)| torque - ideal);
+            added.collect::<Vec<f64>>()
+        };
+        self.motions[..2].iter().flat_map(one).collect()
     }
 
     /// The same case with nothing undeclared: same robot, motions, sensors and noise.
