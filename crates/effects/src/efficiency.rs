@@ -41,7 +41,7 @@ impl EffectKind for DriveEfficiency {
         Some(Constants::from([(PART.to_owned(), BOTH)]))
     }
     fn telling_motion(&self) -> &'static str {
-        "lifting and lowering the same load at the same speeds"
+        "lifting and lowering a known load at the same speeds"
     }
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         let share = |(name, loss): (&str, f64)| match name {

@@ -22,19 +22,23 @@ const KNOTS: &str = "knots";
 /// Ends of the arc \[rad, m\]: the first and the last knot, or a whole turn.
 const LOWER: &str = "lower";
 const UPPER: &str = "upper";
-/// Numbers of knots that are scanned, and between which the data choose.
+/// Numbers of knots that are scanned.
 const SCANNED: [f64; 2] = [6.0, 12.0];
-/// How far the number of knots goes from the one found, step by step.
-const STEPS: [f64; 3] = [2.0, 1.0, 1.0];
+/// Numbers between which the data choose, once a map was found.
+const FEWEST: usize = 6;
+const MOST: usize = 24;
+/// By which factor the number of knots goes from the one found, step by step; by one at least.
+const FACTORS: [f64; 3] = [1.5, 1.2, 1.1];
 /// An arc that is shorter counts as this long \[rad, m\]: no torque changes over it.
 const SHORTEST_ARC: f64 = 1e-3;
 /// Points at which the size of a map is taken.
 const POINTS: usize = 200;
 
 /// Names of the torques at the knots, in the order of the position.
-const NAMES: [&str; SCANNED[1] as usize] = [
+const NAMES: [&str; MOST] = [
     "knot_1", "knot_2", "knot_3", "knot_4", "knot_5", "knot_6", "knot_7", "knot_8", "knot_9", "knot_10",
-    "knot_11", "knot_12",
+    "knot_11", "knot_12", "knot_13", "knot_14", "knot_15", "knot_16", "knot_17", "knot_18", "knot_19",
+    "knot_20", "knot_21", "knot_22", "knot_23", "knot_24",
 ];
 
 impl EffectKind for PositionMap {
@@ -48,10 +52,13 @@ impl EffectKind for PositionMap {
         SCANNED.map(with).to_vec()
     }
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
-        let (Some(&knots), Some(&step)) = (found.get(KNOTS), STEPS.get(step)) else { return Vec::new() };
-        let near = [knots - step, knots + step].into_iter();
-        let near = near.filter(|knots| (SCANNED[0]..=SCANNED[1]).contains(knots));
+        let (Some(&knots), Some(factor)) = (found.get(KNOTS), FACTORS.get(step)) else { return Vec::new() };
+        let near = [(knots / factor).floor(), (knots * factor).ceil()].into_iter();
+        let near = near.map(|knots| knots.clamp(FEWEST as f64, MOST as f64)).filter(|near| *near != knots);
         near.map(|knots| found.clone().into_iter().chain([(KNOTS.to_owned(), knots)]).collect()).collect()
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        Some(Constants::from([(KNOTS.to_owned(), SCANNED[1])]))
     }
     fn telling_motion(&self) -> &'static str {
         "slow motion over the whole range of the joint, several times and in both directions"
@@ -88,7 +95,7 @@ impl EffectKind for PositionMap {
 
 /// The curve of these constants.
 fn spline(constants: &Constants, turns: bool) -> TrigonometricSpline {
-    let knots = constant(constants, KNOTS, SCANNED[0]).clamp(SCANNED[0], SCANNED[1]) as usize;
+    let knots = (constant(constants, KNOTS, SCANNED[0]) as usize).clamp(FEWEST, MOST);
     let lower = constant(constants, LOWER, -1.0);
     let length = (constant(constants, UPPER, 1.0) - lower).max(SHORTEST_ARC);
     if turns && length >= TAU {

@@ -16,6 +16,8 @@ pub struct Survey<'a> {
     pub tree: &'a Tree,
     /// Lowest and highest position that every log reaches, joint by joint.
     pub range: Vec<[f64; 2]>,
+    /// Lowest and highest position that any log reaches, joint by joint.
+    pub arc: Vec<[f64; 2]>,
     /// Root mean square of the speed.
     pub speed: Vec<f64>,
     /// Root mean square of the torque.
@@ -124,7 +126,7 @@ pub fn catalogue(
         Kind::QuadraticFriction => one(Friction::Quadratic),
         Kind::LoadDependentFriction => one(Friction::LoadDependent),
         Kind::DriveEfficiency => one(efficiency(rng)),
-        Kind::PositionMap => mechanism(position_map(joint, survey, rng), rng.sign()),
+        Kind::PositionMap => mechanism(position_map(joint, survey, rng)?, rng.sign()),
         Kind::ThermalDrift => one(Friction::Thermal {
             time_constant: rng.log_uniform(10.0, 60.0),
             viscous: rng.uniform(0.2, 2.0) / speed,
@@ -252,18 +254,23 @@ fn efficiency(rng: &mut CaseRng) -> Friction {
     }
 }
 
-fn position_map(joint: usize, survey: &Survey, rng: &mut CaseRng) -> Mechanism {
-    let ([low, high], travel) = (survey.range[joint], survey.travel(joint));
+/// Smooth over the arc that the logs show, and felt where all of them are.
+fn position_map(joint: usize, survey: &Survey, rng: &mut CaseRng) -> Option<Mechanism> {
+    let [low, high] = survey.range[joint];
+    let arc = survey.arc[joint][1] - survey.arc[joint][0];
+    if survey.travel(joint) < 0.4 * arc {
+        return None;
+    }
     let count = 2 + rng.index(3);
     if rng.chance(0.5) {
         let mut bump = || {
-            let width = rng.uniform(0.08, 0.2) * travel;
+            let width = rng.uniform(0.08, 0.2) * arc;
             [rng.uniform(low, high), width, rng.sign() * rng.uniform(0.4, 1.0)]
         };
-        return Mechanism::Bumps { bumps: (0..count).map(|_| bump()).collect() };
+        return Some(Mechanism::Bumps { bumps: (0..count).map(|_| bump()).collect() });
     }
-    let mut wave = || [TAU * rng.uniform(0.6, 2.5) / travel, rng.uniform(0.0, TAU), rng.uniform(0.4, 1.0)];
-    Mechanism::Beats { waves: (0..count).map(|_| wave()).collect() }
+    let mut wave = || [TAU * rng.uniform(0.6, 2.5) / arc, rng.uniform(0.0, TAU), rng.uniform(0.4, 1.0)];
+    Some(Mechanism::Beats { waves: (0..count).map(|_| wave()).collect() })
 }
 
 fn ripple(joint: usize, survey: &Survey, rng: &mut CaseRng) -> Option<Mechanism> {
