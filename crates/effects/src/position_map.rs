@@ -75,6 +75,9 @@ impl EffectKind for PositionMap {
     fn seen_against(&self) -> Signal {
         Signal::Position
     }
+    fn is_general_form(&self) -> bool {
+        true
+    }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
         let turns = tree.joint(joint).joint_type != JointType::Prismatic;

@@ -215,6 +215,16 @@ fn a_cable_that_catches_is_a_position_map() {
     );
 }
 
+/// A stop that stiffens was named a map of the position, which follows it more closely with 24 numbers than
+/// the catalogue's stop does with three.
+#[test]
+fn a_stop_that_stiffens_is_a_stop_and_no_map() {
+    let tracing = traced(11, &|state, torque| {
+        torque[1] += 4.0 * ((state.q[1] - 0.8) / 0.3).max(0.0).powf(1.5);
+    });
+    assert_eq!(named(&tracing), [("end_stop".to_owned(), vec!["elbow".to_owned()])]);
+}
+
 /// Friction of the load is the same both ways.
 #[test]
 fn a_drive_that_is_harder_to_drive_back_has_an_efficiency_by_the_direction_of_power() {

@@ -187,7 +187,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    fn remove(&mut self, place: usize) -> Result<(), IdentificationError> {
+    pub(super) fn remove(&mut self, place: usize) -> Result<(), IdentificationError> {
         let design = self.design()?;
         self.parameters.drain(design.effect_parameters(place));
         self.specs.remove(place);
