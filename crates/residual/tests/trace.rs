@@ -220,7 +220,7 @@ fn a_cable_that_catches_is_a_position_map() {
 #[test]
 fn a_stop_that_stiffens_is_a_stop_and_no_map() {
     let tracing = traced(11, &|state, torque| {
-        torque[1] += 4.0 * ((state.q[1] - 0.8) / 0.3).max(0.0).powf(1.5);
+        torque[1] += 1.5 * ((state.q[1] - 0.9) / 0.3).max(0.0).powf(1.3);
     });
     assert_eq!(named(&tracing), [("end_stop".to_owned(), vec!["elbow".to_owned()])]);
 }

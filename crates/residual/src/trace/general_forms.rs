@@ -1,11 +1,13 @@
 //! A form that can imitate many others gives way to simpler ones that do its work.
 
 use super::search::Search;
+use super::trial::Squares;
 use phiw_identification::{EffectSpec, IdentificationError};
 
 impl Search<'_> {
-    /// Chooses again without each general form that was found, and takes what is found in its place if that
-    /// does most of its work with no more numbers: nothing was lost that had no simple form.
+    /// Chooses again without each general form that was found, and takes what is found in its place where that
+    /// has no more numbers, and the general form is not worth a name beside it: a stop that is not quite a
+    /// spring is still a stop.
     pub(super) fn prefer_simpler_forms(&mut self) -> Result<(), IdentificationError> {
         let mut asked: Vec<EffectSpec> = Vec::new();
         let mut options = self.options.clone();
@@ -46,17 +48,16 @@ impl Search<'_> {
         Ok(parameters + self.specs.iter().map(|spec| spec.constants.len()).sum::<usize>())
     }
 
-    /// Whether another model takes as good as all that the effect at `place` takes from its torques, on
-    /// motion held out.
+    /// Whether the effect at `place` is not worth a name beside what another model, without it, leaves of its
+    /// torques on motion held out.
     fn is_done_by(&self, place: usize, other: &Search<'_>) -> Result<bool, IdentificationError> {
         let (own, other) = (self.trial()?, other.trial()?);
         let Some(member) = own.member(place) else { return Ok(false) };
-        let squares_of_other = other.held_out_squares(&other.fit);
-        let with = own.held_out_squares(&own.fit);
-        let without = own.held_out_squares(&own.fit_with(|other| other != place));
-        Ok(own.problem.hypotheses[member.hypothesis].torques.iter().all(|&torque| {
-            let work = without[torque] - with[torque];
-            without[torque] - squares_of_other[torque] >= self.options.least_of_general_form * work
-        }))
+        let squares = Squares {
+            initial: own.held_out_squares(&own.fit_with(|other| other < self.declared)),
+            without: other.held_out_squares(&other.fit),
+            with: own.held_out_squares(&own.fit),
+        };
+        Ok(!self.is_material(&own, member, &squares))
     }
 }

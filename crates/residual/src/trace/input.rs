@@ -30,9 +30,6 @@ pub struct TraceOptions {
     /// Share of the squares of what it is a form of that a form must take: how exactly a sign turns is no
     /// effect of its own.
     pub least_of_simpler: f64,
-    /// Share of what a form that can imitate many others takes from its torque from which on simpler effects
-    /// that take it are preferred: an end stop that is not quite a spring is still one.
-    pub least_of_general_form: f64,
     /// RMS of what an effect takes over the RMS of its torque, at least, to have a name.
     pub least_size: f64,
     /// A residual below this share of its torque (RMS) is as good as none: nothing is sought in it.
@@ -62,7 +59,6 @@ impl Default for TraceOptions {
             least_share_of_kin: 0.75,
             least_of_others: 0.025,
             least_of_simpler: 0.0025,
-            least_of_general_form: 0.9,
             least_size: 0.01,
             negligible_share: 0.005,
             floor_margin: 1.15,

@@ -274,7 +274,7 @@ impl Search<'_> {
     /// It must take away a share of the residual of a torque that it acts on, and be a share of that torque.
     /// Where the other parameters have taken up most of it, it is to be seen on any torque, and must be a
     /// share of its torque by itself.
-    fn is_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
+    pub(super) fn is_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
         let options = self.options;
         let Squares { initial, without, with } = squares;
         let hypothesis = &trial.problem.hypotheses[member.hypothesis];
