@@ -11,9 +11,8 @@ use phiw_identification::effect::{Needs, Sample};
 /// What a transmission loses of the torque that it carries: one share where it drives its load, another where
 /// the load drives it (Hamon, Gautier, Garrec 2010).
 ///
-/// With τ the torque of the rigid body, the motor delivers τ/η where τ·q̇ > 0, which is (1/η − 1)·|τ|·sign(q̇)
-/// more, and τ·η′ where τ·q̇ < 0, which is (1 − η′)·|τ|·sign(q̇) more. Of equal shares it is friction of the
-/// load.
+/// With τ the torque of the rigid body, the motor delivers τ/η where τ·q̇ > 0: (1/η − 1)·|τ|·sign(q̇) more.
+/// Where τ·q̇ < 0 it delivers τ·η′: (1 − η′)·|τ|·sign(q̇) more. Of equal shares it is friction of the load.
 pub struct DriveEfficiency;
 
 /// Which of the two shares there are.

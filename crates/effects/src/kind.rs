@@ -134,8 +134,8 @@ pub trait EffectKind: Send + Sync {
         false
     }
 
-    /// Whether it has so many parameters that it can imitate other kinds: it gives way to simpler ones that do
-    /// its work.
+    /// Whether it has so many parameters that it can imitate other kinds: it gives way to simpler ones that
+    /// do its work.
     fn is_general_form(&self) -> bool {
         false
     }

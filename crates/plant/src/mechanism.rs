@@ -34,8 +34,8 @@ pub enum Mechanism {
         /// Phase \[rad\].
         phase: f64,
     },
-    /// What cables and hoses do as they bend, slip and catch: torques that were measured at angles, ascending,
-    /// linear between two of them, and those of the first and the last beyond.
+    /// What cables and hoses do as they bend, slip and catch: torques that were measured at angles, which
+    /// ascend; linear between two of them, and those of the first and the last beyond.
     Cable {
         /// Angles, each with its torque; at least one.
         points: Vec<[f64; 2]>,

@@ -11,8 +11,8 @@
 //! effects that no catalogue has beside others (`wide_outside`), each in fifteen situations, from white noise
 //! to joints that are mostly noise, filters in drives, late velocities, dead bands, and held-out motion that
 //! is faster than all that was trained on. `new_kinds` has the kinds that came to the catalogue last, so that
-//! the cases of the other suites stay what they were. A case follows from its seed alone. Seeds for developing the
-//! tracer and seeds for reporting are disjoint.
+//! the cases of the other suites stay what they were. A case follows from its seed alone. Seeds for
+//! developing the tracer and seeds for reporting are disjoint.
 //!
 //! The tracer is a separate program that sees files only. What is true stays here, or in a `truth.json`
 //! beside the folder that it sees. All forms of effects are written from the literature and not from the

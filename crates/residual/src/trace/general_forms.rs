@@ -5,9 +5,9 @@ use super::trial::Squares;
 use phiw_identification::{EffectSpec, IdentificationError};
 
 impl Search<'_> {
-    /// Chooses again without each general form that was found, and takes what is found in its place where that
-    /// has no more numbers, and the general form is not worth a name beside it: a stop that is not quite a
-    /// spring is still a stop.
+    /// Chooses again without each general form that was found, and takes what is found in its place where
+    /// that has no more numbers, and the general form is not worth a name beside it: a stop that is not
+    /// quite a spring is still a stop.
     pub(super) fn prefer_simpler_forms(&mut self) -> Result<(), IdentificationError> {
         let mut asked: Vec<EffectSpec> = Vec::new();
         let mut options = self.options.clone();
@@ -58,6 +58,6 @@ impl Search<'_> {
             without: other.held_out_squares(&other.fit),
             with: own.held_out_squares(&own.fit),
         };
-        Ok(!self.is_material(&own, member, &squares))
+        Ok(!self.is_seen_or_absorbed(&own, member, &squares).0)
     }
 }
