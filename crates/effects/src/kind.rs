@@ -161,6 +161,8 @@ pub struct JointRange {
     pub torque_rms: f64,
     /// Largest torque \[N·m, N\].
     pub torque_peak: f64,
+    /// RMS of what the model so far leaves of the torque, zero where nothing is fitted yet \[N·m, N\].
+    pub residual_rms: f64,
 }
 
 /// What the training logs cover: bounds for the constants to try.

@@ -61,8 +61,12 @@ pub fn headline(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<String> {
     let mut lines = Vec::new();
     match tracing.verdict {
         trace::Verdict::Sufficient => lines.push(format!(
-            "The declared model ({declared}) is sufficient: what it leaves, {} % of RMS torque held out, is noise.",
-            percent(before)
+            "The declared model ({declared}) is sufficient: what it leaves, {} % of RMS torque held out, {}.",
+            percent(before),
+            match tracing.remaining.disturbances.is_empty() {
+                true => "is noise",
+                false => "follows nothing that was measured",
+            }
         )),
         trace::Verdict::Unexplained => lines.push(format!(
             "The declared model ({declared}) leaves {} % of RMS torque held out, with structure that no effect of the catalogue accounts for.",

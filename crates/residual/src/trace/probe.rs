@@ -47,7 +47,7 @@ pub(super) struct Fit<'a> {
     pub ranges: &'a SignalRanges,
     /// For each torque the angular frequencies \[rad/s\] at which its residual swings over the time.
     pub lines: &'a [Vec<f64>],
-    /// Probability that any residual of noise seems to follow any signal.
+    /// Probability that a torque's residual of noise seems to follow any signal.
     pub false_alarm: f64,
 }
 
@@ -111,7 +111,8 @@ fn probes(
     let free = if fixed.prior.is_some() { 0 } else { stage.model_size() };
     let mut parameters = parameters.to_vec();
     parameters.resize(stage.design.parameter_count(), 0.0);
-    let limit = fit.false_alarm / signals.len().max(1) as f64;
+    let signals_of_torque = signals.len().max(1) as f64 / rows.len() as f64;
+    let limit = fit.false_alarm / signals_of_torque;
     let of_row = |&row: &usize| {
         let own = signals.iter().enumerate().filter(|(_, (of, _))| *of == row);
         let own: Vec<(usize, &String)> = own.map(|(candidate, (_, signal))| (candidate, signal)).collect();

@@ -15,8 +15,8 @@ const EXPECTED_DEVIATIONS: f64 = 2.0;
 impl Search<'_> {
     /// Which residuals have structure, and what they follow.
     ///
-    /// Structure is what motion foretells on data that were not fitted, or what wanders: a correlation over
-    /// seconds that no sensor's noise has. A residual that is larger than noise and neither is a slow
+    /// Structure is what motion foretells on data that were not fitted; what wanders, with a correlation over
+    /// seconds that no sensor's noise has; and what hangs together on one joint and not on others. A residual that is larger than noise and neither is a slow
     /// disturbance that follows nothing measured; it accuses nobody.
     pub(super) fn remaining(
         &self,
@@ -46,9 +46,15 @@ impl Search<'_> {
             false_alarm: self.options.false_name_probability,
         };
         let following = probe::following(fit, &large)?;
-        let wanders = |row: &usize| shape.wander[*row] > self.options.wander;
-        let (structured, colour): (Vec<usize>, Vec<usize>) =
-            large.into_iter().partition(|row| following.contains(row) || wanders(row));
+        let over = |row: usize| error.rmse[row] / self.input.noise_floor[row];
+        let nearest = (0..error.rmse.len()).map(over).fold(f64::INFINITY, f64::min).max(1.0);
+        let stands_out = |row: usize| {
+            over(row) > self.options.structured_ratio * nearest
+                && shape.autocorrelation[row].abs() > self.options.structured_correlation
+        };
+        let wanders = |row: usize| shape.wander[row] > self.options.wander;
+        let is_structured = |row: &usize| following.contains(row) || wanders(*row) || stands_out(*row);
+        let (structured, colour): (Vec<usize>, Vec<usize>) = large.into_iter().partition(is_structured);
         let name = |row: usize| self.fixed.tree.joint(row).joint.clone();
         let disturbance = |&row: &usize| Disturbance {
             joint: name(row),

@@ -6,6 +6,8 @@ use phiw_telemetry::filter::FilterScratch;
 /// What the residual of each torque looks like on some folds.
 #[derive(Clone, Debug, Default)]
 pub struct ResidualShape {
+    /// RMS of each torque's residual \[N·m, N\].
+    pub rms: Vec<f64>,
     /// Autocorrelation of each torque's residual, less what the filter alone gives to noise: the largest of
     /// those 0.25 to 0.5 s apart. Near zero for noise, whatever its colour within the filter's band. At
     /// several distances, since that of a residual that swings once a second is zero at one of them.
@@ -40,6 +42,8 @@ struct Collector {
     filled: usize,
     /// For each torque and distance: sum of the products, sum of the squares.
     products: Vec<[(f64, f64); LAGS.len()]>,
+    /// For each torque: sum of the squares, rows that count.
+    squares: Vec<(f64, f64)>,
     grids: Vec<Grid>,
     /// The same over the time.
     times: Vec<Grid>,
@@ -111,6 +115,7 @@ pub fn residual_shape(
         ring: Vec::new(),
         filled: 0,
         products: vec![Default::default(); torques],
+        squares: vec![(0.0, 0.0); torques],
         grids: ranges.iter().map(|&range| Grid::new(range)).collect(),
         times: ranges.iter().map(|_| Grid::new((0.0, duration))).collect(),
     };
@@ -185,7 +190,9 @@ impl Collector {
             let by_size = |a: &f64, b: &f64| a.abs().total_cmp(&b.abs());
             sums[..STRUCTURE_LAGS.len()].iter().map(correlation).max_by(by_size).unwrap_or_default()
         };
+        let rms = |&(sum, rows): &(f64, f64)| (sum / rows.max(1.0)).sqrt();
         ResidualShape {
+            rms: self.squares.iter().map(rms).collect(),
             autocorrelation: self.products.iter().map(largest).collect(),
             wander: self.products.iter().map(|sums| correlation(&sums[STRUCTURE_LAGS.len()])).collect(),
             ripple_frequencies: self.grids.iter().map(Grid::peaks).collect(),
@@ -208,6 +215,8 @@ impl Collector {
     fn add(&mut self, residual: &[f64], positions: &[f64], time: f64) {
         for (joint, grid) in self.grids.iter_mut().enumerate() {
             if residual[joint] != 0.0 {
+                self.squares[joint].0 += residual[joint] * residual[joint];
+                self.squares[joint].1 += 1.0;
                 grid.add(positions[joint], residual[joint]);
                 self.times[joint].add(time, residual[joint]);
             }
