@@ -279,8 +279,8 @@ impl Search<'_> {
         seen || absorbed
     }
 
-    /// Whether what an effect takes is to be seen on a torque that it acts on; and whether the other parameters
-    /// have taken up most of what it is.
+    /// Whether what an effect takes is to be seen on a torque that it acts on; and whether the other
+    /// parameters have taken up most of what it is.
     pub(super) fn is_seen_or_absorbed(
         &self,
         trial: &Trial,
