@@ -3,6 +3,7 @@
 
 use crate::{EffectKind, FittedEffect, Mechanisms, SignalRanges};
 use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};
+use phiw_codegen::JointTorque;
 use phiw_dynamics::Tree;
 use phiw_identification::effect::{EffectError, EffectParameter, JointProperty};
 use phiw_identification::{Effect, EffectCatalogue, EffectSpec, Variants};
@@ -80,6 +81,18 @@ impl Catalogue {
     ) -> Mechanisms {
         let found = FittedEffect::new(spec, parameters, fitted);
         self.kind(&spec.kind).map(|kind| kind.mechanisms(&found)).unwrap_or_default()
+    }
+
+    /// The torques that an effect adds as formulas of the present motion, with its fitted values; none for one
+    /// that needs more, and for a kind that is unknown here.
+    pub fn formulas(
+        &self,
+        spec: &EffectSpec,
+        parameters: &[EffectParameter],
+        fitted: &[f64],
+    ) -> Vec<JointTorque> {
+        let found = FittedEffect::new(spec, parameters, fitted);
+        self.kind(&spec.kind).map(|kind| kind.formulas(&found)).unwrap_or_default()
     }
 
     /// What an effect means, with its fitted values; a kind that is unknown here gets its name and numbers.

@@ -27,6 +27,9 @@ pub enum Command {
     /// Reproduce logs with an identified model and with its URDF, driven by the measured torque: how fast
     /// they go another way than the robot.
     Simulate(SimulateArguments),
+    /// Write an identified model as other programs take it: C99 and Rust without allocation, a URDF without
+    /// geometry, MJCF, a table of the joints' drives.
+    Export(ExportArguments),
     /// Say what is in logs before anything is fitted: late velocities, torques that are missing or clipped,
     /// units, clocks, and what to do about it.
     Check(CheckArguments),
@@ -46,6 +49,7 @@ impl Command {
             Command::Explain(explain) => explain.session.quiet,
             Command::Predict(predict) => predict.quiet,
             Command::Simulate(simulate) => simulate.quiet,
+            Command::Export(export) => export.quiet,
             Command::Check(check) => check.quiet,
             Command::Retarget(retarget) => retarget.quiet,
             Command::Next(next) => next.quiet,
@@ -117,6 +121,35 @@ pub struct SimulateArguments {
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
     pub hold: Vec<(String, f64)>,
     /// Folder for simulation.json, simulation.csv and the picture simulation.svg; it is made if it is absent.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Print nothing but errors.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// Arguments of `phiw export`. Without a form all are written.
+#[derive(Clone, Debug, Default, Args)]
+pub struct ExportArguments {
+    /// A model.json of `phiw identify` or `phiw explain`; it holds the robot, too.
+    #[arg(long, value_name = "MODEL.json")]
+    pub model: PathBuf,
+    /// Inverse dynamics with the model's effects as one C99 file (inverse_dynamics.c).
+    #[arg(long)]
+    pub c: bool,
+    /// The same as one Rust file without std (inverse_dynamics.rs).
+    #[arg(long)]
+    pub rust: bool,
+    /// The bodies as a URDF without geometry, which names no mesh (bodies.urdf).
+    #[arg(long)]
+    pub urdf: bool,
+    /// MuJoCo's form (identified.xml).
+    #[arg(long)]
+    pub mjcf: bool,
+    /// Armature, damping, friction loss and limits of each joint (actuators.csv).
+    #[arg(long)]
+    pub table: bool,
+    /// Folder for the files; it is made if it is absent.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Print nothing but errors.

@@ -282,6 +282,9 @@ pub enum Error {
     /// The identified parameters cannot be written as MJCF.
     #[error("identified.xml: {0}")]
     IdentifiedMjcf(phiw_mjcf::MjcfError),
+    /// No code can be generated of the model.
+    #[error("generated code: {0}")]
+    Generated(phiw_codegen::CodegenError),
     /// All logs of the training together.
     #[error("{logs}: {source}")]
     TrainingLogs {
@@ -347,6 +350,7 @@ impl Error {
             | Error::Output(_)
             | Error::IdentifiedUrdf(_)
             | Error::IdentifiedMjcf(_)
+            | Error::Generated(_)
             | Error::Json { .. } => 1,
         }
     }

@@ -201,17 +201,18 @@ fn torques_of_urdf(identified: &Identified, motions: &Motions) -> anyhow::Result
     Ok(torques)
 }
 
-/// All of the model, over its possible bodies.
+/// All of the model: its possible bodies, and the columns of its effects. Bodies go round base parameters,
+/// whose map leaves out what motion hardly tells.
 fn torques_of_model(tree: &Tree, model: &Model, motions: &Motions) -> anyhow::Result<Vec<f64>> {
     let (design, mut parameters) = model.design(tree, &Catalogue::default())?;
-    let base = design.base().from_standard(&tree.inertial_parameters())?;
-    parameters[..base.len()].copy_from_slice(&base);
+    parameters[..design.base().count()].fill(0.0);
     for effect in 0..design.effects().len() {
         for (at, parameter) in design.effect_parameters(effect).enumerate() {
             parameters[parameter] = model.consistent_effect(effect, at).context("an effect of the model")?;
         }
     }
     let joints = tree.joint_count();
+    let bodies = torques(&mut AnalyticBackend::new(tree.clone()), motions)?;
     let mut torques = Vec::with_capacity(motions.q.len());
     let rows = motions.q.chunks(joints).zip(motions.v.chunks(joints)).zip(motions.a.chunks(joints));
     for ((q, v), a) in rows {
@@ -222,6 +223,7 @@ fn torques_of_model(tree: &Tree, model: &Model, motions: &Motions) -> anyhow::Re
         };
         predict(&design, &parameters, &[&vec![block]], &mut keep)?;
     }
+    torques.iter_mut().zip(bodies).for_each(|(torque, bodies)| *torque += bodies);
     Ok(torques)
 }
 
