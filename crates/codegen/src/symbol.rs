@@ -61,7 +61,7 @@ impl Operation {
     }
 
     /// What tells it from others: kind, operands, and its own number.
-    fn key(self) -> (std::mem::Discriminant<Self>, [(u8, u64); 3]) {
+    fn key(self) -> Key {
         let of = |symbol: Option<Symbol>| match symbol {
             None => (0, 0),
             Some(Symbol::Known(value)) => (1, value.to_bits()),
@@ -77,11 +77,14 @@ impl Operation {
     }
 }
 
+/// What tells operations apart.
+type Key = (std::mem::Discriminant<Operation>, [(u8, u64); 3]);
+
 /// Steps in their order; what is computed twice is written once.
 #[derive(Default)]
 struct Tape {
     operations: Vec<Operation>,
-    places: HashMap<(std::mem::Discriminant<Operation>, [(u8, u64); 3]), u32>,
+    places: HashMap<Key, u32>,
 }
 
 thread_local! {

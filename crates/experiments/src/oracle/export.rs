@@ -1,15 +1,17 @@
 //! The files of an identified robot: what MuJoCo, Pinocchio and Rapier make of them.
 
+use super::generated::{self, Run};
 use super::python::Python;
 use crate::consistent::robots::{Robot, robots};
 use anyhow::{Context, ensure};
 use nalgebra::DMatrix;
-use phiw::arguments::SessionArguments;
+use phiw::arguments::{ExportArguments, SessionArguments};
 use phiw::console::Console;
+use phiw::export::export;
 use phiw::identify::identify;
 use phiw_dynamics::random_tree::{RandomNumbers, random_state};
-use phiw_dynamics::urdf::{UrdfOptions, read_urdf, without_geometry};
-use phiw_dynamics::{AnalyticBackend, DynamicsBackend, Tree, World};
+use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+use phiw_dynamics::{AnalyticBackend, DynamicsBackend, Tree, Workspace, World};
 use phiw_effects::Catalogue;
 use phiw_identification::effect::JointProperty;
 use phiw_identification::{EffectCatalogue, Model, predict};
@@ -17,6 +19,7 @@ use phiw_sim_rapier::RapierBackend;
 use phiw_telemetry::Block;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::time::Instant;
 
 /// What runs in Python.
 const SCRIPT: &str = include_str!("export_oracle.py");
@@ -26,6 +29,10 @@ const PINNED: &str = "mujoco==3.17.0\npin==4.1.0\n";
 const LATEST: &str = "mujoco\n";
 /// The largest difference of a torque, over the largest torque of its joint, that is rounding.
 const TOLERANCE: f64 = 1e-9;
+/// The same of generated code.
+const CODE_TOLERANCE: f64 = 1e-12;
+/// Times that all states are gone through, for the time of a call.
+const ROUNDS: usize = 500;
 /// States whose torques are compared.
 const STATES: usize = 200;
 /// Poses whose mass matrix is looked at.
@@ -84,16 +91,25 @@ pub fn compare(python: &str, workspace: &Path, seed: u64) -> anyhow::Result<bool
     println!(
         "| robot | possible bodies | program, file | largest difference of a torque | least eigenvalue of M(q) over the largest |\n|---|--:|---|--:|--:|"
     );
-    let mut agrees = true;
+    let (mut agrees, mut times) = (true, Vec::new());
     for robot in robots(&workspace.join("../shared/data/logs"))? {
-        agrees &= robot_agrees(&robot, &pythons, seed).with_context(|| robot.name.to_owned())?;
+        agrees &= robot_agrees(&robot, &pythons, seed, &mut times).with_context(|| robot.name.to_owned())?;
     }
+    println!(
+        "\n| robot | joints | lines of C | C, largest difference | Rust, largest difference | ours, bodies alone, ns | C, ns | Rust, ns |\n|---|--:|--:|--:|--:|--:|--:|--:|"
+    );
+    times.iter().for_each(|line| println!("{line}"));
     let verdict = if agrees { "All agree" } else { "NOT all agree" };
     println!("\n{verdict} to {TOLERANCE:.0e}; every M(q) must be positive definite, every body possible.");
     Ok(agrees)
 }
 
-fn robot_agrees(robot: &Robot, pythons: &[Python], seed: u64) -> anyhow::Result<bool> {
+fn robot_agrees(
+    robot: &Robot,
+    pythons: &[Python],
+    seed: u64,
+    times: &mut Vec<String>,
+) -> anyhow::Result<bool> {
     let folder = tempfile::tempdir()?;
     let identified = identified(robot, folder.path())?;
     let Identified { tree, model, urdf } = &identified;
@@ -105,12 +121,13 @@ fn robot_agrees(robot: &Robot, pythons: &[Python], seed: u64) -> anyhow::Result<
     let of_urdf = torques_of_urdf(&identified, &motions)?;
     let of_model = torques_of_model(tree, model, &motions)?;
     let mut answers = vec![in_rapier(&files, &motions)?];
-    write_case(folder.path(), tree, urdf, &motions)?;
+    write_case(folder.path(), tree, &motions)?;
     for python in pythons {
         let text = python.run(SCRIPT, [folder.path()])?;
         answers.extend(serde_json::from_str::<Vec<Answer>>(&text)?);
     }
     let mut agrees = impossible == 0;
+    agrees &= code_agrees(robot.name, folder.path(), tree, &of_model, &motions, times)?;
     for answer in answers {
         let name = format!("| {} | {} of {bodies} | {}", robot.name, bodies - impossible, answer.reader);
         if let Some(refused) = answer.refused {
@@ -125,6 +142,48 @@ fn robot_agrees(robot: &Robot, pythons: &[Python], seed: u64) -> anyhow::Result<
         agrees &= difference < TOLERANCE && answer.least > 0.0;
     }
     Ok(agrees)
+}
+
+/// Notes how generated code compares; whether its torques are ours.
+fn code_agrees(
+    name: &str,
+    folder: &Path,
+    tree: &Tree,
+    ours: &[f64],
+    motions: &Motions,
+    times: &mut Vec<String>,
+) -> anyhow::Result<bool> {
+    let joints = tree.joint_count();
+    let lines = std::fs::read_to_string(folder.join("inverse_dynamics.c"))?.lines().count();
+    let runs = [generated::in_c(folder)?, generated::in_rust(folder)?];
+    let cell = |run: &Option<Run>| match run {
+        Some(run) => {
+            let difference = difference(ours, &run.torque, joints);
+            (difference, format!("{difference:.1e}"), format!("{:.0}", run.nanoseconds))
+        }
+        None => (0.0, "no compiler".to_owned(), String::new()),
+    };
+    let [(c, of_c, time_of_c), (rust, of_rust, time_of_rust)] = runs.each_ref().map(cell);
+    let own = nanoseconds(tree, motions)?;
+    times.push(format!(
+        "| {name} | {joints} | {lines} | {of_c} | {of_rust} | {own:.0} | {time_of_c} | {time_of_rust} |"
+    ));
+    Ok(c.max(rust) < CODE_TOLERANCE)
+}
+
+/// Time of one inverse dynamics of the bodies by our own algorithm \[ns\].
+fn nanoseconds(tree: &Tree, motions: &Motions) -> anyhow::Result<f64> {
+    let joints = tree.joint_count();
+    let (mut workspace, mut torque) = (Workspace::new(tree), vec![0.0; joints]);
+    let begin = Instant::now();
+    for _ in 0..ROUNDS {
+        for row in 0..STATES {
+            let at = row * joints..(row + 1) * joints;
+            let (q, v, a) = (&motions.q[at.clone()], &motions.v[at.clone()], &motions.a[at]);
+            tree.inverse_dynamics(q, v, a, &mut workspace, &mut torque)?;
+        }
+    }
+    Ok(begin.elapsed().as_secs_f64() * 1e9 / (ROUNDS * STATES) as f64)
 }
 
 /// Identifies the robot; its files go into `out` of the folder, and beside it as the script reads them.
@@ -142,17 +201,25 @@ fn identified(robot: &Robot, folder: &Path) -> anyhow::Result<Identified> {
     let model: Model = serde_json::from_str(&text("model.json")?)?;
     let described = std::fs::read_to_string(&robot.urdf)?;
     let tree = model.consistent_tree(&read_urdf(&described, &UrdfOptions::default())?.tree)?;
+    let (model_file, out) = (folder.join("out/model.json"), folder.to_owned());
+    export(&ExportArguments { model: model_file, out, ..ExportArguments::default() })?;
+    std::fs::copy(folder.join("out/identified.urdf"), folder.join("identified.urdf"))?;
     Ok(Identified { tree, model, urdf: text("identified.urdf")? })
 }
 
-fn write_case(folder: &Path, tree: &Tree, urdf: &str, motions: &Motions) -> anyhow::Result<()> {
+fn write_case(folder: &Path, tree: &Tree, motions: &Motions) -> anyhow::Result<()> {
     let request = Request { joints: tree.joint_names().collect() };
     std::fs::write(folder.join("case.json"), serde_json::to_string(&request)?)?;
-    std::fs::write(folder.join("bodies.urdf"), without_geometry(urdf)?)?;
-    for name in ["identified.urdf", "identified.xml"] {
-        std::fs::copy(folder.join("out").join(name), folder.join(name))?;
-    }
-    let signals = [("q", &motions.q), ("v", &motions.v), ("a", &motions.a), ("poses", &motions.poses)];
+    let rows = motions.q.chunks(tree.joint_count()).zip(motions.v.chunks(tree.joint_count()));
+    let rows = rows.zip(motions.a.chunks(tree.joint_count()));
+    let states: Vec<f64> = rows.flat_map(|((q, v), a)| [q, v, a].concat()).collect();
+    let signals = [
+        ("states", &states),
+        ("q", &motions.q),
+        ("v", &motions.v),
+        ("a", &motions.a),
+        ("poses", &motions.poses),
+    ];
     for (name, values) in signals {
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         std::fs::write(folder.join(name), bytes)?;

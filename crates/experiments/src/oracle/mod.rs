@@ -34,6 +34,7 @@ mod case;
 mod comparison;
 mod consistency;
 mod export;
+mod generated;
 mod pinocchio;
 pub(crate) mod python;
 
