@@ -15,6 +15,7 @@ mod factor_rows;
 mod fit;
 pub mod held_joints;
 mod identify;
+mod jackknife;
 mod kept_blocks;
 mod log_set;
 mod model_sources;
@@ -23,6 +24,7 @@ mod prediction_errors;
 mod rates;
 mod reference;
 pub mod reproduction;
+mod rivals;
 mod robot_findings;
 mod sample;
 

@@ -1,11 +1,14 @@
-//! A random robot whose truth is known, and logs of it.
+//! A robot whose truth is known, and logs of it.
 
-use phiw_dynamics::random_tree::{RandomNumbers, RandomTreeOptions, random_tree};
+use phiw_dynamics::random_tree::RandomNumbers;
+use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Tree, Workspace};
 use phiw_telemetry::Recording;
 use std::f64::consts::TAU;
 
-/// Joints of a robot.
+/// The robot: the arm of the PUMA 560, its wrist held.
+const URDF: &str = include_str!("../../../../models/puma560.urdf");
+const HELD: [&str; 3] = ["joint_4", "joint_5", "joint_6"];
 const JOINTS: usize = 3;
 /// Rows a second, and seconds of a log.
 const RATE: f64 = 100.0;
@@ -64,13 +67,13 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// A robot, its friction, its noise and its motion from a seed.
+    /// The robot with friction, noise and a motion from a seed.
     ///
     /// # Errors
-    /// None is known: random robots can be read.
+    /// None is known: the robot can be read.
     pub fn new(seed: u64, situation: Situation) -> anyhow::Result<Self> {
-        let options = RandomTreeOptions { joints: JOINTS, ..RandomTreeOptions::default() };
-        let tree = random_tree(seed, &options)?;
+        let held = HELD.iter().map(|joint| ((*joint).to_owned(), 0.0)).collect();
+        let tree = read_urdf(URDF, &UrdfOptions { held, ..UrdfOptions::default() })?.tree;
         let mut random = RandomNumbers::new(seed ^ 0x5eed);
         let sines = (0..JOINTS)
             .map(|_| {
