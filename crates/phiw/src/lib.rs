@@ -14,6 +14,7 @@ pub mod export;
 mod exported;
 mod fingerprint;
 mod generated_code;
+mod held_out_reproduction;
 mod identified_mjcf;
 mod identified_urdf;
 pub mod identify;
