@@ -120,6 +120,9 @@ pub struct SimulateArguments {
     /// Joints that stand still, as the model was made with; they need not be named.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
     pub hold: Vec<(String, f64)>,
+    /// What computes the motion; the engines only where phiw was built with the feature `simulators`.
+    #[arg(long, value_enum, default_value_t = Backend::Analytic)]
+    pub backend: Backend,
     /// Folder for simulation.json, simulation.csv and the picture simulation.svg; it is made if it is absent.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -289,6 +292,29 @@ impl NextArguments {
             parallel_cutoff_hz: self.parallel_cutoff_hz,
             quiet: self.quiet,
             ..SessionArguments::default()
+        }
+    }
+}
+
+/// What computes a motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Backend {
+    /// The algorithms of phiw-dynamics.
+    #[default]
+    Analytic,
+    /// MuJoCo.
+    Mujoco,
+    /// Rapier.
+    Rapier,
+}
+
+impl Backend {
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Backend::Analytic => "analytic",
+            Backend::Mujoco => "mujoco",
+            Backend::Rapier => "rapier",
         }
     }
 }

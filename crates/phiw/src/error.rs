@@ -125,6 +125,15 @@ pub enum Error {
         /// Which bodies cannot exist, in words.
         bodies: String,
     },
+    /// A physics engine that this program was built without.
+    #[error(
+        "--backend {backend}: this phiw is built without physics engines; build it with `cargo install phiw --features simulators`, or leave the option \
+         out"
+    )]
+    BackendAbsent {
+        /// The engine.
+        backend: &'static str,
+    },
     /// Logs without a stretch to reproduce.
     #[error(
         "{logs}: no stretch of {needed} s without a gap, which a reproduction needs; record longer motion"
@@ -324,6 +333,7 @@ impl Error {
             | Error::HeldElsewhere { .. }
             | Error::HeldInSimulation { .. }
             | Error::NotPositiveDefinite { .. }
+            | Error::BackendAbsent { .. }
             | Error::NothingToReproduce { .. }
             | Error::Map { .. }
             | Error::Robot { .. }

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::analysis::Analysis;
+use crate::arguments::Backend;
 use crate::page::counted;
 use crate::simulate::{Reproduction, Subject, longest_windows, picture, travel, worse};
 use phiw_identification::{BlockSource, LogSet};
@@ -38,7 +39,8 @@ impl HeldOutReproduction {
             return Ok(none());
         };
         windows.retain(|window| {
-            let (begin, end) = surveys[window.log].time_range();
+            // Windows count the logs of the session.
+            let (begin, end) = logs.surveys()[window.log].time_range();
             share >= 1.0 || window.start >= end - share * (end - begin)
         });
         if windows.is_empty() {
@@ -50,7 +52,8 @@ impl HeldOutReproduction {
             design: &analysis.identified.design,
             parameters: &analysis.identified.fit.parameters,
             travel: (0..session.tree.joint_count()).map(|joint| travel(surveys, joint)).collect(),
-            logs: surveys.iter().map(|survey| survey.path.clone()).collect(),
+            logs: logs.surveys().iter().map(|survey| survey.path.clone()).collect(),
+            backend: Backend::Analytic,
         };
         let reproduced = subject.reproduced(&windows, &settings, &[false])?;
         Ok(HeldOutReproduction(reproduced.map_err(|(log, t)| {

@@ -1,16 +1,17 @@
 //! `phiw simulate`: logs reproduced by the model and by its URDF, and how fast they go another way.
 
+mod backends;
 mod files;
 
 pub(crate) use files::{picture, worse};
 
 use crate::Error;
-use crate::arguments::SimulateArguments;
+use crate::arguments::{Backend, SimulateArguments};
 use crate::console::Console;
 use crate::model_use::{ModelUse, Reading};
 use crate::output::check_folder;
 use crate::warnings::of_log;
-use phiw_dynamics::{AnalyticBackend, Tree};
+use phiw_dynamics::Tree;
 use phiw_identification::reproduction::{
     ErrorGrowth, Plant, ReproductionSettings, Window, collect_windows, reproduce,
 };
@@ -104,6 +105,7 @@ impl Reproduction {
 /// [`Error::exit_status`] tells them apart.
 pub fn simulate(arguments: &SimulateArguments, console: &Console) -> Result<SimulateOutcome, Error> {
     check_folder(&arguments.out)?;
+    backends::check(arguments.backend)?;
     let inputs: Vec<PathBuf> = std::iter::once(&arguments.model).chain(&arguments.logs).cloned().collect();
     check_inputs(&inputs, &FILES.map(|name| arguments.out.join(name)))?;
     let place = Lock::acquire(&arguments.out, "phiw simulate")?;
@@ -164,6 +166,7 @@ fn reproduced(
         parameters: &used.parameters,
         travel: (0..used.tree.joint_count()).map(|joint| travel(used.logs.surveys(), joint)).collect(),
         logs: arguments.logs.clone(),
+        backend: arguments.backend,
     };
     subject.reproduced(windows, settings, &[false, true])?.map_err(|(log, t)| Error::NotPositiveDefinite {
         path: arguments.model.clone(),
@@ -190,6 +193,8 @@ pub(crate) struct Subject<'a> {
     pub travel: Vec<f64>,
     /// The logs.
     pub logs: Vec<PathBuf>,
+    /// What computes the motion.
+    pub backend: Backend,
 }
 
 impl Subject<'_> {
@@ -215,12 +220,11 @@ impl Subject<'_> {
             .map(|joint| self.model.rest_speeds.get(joint).copied().unwrap_or(SIGN_WIDTH))
             .collect();
         let identified = || {
-            let backend = Box::new(AnalyticBackend::new(identified_tree.clone()));
-            Ok(Plant::new(backend).with_effects(self.design, &parameters)?)
+            Ok(Plant::new(backends::of(self.backend, &identified_tree)?)
+                .with_effects(self.design, &parameters)?)
         };
         let nominal = || {
-            let backend = Box::new(AnalyticBackend::new(self.tree.clone()));
-            Ok(Plant::new(backend).with_declared_friction(self.tree, &widths))
+            Ok(Plant::new(backends::of(self.backend, self.tree)?).with_declared_friction(self.tree, &widths))
         };
         let inertia = match inertia(identified().map_err(Error::Simulation)?, windows)? {
             Ok(inertia) => inertia,

@@ -59,7 +59,7 @@ fn report(
         "schema": 1,
         "robot": used.tree.name(),
         "model": arguments.model.display().to_string(),
-        "backend": "analytic",
+        "backend": arguments.backend.name(),
         "logs": arguments.logs.iter().map(|log| log.display().to_string()).collect::<Vec<_>>(),
         "windows": reproduction.windows,
         "window_s": reproduction.window_s,
