@@ -141,6 +141,9 @@ impl EffectKind for Asymmetric {
         let named = found.named_values();
         named.flat_map(|(name, value)| found.own_torque(|joint| part(joint, name, value))).collect()
     }
+    fn form_of(&self) -> &'static [&'static str] {
+        &["viscous_friction", "coulomb_friction"]
+    }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));
         let viscous = ("fv_difference", ParameterKind::PerVelocity, f64::NEG_INFINITY);
@@ -182,6 +185,9 @@ impl EffectKind for Quadratic {
     fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
         let velocity = Expression::velocity;
         found.own_torque(|joint| found.value(0) * (velocity(joint) * velocity(joint).magnitude()))
+    }
+    fn form_of(&self) -> &'static [&'static str] {
+        &["viscous_friction", "coulomb_friction"]
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
@@ -243,6 +249,9 @@ impl EffectKind for Stribeck {
     }
     fn dissipates(&self) -> bool {
         true
+    }
+    fn form_of(&self) -> &'static [&'static str] {
+        &["viscous_friction", "coulomb_friction"]
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));

@@ -41,6 +41,9 @@ impl EffectKind for Hysteresis {
             found.constant(PRESLIDING)
         )
     }
+    fn form_of(&self) -> &'static [&'static str] {
+        &["viscous_friction", "coulomb_friction"]
+    }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let formula = Dahl { joint: site[0], presliding: constant(constants, PRESLIDING, 0.05) };
         let parameters = [("fh", ParameterKind::Torque, 0.0)];

@@ -99,6 +99,12 @@ pub trait EffectKind: Send + Sync {
         &[]
     }
 
+    /// Names of the simpler kinds whose form it polishes: it enters a model with these on the same joint, and
+    /// has a name of its own only where it does what they cannot.
+    fn form_of(&self) -> &'static [&'static str] {
+        &[]
+    }
+
     /// Names of its constants that belong to the joint rather than to the effect: where it is in a model,
     /// other kinds on the same site take the values that it has.
     fn constants_of_the_site(&self) -> &'static [&'static str] {
@@ -165,6 +171,8 @@ pub struct JointRange {
     pub torque_rms: f64,
     /// Largest torque \[N·m, N\].
     pub torque_peak: f64,
+    /// RMS of what the model so far leaves of the torque, zero where nothing is fitted yet \[N·m, N\].
+    pub residual_rms: f64,
 }
 
 /// What the training logs cover: bounds for the constants to try.

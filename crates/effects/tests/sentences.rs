@@ -64,7 +64,13 @@ const SENTENCES: &[(&str, &str)] = &[
 
 /// The kind on its first site, with the last of its constants and parameters 0.5, 0.25, 0.125, …
 fn said(tree: &Tree, kind: &dyn EffectKind) -> String {
-    let joint = JointRange { position: (-1.0, 1.0), velocity_rms: 0.8, torque_rms: 2.0, torque_peak: 9.0 };
+    let joint = JointRange {
+        position: (-1.0, 1.0),
+        velocity_rms: 0.8,
+        torque_rms: 2.0,
+        torque_peak: 9.0,
+        ..JointRange::default()
+    };
     let ranges = SignalRanges {
         joints: vec![joint; 2],
         session: (0.0, 60.0),

@@ -220,6 +220,7 @@ impl Search<'_> {
         let shape =
             residual_shape(&self.design()?, &self.parameters, &data.train, &data.sources, &positions)?;
         ranges.ripple_frequencies = shape.ripple_frequencies;
+        ranges.joints.iter_mut().zip(shape.rms).for_each(|(joint, rms)| joint.residual_rms = rms);
         Ok(ranges)
     }
 }
