@@ -33,7 +33,7 @@ enum Task {
     Torture(torture::Arguments),
     /// Fetch MuJoCo's library into the user's cache folder, with Python's pip.
     Mujoco(mujoco::Arguments),
-    /// Compare with Pinocchio, MuJoCo, ezc3d, CVXPY and Clarabel, installed from PyPI into a private environment.
+    /// Compare with Pinocchio, MuJoCo, ezc3d, CVXPY and Clarabel, installed from PyPI into an environment.
     Oracle(oracle::Arguments),
     /// What it costs that identified bodies can exist, on real logs.
     Consistent(consistent::Arguments),

@@ -1,5 +1,5 @@
-//! Elementary functions for generated Rust, as `core` has none. This file is compiled and tested here, and its
-//! part below is copied into what is generated.
+//! Elementary functions for generated Rust, as `core` has none. This file is compiled and tested here, and
+//! its part below is copied into what is generated.
 
 #![allow(dead_code)] // Each generated file uses some of them.
 // BEGIN

@@ -59,8 +59,8 @@ pub fn write_c(model: &Model<'_>) -> Result<String, CodegenError> {
     Ok(text)
 }
 
-/// One Rust file without `std`, with one function, `inverse_dynamics`: a crate of its own. It allocates nothing
-/// and calls nothing that is not in it.
+/// One Rust file without `std`, with one function, `inverse_dynamics`: a crate of its own. It allocates
+/// nothing and calls nothing that is not in it.
 ///
 /// # Errors
 /// As [`write_c`].

@@ -83,8 +83,8 @@ impl Catalogue {
         self.kind(&spec.kind).map(|kind| kind.mechanisms(&found)).unwrap_or_default()
     }
 
-    /// The torques that an effect adds as formulas of the present motion, with its fitted values; none for one
-    /// that needs more, and for a kind that is unknown here.
+    /// The torques that an effect adds as formulas of the present motion, with its fitted values; none for
+    /// one that needs more, and for a kind that is unknown here.
     pub fn formulas(
         &self,
         spec: &EffectSpec,

@@ -68,7 +68,13 @@ fn every_formula_is_its_effect() {
     let catalogue = Catalogue::default();
     let tree = random_tree(5, &RandomTreeOptions { joints: 4, ..Default::default() }).unwrap();
     let joints = tree.joint_count();
-    let joint = JointRange { position: (-1.0, 1.0), velocity_rms: 0.8, torque_rms: 2.0, torque_peak: 9.0 };
+    let joint = JointRange {
+        position: (-1.0, 1.0),
+        velocity_rms: 0.8,
+        torque_rms: 2.0,
+        torque_peak: 9.0,
+        ..JointRange::default()
+    };
     let ranges = SignalRanges {
         joints: vec![joint; joints],
         session: (0.0, 60.0),

@@ -131,8 +131,8 @@ impl Covariance {
     }
 }
 
-/// The 97.5 % quantile of Student's distribution, to 4e-3 from three degrees of freedom on (Abramowitz & Stegun
-/// 26.7.5).
+/// The 97.5 % quantile of Student's distribution, to 4e-3 from three degrees of freedom on (Abramowitz &
+/// Stegun 26.7.5).
 fn student_quantile_95(freedom: f64) -> f64 {
     let z = BAND_95;
     let [z3, z5, z7, z9] = [3, 5, 7, 9].map(|power| z.powi(power));

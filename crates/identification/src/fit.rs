@@ -16,15 +16,15 @@ pub struct Fit {
     /// Standard deviation of each parameter, from leaving out one fold after the other (correlated samples
     /// count as what they are); not a number where there are too few folds.
     pub standard_deviations: Vec<f64>,
-    /// The 95 % interval of each parameter: Student's for the number of folds, about the value that it has with
-    /// the effects' constants free; not numbers where there are too few folds.
+    /// The 95 % interval of each parameter: Student's for the number of folds, about the value that it has
+    /// with the effects' constants free; not numbers where there are too few folds.
     pub intervals_95: Vec<[f64; 2]>,
     /// Parameters that the logs do not determine: their columns depend on others.
     pub undetermined: Vec<usize>,
     /// Standard deviation of the residual of each torque on the training folds \[N·m, N\].
     pub residual_std: Vec<f64>,
-    /// The same on folds that are left out, less what the parameters' uncertainty has in it \[N·m, N\]: what a
-    /// prediction lacks on motion that the model was not fitted to. Where there are too few folds it is
+    /// The same on folds that are left out, less what the parameters' uncertainty has in it \[N·m, N\]: what
+    /// a prediction lacks on motion that the model was not fitted to. Where there are too few folds it is
     /// `residual_std`.
     pub left_out_std: Vec<f64>,
     /// The weighted factor of \[Φ f\] that gave the parameters, over `determined()` parameters.
@@ -40,9 +40,9 @@ impl Fit {
         (0..self.parameters.len()).filter(|parameter| !self.undetermined.contains(parameter)).collect()
     }
 
-    /// Takes covariance, standard deviations and intervals from the deviations of the solutions that leave out
-    /// a fold each. `shift` is by how much these solutions are about other values than the fit's: the standard
-    /// deviations count it, the intervals are about those values.
+    /// Takes covariance, standard deviations and intervals from the deviations of the solutions that leave
+    /// out a fold each. `shift` is by how much these solutions are about other values than the fit's: the
+    /// standard deviations count it, the intervals are about those values.
     pub(crate) fn take_deviations(
         &mut self,
         determined: &[usize],

@@ -193,8 +193,8 @@ struct Choice {
     rivals: Vec<Option<usize>>,
 }
 
-/// The variant that stands for what the choice leaves open: the best, and where that is chosen the better of its
-/// neighbours in the list.
+/// The variant that stands for what the choice leaves open: the best, and where that is chosen the better of
+/// its neighbours in the list.
 fn rival(merits: &[f64], chosen: usize) -> Option<usize> {
     let best = (0..merits.len()).min_by(|&a, &b| merits[a].total_cmp(&merits[b]))?;
     if best != chosen {
@@ -207,7 +207,8 @@ fn rival(merits: &[f64], chosen: usize) -> Option<usize> {
 /// The training folds with the columns of the chosen effects, and those of their rivals behind them.
 struct Rivals {
     folds: Vec<GroupedFactor>,
-    /// For each rival's column the parameter, of the design of the chosen effects, that it is another form of.
+    /// For each rival's column the parameter, of the design of the chosen effects, that it is another form
+    /// of.
     stands_for: Vec<usize>,
 }
 

@@ -45,8 +45,8 @@ pub struct Model {
     pub effects: Vec<EffectParameters>,
     /// Standard deviation of each torque's residual on the training logs \[N·m, N\].
     pub residual_std: Vec<f64>,
-    /// The same on training motion that is left out of the fit \[N·m, N\] ([`Fit::left_out_std`]); absent from a
-    /// model that an earlier phiw wrote.
+    /// The same on training motion that is left out of the fit \[N·m, N\] ([`Fit::left_out_std`]); absent
+    /// from a model that an earlier phiw wrote.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub left_out_std: Option<Vec<f64>>,
     /// What the fit knew, error included: the weighted factor R of \[Φ f\] over the parameters that were

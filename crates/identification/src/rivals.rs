@@ -1,9 +1,9 @@
 //! What the choice of an effect's constants adds to the uncertainty.
 //!
 //! The constants of a declared effect are chosen from a list, and the factors hold the columns of the whole
-//! list. Beside the chosen column c₀ stands that of the nearest rival, c₁: what the two span is, to first order,
-//! what the effect looks like with its constant free. In the fit of both, β₀c₀ + β₁c₁ = (β₀ + β₁)c₀ + β₁(c₁ −
-//! c₀), so that β₀ + β₁ is the effect's parameter with the constant free.
+//! list. Beside the chosen column c₀ stands that of the nearest rival, c₁: what the two span is, to first
+//! order, what the effect looks like with its constant free. In the fit of both, β₀c₀ + β₁c₁ = (β₀ + β₁)c₀ +
+//! β₁(c₁ − c₀), so that β₀ + β₁ is the effect's parameter with the constant free.
 
 use crate::fit::{Fit, merge};
 use crate::jackknife::Jackknife;
@@ -11,10 +11,11 @@ use phiw_regressor::RegressorError;
 use phiw_regressor::least_squares::GroupedFactor;
 
 /// Widens the covariance of a fit by what the choice among rivals leaves open: to the spread of the solutions
-/// with all constants free, and by how far those are from the fit. Its intervals are then about those solutions:
-/// the simplest constants are chosen that the data allow, and they bend the parameters.
+/// with all constants free, and by how far those are from the fit. Its intervals are then about those
+/// solutions: the simplest constants are chosen that the data allow, and they bend the parameters.
 ///
-/// `folds` have the columns of the fit's design, then one for each of `stands_for`, a rival's of that parameter.
+/// `folds` have the columns of the fit's design, then one for each of `stands_for`, a rival's of that
+/// parameter.
 ///
 /// # Errors
 /// The folds are of another design.

@@ -1,5 +1,7 @@
 //! The command line.
 
+pub use crate::export::ExportArguments;
+pub use crate::simulate::Backend;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -124,35 +126,6 @@ pub struct SimulateArguments {
     #[arg(long, value_enum, default_value_t = Backend::Analytic)]
     pub backend: Backend,
     /// Folder for simulation.json, simulation.csv and the picture simulation.svg; it is made if it is absent.
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
-    /// Print nothing but errors.
-    #[arg(long)]
-    pub quiet: bool,
-}
-
-/// Arguments of `phiw export`. Without a form all are written.
-#[derive(Clone, Debug, Default, Args)]
-pub struct ExportArguments {
-    /// A model.json of `phiw identify` or `phiw explain`; it holds the robot, too.
-    #[arg(long, value_name = "MODEL.json")]
-    pub model: PathBuf,
-    /// Inverse dynamics with the model's effects as one C99 file (inverse_dynamics.c).
-    #[arg(long)]
-    pub c: bool,
-    /// The same as one Rust file without std (inverse_dynamics.rs).
-    #[arg(long)]
-    pub rust: bool,
-    /// The bodies as a URDF without geometry, which names no mesh (bodies.urdf).
-    #[arg(long)]
-    pub urdf: bool,
-    /// MuJoCo's form (identified.xml).
-    #[arg(long)]
-    pub mjcf: bool,
-    /// Armature, damping, friction loss and limits of each joint (actuators.csv).
-    #[arg(long)]
-    pub table: bool,
-    /// Folder for the files; it is made if it is absent.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Print nothing but errors.
@@ -296,29 +269,6 @@ impl NextArguments {
     }
 }
 
-/// What computes a motion.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Backend {
-    /// The algorithms of phiw-dynamics.
-    #[default]
-    Analytic,
-    /// MuJoCo.
-    Mujoco,
-    /// Rapier.
-    Rapier,
-}
-
-impl Backend {
-    /// Its name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Backend::Analytic => "analytic",
-            Backend::Mujoco => "mujoco",
-            Backend::Rapier => "rapier",
-        }
-    }
-}
-
 /// How velocities and accelerations come about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Derivatives {
@@ -346,6 +296,13 @@ pub struct SessionArguments {
     /// Joints of the URDF that do not move, at 0 or at a value (rad, m); they need no column in the log.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
     pub hold: Vec<(String, f64)>,
+    /// Masses that are known, as weighed (kg), of the links that joints carry; what is fixed to a link counts
+    /// with it. They hold for the bodies that are written, not for least squares.
+    #[arg(long, value_name = "LINK=KG,…", value_delimiter = ',', value_parser = known_mass)]
+    pub mass: Vec<(String, f64)>,
+    /// Mass of all links that move, as weighed (kg).
+    #[arg(long, value_name = "KG", value_parser = positive)]
+    pub total_mass: Option<f64>,
     /// Cut-off of the low-pass over positions (Hz); by default chosen from the logs' spectra.
     #[arg(long, value_name = "HZ")]
     pub cutoff_hz: Option<f64>,
@@ -389,6 +346,8 @@ impl SessionArguments {
         option("--validate", paths(&self.validate));
         option("--declare", list(self.declare.clone()));
         option("--hold", list(self.hold.iter().map(held).collect()));
+        option("--mass", list(self.mass.iter().map(|(link, mass)| format!("{link}={mass}")).collect()));
+        option("--total-mass", number(self.total_mass));
         option("--cutoff-hz", number(self.cutoff_hz));
         option("--parallel-cutoff-hz", number(self.parallel_cutoff_hz));
         option("--out", paths(std::slice::from_ref(&self.out)));
@@ -407,6 +366,14 @@ fn held_joint(text: &str) -> Result<(String, f64), String> {
         Ok(number) if number.is_finite() => Ok((joint.to_owned(), number)),
         _ => Err(format!("`{value}` is not a position; write {joint} or {joint}=0.5 (rad or m)")),
     }
+}
+
+/// `LINK=KG`.
+fn known_mass(text: &str) -> Result<(String, f64), String> {
+    let Some((link, mass)) = text.split_once('=') else {
+        return Err(format!("write LINK=KG, for example {text}=2.5"));
+    };
+    Ok((link.trim().to_owned(), positive(mass.trim())?))
 }
 
 /// A number from 0 to 1.

@@ -134,6 +134,24 @@ pub enum Error {
         /// The engine.
         backend: &'static str,
     },
+    /// A mass is known of a link that no joint carries.
+    #[error("--mass names the link `{link}`, which no joint that moves carries; those are {links}")]
+    UnknownLink {
+        /// What was named.
+        link: String,
+        /// The links that joints carry.
+        links: String,
+    },
+    /// The total mass leaves nothing to the links without a known mass.
+    #[error(
+        "--total-mass {total} kg leaves nothing beside the links of --mass, {of_links} kg together: leave one of the two out"
+    )]
+    TotalMass {
+        /// The total \[kg\].
+        total: f64,
+        /// The sum of the links' \[kg\].
+        of_links: f64,
+    },
     /// Logs without a stretch to reproduce.
     #[error(
         "{logs}: no stretch of {needed} s without a gap, which a reproduction needs; record longer motion"
@@ -334,6 +352,8 @@ impl Error {
             | Error::HeldInSimulation { .. }
             | Error::NotPositiveDefinite { .. }
             | Error::BackendAbsent { .. }
+            | Error::UnknownLink { .. }
+            | Error::TotalMass { .. }
             | Error::NothingToReproduce { .. }
             | Error::Map { .. }
             | Error::Robot { .. }

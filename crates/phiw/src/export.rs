@@ -2,7 +2,6 @@
 
 use crate::Error;
 use crate::actuator_table::{self, actuator_table};
-use crate::arguments::ExportArguments;
 use crate::exported::Carried;
 use crate::generated_code;
 use crate::identified_mjcf::{self, identified_mjcf};
@@ -10,13 +9,44 @@ use crate::identified_urdf::{self, identified_urdf};
 use crate::model_file::ModelFile;
 use crate::model_use::robot;
 use crate::output::check_folder;
+use clap::Args;
 use phiw_dynamics::urdf::without_geometry;
 use phiw_effects::Catalogue;
 use phiw_result_folder::{Disk, Lock, ResultFile, check_inputs, replace_folder};
 use std::fmt::Write as _;
+use std::path::PathBuf;
 
 /// Name of the URDF without geometry.
 pub const URDF_FILE: &str = "bodies.urdf";
+
+/// Arguments of `phiw export`. Without a form all are written.
+#[derive(Clone, Debug, Default, Args)]
+pub struct ExportArguments {
+    /// A model.json of `phiw identify` or `phiw explain`; it holds the robot, too.
+    #[arg(long, value_name = "MODEL.json")]
+    pub model: PathBuf,
+    /// Inverse dynamics with the model's effects as one C99 file (inverse_dynamics.c).
+    #[arg(long)]
+    pub c: bool,
+    /// The same as one Rust file without std (inverse_dynamics.rs).
+    #[arg(long)]
+    pub rust: bool,
+    /// The bodies as a URDF without geometry, which names no mesh (bodies.urdf).
+    #[arg(long)]
+    pub urdf: bool,
+    /// MuJoCo's form (identified.xml).
+    #[arg(long)]
+    pub mjcf: bool,
+    /// Armature, damping, friction loss and limits of each joint (actuators.csv).
+    #[arg(long)]
+    pub table: bool,
+    /// Folder for the files; it is made if it is absent.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Print nothing but errors.
+    #[arg(long)]
+    pub quiet: bool,
+}
 
 /// What the command has done.
 #[derive(Debug)]

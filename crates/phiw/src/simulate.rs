@@ -3,10 +3,11 @@
 mod backends;
 mod files;
 
+pub use backends::Backend;
 pub(crate) use files::{picture, worse};
 
 use crate::Error;
-use crate::arguments::{Backend, SimulateArguments};
+use crate::arguments::SimulateArguments;
 use crate::console::Console;
 use crate::model_use::{ModelUse, Reading};
 use crate::output::check_folder;
@@ -198,8 +199,8 @@ pub(crate) struct Subject<'a> {
 }
 
 impl Subject<'_> {
-    /// Reproduces windows in the loops that are asked for (open: `false`), or gives the log and the time of the
-    /// first pose in which the model's M(q) is not positive definite.
+    /// Reproduces windows in the loops that are asked for (open: `false`), or gives the log and the time of
+    /// the first pose in which the model's M(q) is not positive definite.
     pub fn reproduced(
         &self,
         windows: &[Window],

@@ -3,13 +3,13 @@
 //! # What it asks
 //!
 //! Whether the 95 % interval of a parameter, and the 95 % band of a predicted torque on motion twice as fast,
-//! hold the truth in 95 % of cases, where the noise is white, where it is coloured, where the encoder is coarse
-//! and where friction turns smoothly.
+//! hold the truth in 95 % of cases, where the noise is white, where it is coloured, where the encoder is
+//! coarse and where friction turns smoothly.
 //!
 //! # How it is run
 //!
-//! `cargo xtask coverage --count 1000`. Every data set is an arm of three joints with its own motion, friction and
-//! noise; its number is its seed.
+//! `cargo xtask coverage --count 1000`. Every data set is an arm of three joints with its own motion,
+//! friction and noise; its number is its seed.
 //!
 //! # What it prints
 //!
@@ -160,8 +160,8 @@ fn intervals(truth: &Truth, identified: &Identified) -> anyhow::Result<[Count; 4
 mod tests {
     use super::{Outcome, Situation, outcome};
 
-    /// The width of the sign is chosen as narrow as the data allow. The intervals took it for the truth: those of
-    /// friction whose sign is smooth held it in half of the cases.
+    /// The width of the sign is chosen as narrow as the data allow. The intervals took it for the truth:
+    /// those of friction whose sign is smooth held it in half of the cases.
     #[test]
     fn intervals_hold_friction_whose_sign_turns_smoothly() -> anyhow::Result<()> {
         let mut all = Outcome::default();

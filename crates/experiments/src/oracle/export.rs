@@ -14,6 +14,7 @@ use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{AnalyticBackend, DynamicsBackend, Tree, Workspace, World};
 use phiw_effects::Catalogue;
 use phiw_identification::effect::JointProperty;
+use phiw_identification::reproduction::{Plant, ReproductionSettings, Window, reproduce};
 use phiw_identification::{EffectCatalogue, Model, predict};
 use phiw_sim_rapier::RapierBackend;
 use phiw_telemetry::Block;
@@ -31,6 +32,12 @@ const LATEST: &str = "mujoco\n";
 const TOLERANCE: f64 = 1e-9;
 /// The same of generated code.
 const CODE_TOLERANCE: f64 = 1e-12;
+/// The largest error of a motion after [`STROKE_S`], over the joints' travel: MuJoCo's friction is soft, and
+/// ours turns within a width.
+const MOTION_TOLERANCE: f64 = 0.02;
+/// Time between two rows of a motion \[s\], and its length \[s\].
+const PERIOD: f64 = 1e-3;
+const STROKE_S: f64 = 0.5;
 /// Times that all states are gone through, for the time of a call.
 const ROUNDS: usize = 500;
 /// States whose torques are compared.
@@ -59,6 +66,16 @@ struct Answer {
     torque: Vec<f64>,
     #[serde(default)]
     least: f64,
+    #[serde(default)]
+    motion: Option<Motion>,
+}
+
+/// A motion that MuJoCo has made of the file, a row each [`PERIOD`].
+#[derive(Deserialize)]
+struct Motion {
+    q: Vec<f64>,
+    v: Vec<f64>,
+    torque: Vec<f64>,
 }
 
 /// Motions: slices over the states, one row each.
@@ -89,7 +106,7 @@ pub fn compare(python: &str, workspace: &Path, seed: u64) -> anyhow::Result<bool
     }
     println!("Identified with {}; {STATES} states, {POSES} poses, seed {seed}\n", DECLARED.join(", "));
     println!(
-        "| robot | possible bodies | program, file | largest difference of a torque | least eigenvalue of M(q) over the largest |\n|---|--:|---|--:|--:|"
+        "| robot | possible bodies | program, file | largest difference of a torque | least eigenvalue of M(q) over the largest | motion, error over travel |\n|---|--:|---|--:|--:|--:|"
     );
     let (mut agrees, mut times) = (true, Vec::new());
     for robot in robots(&workspace.join("../shared/data/logs"))? {
@@ -131,17 +148,46 @@ fn robot_agrees(
     for answer in answers {
         let name = format!("| {} | {} of {bodies} | {}", robot.name, bodies - impossible, answer.reader);
         if let Some(refused) = answer.refused {
-            println!("{name} | refused: {refused} | |");
+            println!("{name} | refused: {refused} | | |");
             agrees = false;
             continue;
         }
         let ours = if answer.reader.ends_with("MJCF") { &of_model } else { &of_urdf };
         ensure!(answer.torque.len() == ours.len(), "{} answers with other torques", answer.reader);
         let difference = difference(ours, &answer.torque, joints);
-        println!("{name} | {difference:.1e} | {:.1e} |", answer.least);
+        let motion = answer.motion.map(|motion| motion_error(&identified, motion)).transpose()?;
+        let told = motion.map_or(String::new(), |error| format!("{:.2} %", 100.0 * error));
+        println!("{name} | {difference:.1e} | {:.1e} | {told} |", answer.least);
         agrees &= difference < TOLERANCE && answer.least > 0.0;
+        agrees &= motion.is_none_or(|error| error < MOTION_TOLERANCE);
     }
     Ok(agrees)
+}
+
+/// How far our own model goes another way than MuJoCo's, under the same torques from the same state: RMS over
+/// the joints of the position's error after [`STROKE_S`], over their travel.
+fn motion_error(identified: &Identified, motion: Motion) -> anyhow::Result<f64> {
+    let Identified { tree, model, .. } = identified;
+    let joints = tree.joint_count();
+    let (design, mut parameters) = model.design(tree, &Catalogue::default())?;
+    for effect in 0..design.effects().len() {
+        for (at, parameter) in design.effect_parameters(effect).enumerate() {
+            parameters[parameter] = model.consistent_effect(effect, at).context("an effect of the model")?;
+        }
+    }
+    let Motion { q, v, torque } = motion;
+    let travel: Vec<f64> = (0..joints)
+        .map(|joint| {
+            let own = || q.iter().skip(joint).step_by(joints).copied();
+            own().fold(f64::MIN, f64::max) - own().fold(f64::MAX, f64::min)
+        })
+        .collect();
+    let window = Window { log: 0, start: 0.0, period: PERIOD, joints, q, qd: v, tau: torque };
+    let settings = ReproductionSettings { window_s: STROKE_S, ..ReproductionSettings::default() };
+    let plant =
+        || Ok(Plant::new(Box::new(AnalyticBackend::new(tree.clone()))).with_effects(&design, &parameters)?);
+    let growth = reproduce(&plant, &[window], &travel, None, &settings)?;
+    growth.share_of_travel.last().copied().context("a horizon")
 }
 
 /// Notes how generated code compares; whether its torques are ours.
@@ -307,7 +353,7 @@ fn in_rapier(read: &Tree, motions: &Motions) -> anyhow::Result<Answer> {
     for pose in motions.poses.chunks(joints) {
         least = least.min(least_eigenvalue(&mut backend, pose)?);
     }
-    Ok(Answer { reader: "Rapier, URDF".to_owned(), refused: None, torque, least })
+    Ok(Answer { reader: "Rapier, URDF".to_owned(), refused: None, torque, least, motion: None })
 }
 
 /// The least eigenvalue over the largest of the mass matrix, whose columns are what unit accelerations need.

@@ -17,6 +17,10 @@ from pathlib import Path
 import numpy as np
 
 
+# Time between two rows of a motion [s], steps in it, and half of a stroke [rad, m].
+PERIOD, STEPS, STROKE = 1e-3, 4, 0.05
+
+
 def least_eigenvalue(matrices):
     """The least eigenvalue over the largest, of all matrices."""
     values = np.linalg.eigvalsh(np.array(matrices))
@@ -62,6 +66,40 @@ class InMujoco:
         return 0.5 * (matrix + matrix.T)
 
 
+    def motion(self, start):
+        """Half a stroke of every joint under the torques that it needs, without a controller: positions, velocities
+        and torques, a row each PERIOD."""
+        mujoco, model = self.mujoco, self.model
+        flags = mujoco.mjtDisableBit
+        free = int(flags.mjDSBL_LIMIT) | int(flags.mjDSBL_CONTACT)
+        model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, PERIOD / STEPS
+        model.actuator_forcelimited[:] = 0
+        rate = 2 * np.pi
+        planner = InMujoco.__new__(InMujoco)
+        planner.__dict__.update(self.__dict__, data=mujoco.MjData(model))
+
+        def torque(t):
+            stroke = STROKE * np.array([1 - np.cos(rate * t), rate * np.sin(rate * t), rate**2 * np.cos(rate * t)])
+            ones = np.ones(len(start))
+            model.opt.disableflags = free | int(flags.mjDSBL_CONSTRAINT)
+            needed = planner.torque(start + stroke[0] * ones, stroke[1] * ones, stroke[2] * ones)
+            model.opt.disableflags = free
+            return needed
+
+        data = self.data = mujoco.MjData(model)
+        self.set(data.qpos, start)
+        rows = {"q": [], "v": [], "torque": []}
+        motors = [model.actuator(model.joint(joint).name).id for joint in (model.dof_jntid[at] for at in self.order)]
+        for row in range(int(0.5 / PERIOD) + 1):
+            t = row * PERIOD
+            for name, values in [("q", data.qpos[self.order]), ("v", data.qvel[self.order]), ("torque", torque(t))]:
+                rows[name] += values.tolist()
+            for step in range(STEPS):
+                data.ctrl[motors] = torque(t + (step + 0.5) * PERIOD / STEPS)
+                mujoco.mj_step(model, data)
+        return rows
+
+
 class InPinocchio:
     """A robot in Pinocchio."""
 
@@ -99,7 +137,10 @@ def answer(reader, file, joints, states, poses):
     except Exception as refusal:
         return {"refused": " ".join(str(refusal).split())}
     torques = [robot.torque(*state).tolist() for state in zip(*states)]
-    return {"torque": sum(torques, []), "least": least_eigenvalue([robot.mass_matrix(q) for q in poses])}
+    found = {"torque": sum(torques, []), "least": least_eigenvalue([robot.mass_matrix(q) for q in poses])}
+    if file.suffix == ".xml":
+        found["motion"] = robot.motion(states[0][0])
+    return found
 
 
 def main(folder):

@@ -7,8 +7,8 @@
 //! Whether independent programs compute the same. Regressor, inverse dynamics, mass matrix, forward dynamics
 //! and centre of mass are compared at random states of every robot at hand and of random ones, on fixed and
 //! floating bases; C3D files coordinate by coordinate; the optimum over possible bodies on random problems of
-//! real robots; the torques and mass matrices of identified.urdf and identified.xml in MuJoCo (pinned, and the
-//! newest), Pinocchio and Rapier.
+//! real robots; the torques and mass matrices of identified.urdf and identified.xml in MuJoCo (pinned, and
+//! the newest), Pinocchio and Rapier.
 //!
 //! # How it is run
 //!

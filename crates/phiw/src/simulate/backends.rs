@@ -2,8 +2,30 @@
 //! them.
 
 use crate::Error;
-use crate::arguments::Backend;
 use phiw_dynamics::{AnalyticBackend, BackendError, DynamicsBackend, Tree};
+
+/// What computes a motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Backend {
+    /// The algorithms of phiw-dynamics.
+    #[default]
+    Analytic,
+    /// MuJoCo.
+    Mujoco,
+    /// Rapier.
+    Rapier,
+}
+
+impl Backend {
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Backend::Analytic => "analytic",
+            Backend::Mujoco => "mujoco",
+            Backend::Rapier => "rapier",
+        }
+    }
+}
 
 /// Whether the backend is part of this program.
 ///
