@@ -224,9 +224,6 @@ impl EffectKind for Stribeck {
         near.extend(around(found, EXPONENT, step));
         near
     }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
-    }
     fn telling_motion(&self) -> &'static str {
         "a slow motion, well below the speed at which friction is lowest"
     }

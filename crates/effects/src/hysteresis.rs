@@ -27,9 +27,6 @@ impl EffectKind for Hysteresis {
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
         around(found, PRESLIDING, step)
     }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
-    }
     fn telling_motion(&self) -> &'static str {
         "small slow strokes of growing size about one position"
     }

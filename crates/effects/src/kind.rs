@@ -62,9 +62,9 @@ pub trait EffectKind: Send + Sync {
         Vec::new()
     }
 
-    /// Constants to use when the kind is declared for all joints; `None` if that makes no sense.
+    /// Constants that are fixed where the kind is declared; `None` if the data choose all of them.
     fn declared_constants(&self) -> Option<Constants> {
-        Some(Constants::new())
+        None
     }
 
     /// Whether its parameters may have changed against a held model that has it already: the change is then

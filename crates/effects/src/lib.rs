@@ -3,6 +3,7 @@
 mod catalogue;
 mod columns;
 mod coupling;
+mod declaration;
 mod drift;
 mod drive;
 mod elasticity;

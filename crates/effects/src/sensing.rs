@@ -33,9 +33,6 @@ impl EffectKind for TimeDelay {
     fn acts_on(&self) -> &'static str {
         "one joint, or all joints"
     }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
-    }
     fn telling_motion(&self) -> &'static str {
         "quick reversals of the torque"
     }
@@ -136,9 +133,6 @@ const OFFSET: &str = "offset";
 impl EffectKind for EncoderOffset {
     fn name(&self) -> &str {
         "encoder_offset"
-    }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
     }
     fn telling_motion(&self) -> &'static str {
         "rests in many poses of the joint and of those behind it"
@@ -255,9 +249,6 @@ impl EffectKind for ActuatorSaturation {
         [1.0 - spread, 1.0 + spread]
             .map(|factor| Constants::from([(LIMIT.to_owned(), limit * factor)]))
             .to_vec()
-    }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
     }
     fn telling_motion(&self) -> &'static str {
         "a motion that asks for more torque than the drive has"

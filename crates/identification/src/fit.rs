@@ -182,3 +182,14 @@ pub(crate) fn undetermined(all: &GroupedFactor) -> Result<Vec<usize>, RegressorE
         .collect();
     Ok(all.combine(&weights)?.undetermined_columns())
 }
+
+/// The solutions that leave out one fold each; `None` where there are too few folds.
+pub(crate) fn left_out(
+    folds: &[GroupedFactor],
+    determined: &[usize],
+    weights: &[f64],
+) -> Result<Option<Vec<Vec<f64>>>, RegressorError> {
+    let selected: Vec<GroupedFactor> =
+        folds.iter().map(|fold| fold.select(determined)).collect::<Result<_, _>>()?;
+    Ok(Jackknife::of(&selected, weights)?.map(Jackknife::into_solutions))
+}

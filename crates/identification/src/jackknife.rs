@@ -36,6 +36,11 @@ impl Jackknife {
         Ok(Some(Jackknife { solutions }))
     }
 
+    /// A solution for each fold that is left out.
+    pub(crate) fn into_solutions(self) -> Vec<Vec<f64>> {
+        self.solutions
+    }
+
     /// The same with each solution changed.
     pub(crate) fn map(self, change: impl Fn(&[f64]) -> Vec<f64>) -> Self {
         Jackknife { solutions: self.solutions.iter().map(|solution| change(solution)).collect() }

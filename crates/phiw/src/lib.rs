@@ -3,6 +3,7 @@
 mod actuator_table;
 pub mod analysis;
 pub mod arguments;
+pub mod bandwidth;
 pub mod check;
 pub mod console;
 mod date;

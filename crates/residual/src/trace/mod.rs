@@ -24,6 +24,6 @@ pub use floor::noise_floor;
 pub use input::{HeldModel, TraceInput, TraceOptions};
 pub use naming::LEAST_RIVAL;
 pub use probe::Dependence;
-pub use residuals::{ResidualShape, residual_shape};
+pub use residuals::{ResidualShape, ranges_of_residual, residual_shape};
 pub use search::trace;
 pub use tracing::{Disturbance, FoundEffect, Ranked, Remaining, RivalEffect, Tracing, Verdict};

@@ -1,6 +1,7 @@
 //! One pass over the logs with a fitted model: what it leaves, sample by sample, in constant memory.
 
-use phiw_identification::{BlockSource, Design, Fold, IdentificationError};
+use phiw_effects::SignalRanges;
+use phiw_identification::{BlockSource, Data, Design, Fold, IdentificationError};
 use phiw_telemetry::filter::FilterScratch;
 
 /// What the residual of each torque looks like on some folds.
@@ -32,6 +33,23 @@ const LAGS: [f64; 4] = [0.25, 0.35, 0.5, 2.5];
 const PEAKS: usize = 4;
 /// Highest spatial frequency that is tried \[1/rad\].
 const HIGHEST_FREQUENCY: f64 = 130.0;
+
+/// What the training motion covers, with the frequencies of what a model leaves of it.
+///
+/// # Errors
+/// A log cannot be read.
+pub fn ranges_of_residual(
+    design: &Design,
+    parameters: &[f64],
+    data: &Data<'_>,
+    mut ranges: SignalRanges,
+) -> Result<SignalRanges, IdentificationError> {
+    let positions: Vec<(f64, f64)> = ranges.joints.iter().map(|joint| joint.position).collect();
+    let shape = residual_shape(design, parameters, &data.train, &data.sources, &positions)?;
+    ranges.ripple_frequencies = shape.ripple_frequencies;
+    ranges.joints.iter_mut().zip(shape.rms).for_each(|(joint, rms)| joint.residual_rms = rms);
+    Ok(ranges)
+}
 
 struct Collector {
     /// Distances in outputs, ascending.

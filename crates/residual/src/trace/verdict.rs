@@ -4,7 +4,7 @@ use super::naming::Harm;
 use super::search::Search;
 use super::tracing::{Tracing, Verdict};
 use phiw_identification::fitting::{TorqueError, accumulate, fit, torque_error};
-use phiw_identification::{IdentificationError, Identified};
+use phiw_identification::{Design, IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
 
 /// Error of all torques together on motion held out, over that of the declared model, up to which a model
@@ -41,13 +41,19 @@ impl Search<'_> {
         let data = self.fixed.data;
         let folds = [data.train.as_slice(), &data.held_out].concat();
         let mut train_folds = accumulate(&design, &folds, &data.sources)?;
-        let held_out_folds = train_folds.split_off(data.train.len());
+        let mut held_out_folds = train_folds.split_off(data.train.len());
         let mut final_fit = fit(&design, &train_folds)?;
         if self.fixed.prior.is_some() {
             final_fit.parameters = match effects.is_empty() && refinements.is_empty() {
                 true => self.input.parameters.clone(),
                 false => self.parameters.clone(),
             };
+        }
+        // Where columns are made of the model's torque, it is that of the fit: the model as it is used.
+        let design = design.with_own_reference(&final_fit.parameters)?;
+        if design.needs().of_reference() {
+            train_folds = accumulate(&design, &folds, &data.sources)?;
+            held_out_folds = train_folds.split_off(data.train.len());
         }
         let after = errors(&train_folds, &held_out_folds, &final_fit.parameters)?;
         self.parameters.clone_from(&final_fit.parameters);
@@ -58,7 +64,6 @@ impl Search<'_> {
             (false, true) => Verdict::Explained,
             (false, false) => Verdict::PartlyExplained,
         };
-        let design = design.with_reference(self.fixed.reference(&self.specs, &final_fit.parameters)?);
         let model = Identified {
             design,
             fit: final_fit,
@@ -86,8 +91,11 @@ impl Search<'_> {
         let data = self.fixed.data;
         let (specs, parameters) = (&self.input.declared, &self.input.parameters);
         let folds = [data.train.as_slice(), &data.held_out].concat();
-        let reference = self.fixed.reference(specs, parameters)?;
-        let mut train = self.fixed.pass(specs, Vec::new(), reference, &folds)?.folds;
+        let effects = self.fixed.build(specs)?;
+        let design = Design::new(self.fixed.tree.clone(), self.fixed.base.clone(), effects)
+            .with_rest_speeds(data.rest_speeds.clone())
+            .with_own_reference(parameters)?;
+        let mut train = accumulate(&design, &folds, &data.sources)?;
         let held_out = train.split_off(data.train.len());
         errors(&train, &held_out, parameters)
     }
