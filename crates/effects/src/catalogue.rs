@@ -2,7 +2,8 @@
 
 use crate::declaration::{cannot_act, joint_indices, nearest};
 use crate::{EffectKind, FittedEffect, Mechanisms};
-use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};
+use crate::{coupling, drift, drive, efficiency, elasticity, external, friction, hysteresis};
+use crate::{position, position_map, sensing};
 use phiw_codegen::JointTorque;
 use phiw_dynamics::Tree;
 use phiw_identification::effect::{EffectError, EffectParameter, JointProperty};
@@ -41,6 +42,8 @@ impl Default for Catalogue {
                 Box::new(external::GravityTilt),
                 Box::new(external::Payload),
                 Box::new(external::ExternalForce),
+                Box::new(efficiency::DriveEfficiency),
+                Box::new(position_map::PositionMap),
             ],
         }
     }

@@ -150,6 +150,12 @@ pub trait EffectKind: Send + Sync {
         false
     }
 
+    /// Whether it has so many parameters that it can imitate other kinds: it gives way to simpler ones that
+    /// do its work.
+    fn is_general_form(&self) -> bool {
+        false
+    }
+
     /// Whether it changes with the time since the session began, so that logs whose clocks each begin anew
     /// cannot tell it.
     fn needs_session_time(&self) -> bool {

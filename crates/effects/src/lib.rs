@@ -6,6 +6,7 @@ mod coupling;
 mod declaration;
 mod drift;
 mod drive;
+mod efficiency;
 mod elasticity;
 mod external;
 mod fitted;
@@ -14,7 +15,9 @@ mod hysteresis;
 mod kind;
 mod mechanism;
 mod position;
+mod position_map;
 mod sensing;
+mod trigonometric_spline;
 
 pub use catalogue::{Catalogue, sentence};
 pub use columns::{Formula, OwnTorque, ParameterKind, smooth_sign};

@@ -39,6 +39,8 @@ pub struct TraceOptions {
     /// A residual below this share of its torque (RMS) is no structure: filters and encoders leave as much of
     /// a right model.
     pub structured_share: f64,
+    /// Probability that a torque's residual of noise seems to follow any signal.
+    pub false_structure_probability: f64,
     /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which on it
     /// is structure if its samples hang together (`structured_correlation`): the noise of a robot's sensors is
     /// of one colour, and raises all residuals over their floors alike.
@@ -69,6 +71,7 @@ impl Default for TraceOptions {
             negligible_share: 0.005,
             floor_margin: 1.15,
             structured_share: 0.03,
+            false_structure_probability: 0.05,
             structured_ratio: 8.0,
             structured_correlation: 0.3,
             wander: 0.5,

@@ -7,6 +7,7 @@
 
 mod constants;
 mod floor;
+mod general_forms;
 mod hypotheses;
 mod input;
 mod naming;

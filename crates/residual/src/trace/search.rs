@@ -58,6 +58,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
             break;
         }
     }
+    search.prefer_simpler_forms()?;
     search.finish()
 }
 
@@ -126,7 +127,7 @@ impl Search<'_> {
     }
 
     /// Chooses among all hypotheses, from the present model on.
-    fn choose(&mut self) -> Result<(), IdentificationError> {
+    pub(super) fn choose(&mut self) -> Result<(), IdentificationError> {
         let present = Present { specs: &self.specs, declared: self.declared };
         let mut candidates = Candidates::all(self.fixed, present, &self.ranges()?, self.options)?;
         let effects = std::mem::take(&mut candidates.effects);
