@@ -135,7 +135,8 @@ fn robot_agrees(
     let bodies = files.bodies().len();
     let motions = motions(tree, seed);
     let joints = tree.joint_count();
-    let of_urdf = torques_of_urdf(&identified, &motions)?;
+    // Other programs take a URDF's angles as they are written.
+    let of_urdf = torques_of_urdf(&identified, &files, &motions)?;
     let of_model = torques_of_model(tree, model, &motions)?;
     let mut answers = vec![in_rapier(&files, &motions)?];
     write_case(folder.path(), tree, &motions)?;
@@ -246,7 +247,8 @@ fn identified(robot: &Robot, folder: &Path) -> anyhow::Result<Identified> {
     let text = |name: &str| std::fs::read_to_string(folder.join("out").join(name));
     let model: Model = serde_json::from_str(&text("model.json")?)?;
     let described = std::fs::read_to_string(&robot.urdf)?;
-    let tree = model.consistent_tree(&read_urdf(&described, &UrdfOptions::default())?.tree)?;
+    let options = UrdfOptions { snap: true, ..UrdfOptions::default() };
+    let tree = model.consistent_tree(&read_urdf(&described, &options)?.tree)?;
     let (model_file, out) = (folder.join("out/model.json"), folder.to_owned());
     export(&ExportArguments { model: model_file, out, ..ExportArguments::default() })?;
     std::fs::copy(folder.join("out/identified.urdf"), folder.join("identified.urdf"))?;
@@ -291,7 +293,7 @@ fn motions(tree: &Tree, seed: u64) -> Motions {
 }
 
 /// Rigid body, damping and friction: what URDF can express.
-fn torques_of_urdf(identified: &Identified, motions: &Motions) -> anyhow::Result<Vec<f64>> {
+fn torques_of_urdf(identified: &Identified, files: &Tree, motions: &Motions) -> anyhow::Result<Vec<f64>> {
     let Identified { tree, model, .. } = identified;
     let (joints, catalogue) = (tree.joint_count(), Catalogue::default());
     let mut damping = vec![0.0; joints];
@@ -305,7 +307,7 @@ fn torques_of_urdf(identified: &Identified, motions: &Motions) -> anyhow::Result
             _ => {}
         }
     }
-    let mut backend = AnalyticBackend::new(tree.clone());
+    let mut backend = AnalyticBackend::new(files.clone());
     let mut torques = torques(&mut backend, motions)?;
     for (place, torque) in torques.iter_mut().enumerate() {
         let (joint, v) = (place % joints, motions.v[place]);
