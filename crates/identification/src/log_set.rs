@@ -114,8 +114,8 @@ impl LogSet {
     pub fn conditioning(&self) -> &Conditioning {
         &self.conditioning
     }
-    /// Conditions all logs with another cut-off of the parallel filter \[Hz\], one that the training logs told
-    /// (see [`bandwidth`](crate::bandwidth)).
+    /// Conditions all logs with another cut-off of the parallel filter \[Hz\], one that the training logs
+    /// told (see [`bandwidth`](crate::bandwidth)).
     pub fn set_parallel_cutoff(&mut self, cutoff_hz: f64) {
         self.conditioning.parallel_cutoff_hz = cutoff_hz;
     }

@@ -133,8 +133,8 @@ fn finite(value: f64) -> Option<f64> {
 }
 
 impl Model {
-    /// The model of a fit. `declared` is what the user declared, in the form of [`EffectSelector`]; `held` are
-    /// the joints that were held.
+    /// The model of a fit. `declared` is what the user declared, in the form of [`EffectSelector`]; `held`
+    /// are the joints that were held.
     ///
     /// # Errors
     /// The fit is not of this design.
