@@ -95,6 +95,13 @@ impl LogSet {
         Ok(LogSet { train: train.len(), conditioning, surveys })
     }
 
+    /// The same logs, each row of which goes out.
+    pub fn with_every_row(&self) -> Self {
+        let mut conditioning = self.conditioning.clone();
+        conditioning.options.decimation = Some(1);
+        LogSet { surveys: self.surveys.clone(), train: self.train, conditioning }
+    }
+
     /// All surveys: training logs, then those for validation.
     pub fn surveys(&self) -> &[Survey] {
         &self.surveys
