@@ -16,15 +16,27 @@ impl<'a> KeptBlocks<'a> {
     ///
     /// # Errors
     /// A log cannot be read.
-    pub fn keep(
+    pub fn keep(sources: &[&'a dyn BlockSource], budget: usize) -> Result<Vec<Self>, IdentificationError> {
+        Self::keep_where(sources, budget, |_| true)
+    }
+
+    /// The same for those blocks alone that are `wanted`: only they come again where they fit.
+    ///
+    /// # Errors
+    /// A log cannot be read.
+    pub fn keep_where(
         sources: &[&'a dyn BlockSource],
         mut budget: usize,
+        wanted: impl Fn(&Block) -> bool,
     ) -> Result<Vec<Self>, IdentificationError> {
         let mut all = Vec::with_capacity(sources.len());
         for &source in sources {
             let mut kept = Some(Vec::new());
             let mut used = 0;
             source.blocks(&mut |block| {
+                if !wanted(&block) {
+                    return;
+                }
                 used += size(&block);
                 match &mut kept {
                     Some(blocks) if used <= budget => blocks.push(block),

@@ -14,6 +14,7 @@ mod naming;
 mod probe;
 mod remaining;
 mod residuals;
+mod sample;
 mod search;
 mod signal_shapes;
 mod stage;

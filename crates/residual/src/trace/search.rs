@@ -3,16 +3,13 @@
 use super::hypotheses::{Candidates, Present};
 use super::input::{TraceInput, TraceOptions};
 use super::residuals::ranges_of_residual;
+use super::sample::Sample;
 use super::stage::{Fixed, Stage, specs_and_values};
 use super::tracing::Tracing;
 use crate::selection::{Member, Policy, Problem, select, value};
 use phiw_effects::SignalRanges;
-use phiw_identification::{
-    BlockSource, Data, Design, Effect, EffectSpec, Fold, IdentificationError, KeptBlocks,
-};
+use phiw_identification::{Data, Design, Effect, EffectSpec, Fold, IdentificationError};
 
-/// Conditioned samples that are kept between passes; longer logs are read again \[bytes\].
-const KEPT_BYTES: usize = 64 << 20;
 /// Times that all is chosen anew: columns that are made of the model's torque need a second, what they bring
 /// about a third.
 const ROUNDS: usize = 4;
@@ -30,16 +27,12 @@ const FINALISTS: usize = 12;
 /// # Errors
 /// A log cannot be read, or holds too little for the declared model.
 pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, IdentificationError> {
-    let kept = KeptBlocks::keep(&input.data.sources, KEPT_BYTES)?;
-    let data = Data {
-        train: input.data.train.clone(),
-        held_out: input.data.held_out.clone(),
-        sources: kept.iter().map(|kept| kept as &dyn BlockSource).collect(),
-        rest_speeds: input.data.rest_speeds.clone(),
-    };
+    let sample = Sample::of(input.data, input.ranges.period)?;
+    let data = sample.data(&input.data.rest_speeds);
     let fixed = Fixed::new(&input, &data, options)?;
     let mut search = Search {
         fixed: &fixed,
+        whole: if data.train == input.data.train { &data } else { input.data },
         specs: input.declared.clone(),
         parameters: input.parameters.clone(),
         declared: input.declared.len(),
@@ -80,6 +73,8 @@ pub(super) struct Chosen {
 #[derive(Clone)]
 pub(super) struct Search<'a> {
     pub fixed: &'a Fixed<'a>,
+    /// All logs: `fixed` has those pieces of long ones that are searched.
+    pub whole: &'a Data<'a>,
     /// Effects of the model: those declared, then those found.
     pub specs: Vec<EffectSpec>,
     /// The base parameters, then those of the effects.

@@ -38,7 +38,7 @@ impl Search<'_> {
             self.parameters.clone_from(&self.input.parameters);
         }
         let design = self.design()?;
-        let data = self.fixed.data;
+        let data = self.whole;
         let folds = [data.train.as_slice(), &data.held_out].concat();
         let mut train_folds = accumulate(&design, &folds, &data.sources)?;
         let mut held_out_folds = train_folds.split_off(data.train.len());
@@ -81,14 +81,14 @@ impl Search<'_> {
     /// with those that were declared.
     fn is_worse_than(&self, declared: &TorqueError) -> Result<bool, IdentificationError> {
         let design = self.design()?;
-        let data = self.fixed.data;
+        let data = self.whole;
         let folds = accumulate(&design, &data.held_out, &data.sources)?;
         Ok(torque_error(&folds, &self.parameters)?.relative > declared.relative)
     }
 
     /// Error of the declared (or held) model: training, held out.
     fn declared_error(&self) -> Result<(TorqueError, TorqueError), IdentificationError> {
-        let data = self.fixed.data;
+        let data = self.whole;
         let (specs, parameters) = (&self.input.declared, &self.input.parameters);
         let folds = [data.train.as_slice(), &data.held_out].concat();
         let effects = self.fixed.build(specs)?;

@@ -1,0 +1,96 @@
+//! Long logs are searched in evenly spread pieces: which effects are missing is told by minutes, what they
+//! measure by all.
+
+use phiw_identification::{BlockSource, Data, Fold, IdentificationError, KeptBlocks};
+use phiw_telemetry::Block;
+
+/// Samples that the search looks at, at most: some minutes of motion.
+const SEARCHED_SAMPLES: f64 = 150_000.0;
+/// Length of a piece \[s\]: long against a residual's correlation and against the filters' reach.
+const PIECE_S: f64 = 5.0;
+/// Conditioned samples that are kept between passes; what does not fit is read again \[bytes\].
+const KEPT_BYTES: usize = 64 << 20;
+/// The same for pieces of long logs, which are as many as they are.
+const KEPT_BYTES_OF_PIECES: usize = 512 << 20;
+
+/// The stretches that are searched, and the blocks that hold them.
+pub(super) struct Sample<'a> {
+    train: Vec<Fold>,
+    held_out: Vec<Fold>,
+    kept: Vec<KeptBlocks<'a>>,
+}
+
+impl<'a> Sample<'a> {
+    /// All of `data` where that is little, pieces of it otherwise. `period_s` is the time between samples.
+    ///
+    /// # Errors
+    /// A log cannot be read.
+    pub fn of(data: &Data<'a>, period_s: f64) -> Result<Self, IdentificationError> {
+        let length = |folds: &[Fold]| folds.iter().map(|fold| fold.end - fold.start).sum::<f64>();
+        let samples = (length(&data.train) + length(&data.held_out)) / period_s;
+        if samples.is_nan() || samples <= SEARCHED_SAMPLES {
+            return Ok(Sample {
+                train: data.train.clone(),
+                held_out: data.held_out.clone(),
+                kept: KeptBlocks::keep(&data.sources, KEPT_BYTES)?,
+            });
+        }
+        let share = SEARCHED_SAMPLES / samples;
+        let (train, held_out) = (pieces(&data.train, share), pieces(&data.held_out, share));
+        let within = |block: &Block| {
+            let time = |output: &usize| block.t[*output];
+            let (first, last) = (block.outputs.first().map(time), block.outputs.last().map(time));
+            let (Some(first), Some(last)) = (first, last) else { return false };
+            let overlaps = |fold: &Fold| fold.log == block.log && fold.start <= last && first < fold.end;
+            train.iter().chain(&held_out).any(overlaps)
+        };
+        let kept = KeptBlocks::keep_where(&data.sources, KEPT_BYTES_OF_PIECES, within)?;
+        Ok(Sample { train, held_out, kept })
+    }
+
+    /// The same as data of a session.
+    pub fn data(&self, rest_speeds: &[f64]) -> Data<'_> {
+        Data {
+            train: self.train.clone(),
+            held_out: self.held_out.clone(),
+            sources: self.kept.iter().map(|kept| kept as &dyn BlockSource).collect(),
+            rest_speeds: rest_speeds.to_vec(),
+        }
+    }
+}
+
+/// Pieces of about `share` of the folds' length, spread evenly; of each fold at least one.
+fn pieces(folds: &[Fold], share: f64) -> Vec<Fold> {
+    let of_fold = |fold: &Fold| -> Vec<Fold> {
+        let length = fold.end - fold.start;
+        let wanted = share * length;
+        let count = (wanted / PIECE_S).round().max(1.0);
+        let (half, step) = (0.5 * (wanted / count), length / count);
+        let piece = |index: usize| {
+            let middle = fold.start + (index as f64 + 0.5) * step;
+            Fold { log: fold.log, start: middle - half, end: middle + half }
+        };
+        (0..count as usize).map(piece).collect()
+    };
+    folds.iter().flat_map(of_fold).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The time of a trace grew with the length of the logs: 553 s for a million rows.
+    #[test]
+    fn pieces_of_long_folds_are_as_long_as_asked_and_lie_within() {
+        let folds = [Fold { log: 0, start: 3.0, end: 1003.0 }, Fold { log: 1, start: 0.0, end: 12.0 }];
+        let all = pieces(&folds, 0.15);
+        let length: f64 = all.iter().map(|piece| piece.end - piece.start).sum();
+        assert!((length - 0.15 * 1012.0).abs() < 1e-9);
+        assert_eq!(all.iter().filter(|piece| piece.log == 0).count(), 30);
+        for piece in &all {
+            let fold = &folds[piece.log];
+            assert!(fold.start <= piece.start && piece.start < piece.end && piece.end <= fold.end);
+        }
+        assert!(all.windows(2).all(|pair| pair[0].log < pair[1].log || pair[0].end <= pair[1].start));
+    }
+}
