@@ -84,6 +84,10 @@ pub struct ExplainArguments {
     /// Effects that are not sought: a kind anywhere, or on the joints named. Declared effects stay.
     #[arg(long, value_name = "KIND[:JOINT[+JOINT…]],…", value_delimiter = ',')]
     pub exclude: Vec<String>,
+    /// Probability of naming anything where nothing is missing, for all logs and candidates together; 0.01 by
+    /// default.
+    #[arg(long, value_name = "PROBABILITY", value_parser = share)]
+    pub false_name_rate: Option<f64>,
 }
 
 /// Arguments of `phiw predict`.

@@ -106,6 +106,9 @@ pub fn command_line(arguments: &ExplainArguments) -> String {
     if !arguments.exclude.is_empty() {
         line.push_str(&format!(" --exclude {}", quoted(&arguments.exclude.join(","))));
     }
+    if let Some(rate) = arguments.false_name_rate {
+        line.push_str(&format!(" --false-name-rate {rate}"));
+    }
     if arguments.draws > 0 {
         line.push_str(&format!(" --draws {}", arguments.draws));
     }
@@ -148,7 +151,9 @@ fn traced(
         noise_floor: floor.clone(),
         rows_per_independent: (plan.output_rate_hz() / (2.0 * conditioning.parallel_cutoff_hz)).max(1.0),
     };
-    let tracing = trace(input, &TraceOptions { excluded, ..TraceOptions::default() })?;
+    let mut options = TraceOptions { excluded, ..TraceOptions::default() };
+    options.false_name_probability = arguments.false_name_rate.unwrap_or(options.false_name_probability);
+    let tracing = trace(input, &options)?;
     Ok(Traced { start: start.model, floor, tracing })
 }
 

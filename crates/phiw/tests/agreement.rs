@@ -86,6 +86,7 @@ impl Case {
             model: None,
             draws: 0,
             exclude: Vec::new(),
+            false_name_rate: None,
         };
         let explained = phiw::explain::explain(&arguments, &Console::silent()).unwrap().report;
         assert_eq!(identified.before, explained.before, "{declare:?}");

@@ -49,11 +49,16 @@ impl Scene {
     }
 
     fn explain(&self, declare: &[&str], exclude: &[&str]) -> ReportJson {
+        self.explain_at(declare, exclude, None)
+    }
+
+    fn explain_at(&self, declare: &[&str], exclude: &[&str], false_name_rate: Option<f64>) -> ReportJson {
         let arguments = ExplainArguments {
             session: self.session(declare, "explained"),
             model: None,
             draws: 0,
             exclude: exclude.iter().map(|&excluded| excluded.to_owned()).collect(),
+            false_name_rate,
         };
         phiw::explain::explain(&arguments, &Console::silent()).unwrap().report
     }
@@ -193,6 +198,15 @@ fn what_is_excluded_is_neither_named_nor_a_refinement() {
     );
     let page = fs::read_to_string(scene.path("explained/report.html")).unwrap();
     assert!(page.contains("--exclude coulomb_friction"));
+}
+
+/// The probability of naming anything where nothing is missing is set, not hoped for.
+#[test]
+fn a_lower_false_name_rate_asks_for_more_certainty() {
+    let scene = Scene::new(30.0, |speeds, torques| torques[1] += 2.0 * (speeds[1] / 0.005).tanh());
+    let named = |rate| scene.explain_at(&["viscous_friction"], &[], rate).effects.len();
+    assert!(named(None) > 0);
+    assert_eq!(named(Some(0.0)), 0);
 }
 
 #[test]
