@@ -6,7 +6,7 @@ mod test;
 mod torture;
 
 use clap::{Parser, Subcommand};
-use phiw_experiments::{consistent, oracle, paper, plant, retarget, run, synthetic_log, undeclared};
+use phiw_experiments::{consistent, noise, oracle, paper, plant, retarget, run, synthetic_log, undeclared};
 use std::process::ExitCode;
 
 #[derive(Parser)]
@@ -39,6 +39,8 @@ enum Task {
     Undeclared(undeclared::Arguments),
     /// The experiments of the paper's section 5, resumable, on one machine or many.
     Paper(paper::Arguments),
+    /// The curriculum on a robot whose noise nobody knows: estimators, sensors and noises compared.
+    Noise(noise::Arguments),
     /// Robots in physics engines with one secret each, tracked poorly: log, trace with `phiw explain`, score.
     Plant(plant::Arguments),
 }
@@ -60,6 +62,12 @@ fn main() -> anyhow::Result<ExitCode> {
                 mujoco::fetch_or_go_on_without();
             }
             paper::command(&arguments).map(|()| ExitCode::SUCCESS)
+        }
+        Task::Noise(arguments) => {
+            if arguments.needs_mujoco() {
+                mujoco::fetch_or_go_on_without();
+            }
+            noise::command(&arguments).map(|()| ExitCode::SUCCESS)
         }
         Task::Plant(arguments) => plant::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Consistent(arguments) => consistent::command(&arguments).map(|()| ExitCode::SUCCESS),

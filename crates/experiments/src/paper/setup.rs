@@ -264,6 +264,8 @@ impl Setup {
             timing: timing(backend),
             fall_tilt_rad: 0.3,
             stillness: Default::default(),
+            noise_correlation: 0.0,
+            measuring: Default::default(),
             build: Box::new(move |tree, world| backend.build(tree, world)),
         }
     }

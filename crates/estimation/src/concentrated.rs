@@ -1,0 +1,229 @@
+//! Maximum likelihood of a motion that noise moves, where nobody knows the noise.
+
+use super::body_prior::BodyPrior;
+use super::in_order::{Colour, InOrder};
+use super::likelihood::column;
+use super::profile::{Minimum, Profile};
+use super::sensitivity::Sensitivity;
+use super::settings::NewtonSettings;
+use super::{Estimate, Estimator, Evidence};
+use crate::{EstimationError, RobotModel};
+use faer::Mat;
+use phiw_consistency::PriorSettings;
+use phiw_identification::Design;
+
+/// [`super::MotionLikelihood`] without being told the noise: its size, its correlation from a period to the
+/// next, and how much of what the log's torque has beside the command moved the robot are found with the
+/// parameters.
+///
+/// Three things are unknown of each torque, and each has its own trace in the logs:
+///
+/// - σ, the size. That of the residual under the parameters; the parameters are those that are most likely
+///   when σ is (concentrated likelihood). What is lost against a known σ is what the noise's own size tells of
+///   the inertia it shakes.
+/// - ρ, the correlation from one command to the next. The rows are Φ_t − ρ·Φ_{t−1} (Cochrane & Orcutt 1949),
+///   whose noise is white, so that the state a period begins with is an instrument again.
+/// - Where the noise is. A controller of the form (13) commands what follows from the reference and the
+///   encoders ([`crate::MotionLog::command`]); what the log's torque has beside it is an error of its sensor,
+///   or was delivered and moved the robot. The share that did is a coefficient of its own.
+///
+/// Bodies are possible: the prior is the log-det divergence from what was believed at first, and frictions
+/// stay positive. Without [`crate::MotionLog::asked`] the log's torque is taken for the command: right for a
+/// robot that logs its commands, and where a torque sensor's noise is small beside the actuators'.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ConcentratedLikelihood {
+    /// What was believed before anything was measured.
+    pub initial: RobotModel,
+    /// Bodies that do not move ([`super::MotionLikelihood::standing_on`]).
+    pub standing_on: Vec<usize>,
+    /// What it decides.
+    pub settings: ConcentratedSettings,
+}
+
+/// What [`ConcentratedLikelihood`] decides.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ConcentratedSettings {
+    /// Weight of the prior: nats of −log L a unit of divergence. Default: 1.
+    pub prior_weight: f64,
+    /// How bodies of the first belief that can not exist are mended.
+    pub prior: PriorSettings,
+    /// Times that parameters and colours are found one after the other, at most. Default: 8.
+    pub rounds: usize,
+    /// Change of a correlation from which on another round is worth it. Default: 0.005.
+    pub settled: f64,
+    /// Largest correlation of the noise. Default: 0.98: rows of a noise that is nearly a constant say nothing
+    /// of weights.
+    pub largest_correlation: f64,
+    /// Least standard deviation of a torque's noise over the RMS of its command. Default: 10⁻⁴, what an
+    /// engine's integration leaves.
+    pub least_noise: f64,
+    /// How minima are found.
+    pub newton: NewtonSettings,
+}
+
+impl Default for ConcentratedSettings {
+    fn default() -> Self {
+        ConcentratedSettings {
+            prior_weight: 1.0,
+            prior: PriorSettings::default(),
+            rounds: 8,
+            settled: 0.005,
+            largest_correlation: 0.98,
+            least_noise: 1e-4,
+            newton: NewtonSettings::default(),
+        }
+    }
+}
+
+/// The noise of a torque, as found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorqueNoise {
+    /// Standard deviation of what moved the robot beside the command \[N·m, N\].
+    pub std: f64,
+    /// Its correlation from one command to the next.
+    pub correlation: f64,
+    /// Share of what the log's torque has beside the command that moved the robot: 0 where it is the error of
+    /// a sensor, 1 where it was delivered.
+    pub felt: f64,
+}
+
+impl ConcentratedLikelihood {
+    /// For a robot of which this was believed at first.
+    pub fn new(initial: RobotModel) -> Self {
+        ConcentratedLikelihood { initial, standing_on: Vec::new(), settings: ConcentratedSettings::default() }
+    }
+
+    /// The same for a robot on which these bodies do not move.
+    pub fn standing_on(self, bodies: Vec<usize>) -> Self {
+        ConcentratedLikelihood { standing_on: bodies, ..self }
+    }
+
+    /// The noise of each torque under `parameters`.
+    ///
+    /// # Errors
+    /// The evidence is not of this design, or its rows were not taken in order.
+    pub fn noise(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        parameters: &[f64],
+    ) -> Result<Vec<TorqueNoise>, EstimationError> {
+        let parts = self.parts(design, evidence)?;
+        let colours = parts.in_order.colours(parameters, self.settings.largest_correlation);
+        let std = parts.profile(self, &colours)?.noise(&column(parameters));
+        let noise = |(colour, std): (&Colour, f64)| TorqueNoise {
+            std: std / (1.0 - colour.correlation * colour.correlation).sqrt(),
+            correlation: colour.correlation,
+            felt: colour.felt,
+        };
+        Ok(colours.iter().zip(std).map(noise).collect())
+    }
+
+    fn parts<'a>(&self, design: &Design, evidence: &'a Evidence) -> Result<Parts<'a>, EstimationError> {
+        let in_order = evidence.in_order()?;
+        let prior = BodyPrior::new(design, &self.initial, &self.settings.prior)?;
+        let base = design.base().map();
+        let (rigid, standard) = (design.base().count(), prior.standard_size());
+        let map = Mat::from_fn(design.parameter_count(), prior.size(), |row, column| {
+            match (row < rigid, column < standard) {
+                (true, true) => base[(row, column)],
+                (false, false) => f64::from(u8::from(row - rigid == column - standard)),
+                _ => 0.0,
+            }
+        });
+        let sensitivities = Sensitivity::all(design, evidence, &self.standing_on)?;
+        let variance = |group: &phiw_regressor::least_squares::Group| {
+            let rows = group.factor.rows().max(1) as f64;
+            let square = group.factor.right_hand_side_sum_of_squares() / rows;
+            (self.settings.least_noise.powi(2) * square).max(f64::MIN_POSITIVE)
+        };
+        let least_variance = evidence.factor().groups().iter().map(variance).collect();
+        Ok(Parts { in_order, prior, map, sensitivities, least_variance })
+    }
+}
+
+/// What all rounds share.
+struct Parts<'a> {
+    in_order: &'a InOrder,
+    prior: BodyPrior,
+    map: Mat<f64>,
+    sensitivities: Vec<Sensitivity>,
+    least_variance: Vec<f64>,
+}
+
+impl Parts<'_> {
+    fn profile(
+        &self,
+        estimator: &ConcentratedLikelihood,
+        colours: &[Colour],
+    ) -> Result<Profile<'_>, EstimationError> {
+        Ok(Profile {
+            factor: self.in_order.whitened(colours)?,
+            sensitivities: &self.sensitivities,
+            map: &self.map,
+            prior: &self.prior,
+            prior_weight: estimator.settings.prior_weight,
+            least_variance: self.least_variance.clone(),
+            newton: estimator.settings.newton,
+        })
+    }
+}
+
+impl Estimator for ConcentratedLikelihood {
+    fn name(&self) -> &'static str {
+        "concentrated_likelihood"
+    }
+
+    fn in_order(&self) -> bool {
+        true
+    }
+
+    fn estimate(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        present: &RobotModel,
+        present_parameters: &[f64],
+    ) -> Result<Estimate, EstimationError> {
+        let parts = self.parts(design, evidence)?;
+        let rigid = design.base().count();
+        let mut x = parts.prior.start(&present.standard, &present_parameters[rigid..]);
+        let mut colours = vec![Colour { correlation: 0.0, felt: 0.0 }; design.rows().len()];
+        let mut covariance = None;
+        for round in 0..self.settings.rounds.max(1) {
+            let profile = parts.profile(self, &colours)?;
+            let found: Minimum = profile.minimum(x);
+            (x, covariance) = (found.x, found.covariance);
+            let w = &parts.map * &x;
+            let next = parts.in_order.colours(w.col_as_slice(0), self.settings.largest_correlation);
+            let change = |(one, other): (&Colour, &Colour)| {
+                (one.correlation - other.correlation).abs().max((one.felt - other.felt).abs())
+            };
+            let changed = colours.iter().zip(&next).map(change).fold(0.0, f64::max);
+            if changed < self.settings.settled || round + 1 == self.settings.rounds {
+                break;
+            }
+            colours = next;
+        }
+        let w = &parts.map * &x;
+        let covariance = covariance.map(|own: Mat<f64>| &parts.map * own * parts.map.transpose());
+        let deviation = |k: usize| covariance.as_ref().map_or(f64::NAN, |own| own[(k, k)].max(0.0).sqrt());
+        Ok(Estimate {
+            parameters: w.col_as_slice(0).to_vec(),
+            standard_deviations: (0..w.nrows()).map(deviation).collect(),
+            covariance,
+        })
+    }
+
+    /// At the colours that the parameters themselves leave, so that models are compared each at its best.
+    fn negative_log_likelihood(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        parameters: &[f64],
+    ) -> Result<Option<f64>, EstimationError> {
+        let parts = self.parts(design, evidence)?;
+        let colours = parts.in_order.colours(parameters, self.settings.largest_correlation);
+        Ok(Some(parts.profile(self, &colours)?.likelihood(&column(parameters))))
+    }
+}
