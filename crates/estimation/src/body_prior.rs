@@ -6,7 +6,7 @@
 //! keeps every body possible.
 
 use crate::{EstimationError, RobotModel};
-use faer::Mat;
+use faer::{Mat, Side};
 use phiw_consistency::{PriorSettings, PseudoInertia, possible_priors};
 use phiw_dynamics::dense::Cholesky;
 use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
@@ -31,11 +31,19 @@ struct Body {
 
 impl BodyPrior {
     /// About a model. Bodies of it that are not possible are mended first.
-    pub fn new(design: &Design, model: &RobotModel, settings: &PriorSettings) -> Result<Self, EstimationError> {
+    pub fn new(design: &Design, model: &RobotModel, roundness: f64) -> Result<Self, EstimationError> {
         let described = model.standard.as_chunks::<PARAMETERS_PER_BODY>().0;
-        let possible = possible_priors(described, length(design), settings);
-        let mut bodies = Vec::with_capacity(possible.len());
-        for standard in possible {
+        let mut bodies = Vec::with_capacity(described.len());
+        let settings = PriorSettings::default();
+        let lengths = length(design);
+        let masses: Vec<f64> = described.iter().map(|body| body[0]).filter(|mass| *mass > 0.0).collect();
+        let mean_mass = masses.iter().sum::<f64>() / masses.len().max(1) as f64;
+        let rounded: Vec<[f64; PARAMETERS_PER_BODY]> = described
+            .iter()
+            .map(|body| round(body, roundness, settings.least_mass * mean_mass, settings.least_radius * lengths))
+            .collect();
+        // What is nothing at all stays for the general remedy.
+        for standard in possible_priors(&rounded, lengths, &settings) {
             let prior = PseudoInertia::of_parameters(&standard);
             let Some(factor) = Cholesky::of(ROWS, |row, column| prior.entry(row, column)) else {
                 return Err(EstimationError::Log("a body of the first belief is flat to the last digit"));
@@ -145,6 +153,36 @@ impl BodyPrior {
         }
     }
 }
+
+/// A body with the described mass, centre of mass and size, lifted where it is flatter than `roundness`, or
+/// impossible: second moments about the centre of mass along all axes are then at least that share of their
+/// mean. The mean is at least a quarter of that about the joint, and a sphere's of `least_radius`: what is
+/// left of an inertia without its mass's own share may be less than nothing where each of them is uncertain.
+fn round(
+    body: &[f64; PARAMETERS_PER_BODY],
+    roundness: f64,
+    least_mass: f64,
+    least_radius: f64,
+) -> [f64; PARAMETERS_PER_BODY] {
+    let mass = body[0].max(least_mass);
+    let whole = PseudoInertia::of_parameters(body);
+    let centre: [f64; 3] = std::array::from_fn(|axis| whole.entry(axis, 3) / mass);
+    let about = |row: usize, column: usize| whole.entry(row, column) - mass * centre[row] * centre[column];
+    let about_joint: f64 = (0..3).map(|axis| whole.entry(axis, axis)).sum();
+    let about_centre: f64 = (0..3).map(|axis| about(axis, axis)).sum();
+    let mean = about_centre.max(LEFT_OF_INERTIA * about_joint).max(3.0 * mass * least_radius.powi(2)) / 3.0;
+    let Ok(eigen) = Mat::from_fn(3, 3, about).self_adjoint_eigen(Side::Lower) else { return *body };
+    let lifted = |row: usize, column: usize| -> f64 {
+        (0..3).map(|k| eigen.U()[(row, k)] * eigen.U()[(column, k)] * eigen.S()[k].max(roundness * mean)).sum()
+    };
+    let second = |row: usize, column: usize| lifted(row, column) + mass * centre[row] * centre[column];
+    let (x, y, z) = (second(0, 0), second(1, 1), second(2, 2));
+    let [hx, hy, hz] = centre.map(|along| mass * along);
+    [mass, hx, hy, hz, y + z, -second(0, 1), x + z, -second(0, 2), -second(1, 2), x + y]
+}
+
+/// Share of a body's second moment about its joint that is left about its centre of mass at least.
+const LEFT_OF_INERTIA: f64 = 0.25;
 
 /// Divergence from the prior above which a body is no start: nearly flat bodies take many steps.
 const FARTHEST_START: f64 = 50.0;

@@ -9,7 +9,6 @@ use super::settings::NewtonSettings;
 use super::{Estimate, Estimator, Evidence};
 use crate::{EstimationError, RobotModel};
 use faer::Mat;
-use phiw_consistency::PriorSettings;
 use phiw_identification::Design;
 
 /// [`super::MotionLikelihood`] without being told the noise: its size, its correlation from a period to the
@@ -24,7 +23,7 @@ use phiw_identification::Design;
 /// - ρ, the correlation from one command to the next. The rows are Φ_t − ρ·Φ_{t−1} (Cochrane & Orcutt 1949),
 ///   whose noise is white, so that the state a period begins with is an instrument again.
 /// - Where the noise is. A controller of the form (13) commands what follows from the reference and the
-///   encoders ([`crate::MotionLog::command`]); what the log's torque has beside it is an error of its sensor,
+///   encoders ([`crate::MotionLog::commands`]); what the log's torque has beside it is an error of its sensor,
 ///   or was delivered and moved the robot. The share that did is a coefficient of its own.
 ///
 /// Bodies are possible: the prior is the log-det divergence from what was believed at first, and frictions
@@ -45,17 +44,26 @@ pub struct ConcentratedLikelihood {
 pub struct ConcentratedSettings {
     /// Weight of the prior: nats of −log L a unit of divergence. Default: 1.
     pub prior_weight: f64,
-    /// How bodies of the first belief that can not exist are mended.
-    pub prior: PriorSettings,
-    /// Times that parameters and colours are found one after the other, at most. Default: 8.
+    /// How round the bodies are that are believed at first: least second moment about the centre of mass
+    /// along any axis, over the mean of all axes. Default: 0.4.
+    pub roundness: f64,
+    /// Times that parameters and colours are found one after the other, at most. Default: 14.
     pub rounds: usize,
+    /// Of these, the first so many take the torques' median correlation for all: under a bad first belief
+    /// the residual of a single torque is no noise yet, and may keep the estimate from ever leaving it.
+    /// Default: 5.
+    pub rounds_in_common: usize,
+    /// Newton steps of a round at most, but of the last: what is found anew a moment later need not be
+    /// found exactly. Default: 6.
+    pub steps_a_round: usize,
     /// Change of a correlation from which on another round is worth it. Default: 0.005.
     pub settled: f64,
     /// Largest correlation of the noise. Default: 0.98: rows of a noise that is nearly a constant say nothing
     /// of weights.
     pub largest_correlation: f64,
-    /// Least standard deviation of a torque's noise over the RMS of its command. Default: 10⁻⁴, what an
-    /// engine's integration leaves.
+    /// Least standard deviation of a torque's noise over the RMS of its command. Default: 3·10⁻³. No drive
+    /// delivers its command better than to some thousandths, and without a floor a log without noise would
+    /// leave no digits for the bodies.
     pub least_noise: f64,
     /// How minima are found.
     pub newton: NewtonSettings,
@@ -65,11 +73,13 @@ impl Default for ConcentratedSettings {
     fn default() -> Self {
         ConcentratedSettings {
             prior_weight: 1.0,
-            prior: PriorSettings::default(),
-            rounds: 8,
+            roundness: 0.4,
+            rounds: 14,
+            rounds_in_common: 5,
+            steps_a_round: 6,
             settled: 0.005,
             largest_correlation: 0.98,
-            least_noise: 1e-4,
+            least_noise: 3e-3,
             newton: NewtonSettings::default(),
         }
     }
@@ -109,7 +119,7 @@ impl ConcentratedLikelihood {
         parameters: &[f64],
     ) -> Result<Vec<TorqueNoise>, EstimationError> {
         let parts = self.parts(design, evidence)?;
-        let colours = parts.in_order.colours(parameters, self.settings.largest_correlation);
+        let colours = parts.colours(self, parameters);
         let std = parts.profile(self, &colours)?.noise(&column(parameters));
         let noise = |(colour, std): (&Colour, f64)| TorqueNoise {
             std: std / (1.0 - colour.correlation * colour.correlation).sqrt(),
@@ -121,7 +131,7 @@ impl ConcentratedLikelihood {
 
     fn parts<'a>(&self, design: &Design, evidence: &'a Evidence) -> Result<Parts<'a>, EstimationError> {
         let in_order = evidence.in_order()?;
-        let prior = BodyPrior::new(design, &self.initial, &self.settings.prior)?;
+        let prior = BodyPrior::new(design, &self.initial, self.settings.roundness)?;
         let base = design.base().map();
         let (rigid, standard) = (design.base().count(), prior.standard_size());
         let map = Mat::from_fn(design.parameter_count(), prior.size(), |row, column| {
@@ -152,13 +162,24 @@ struct Parts<'a> {
 }
 
 impl Parts<'_> {
+    fn colours(&self, estimator: &ConcentratedLikelihood, w: &[f64]) -> Vec<Colour> {
+        self.in_order.colours(w, &self.least_variance, estimator.settings.largest_correlation)
+    }
+
     fn profile(
         &self,
         estimator: &ConcentratedLikelihood,
         colours: &[Colour],
     ) -> Result<Profile<'_>, EstimationError> {
+        let factor = self.in_order.whitened(colours)?;
+        let gram = |group: &phiw_regressor::least_squares::Group| {
+            let size = group.factor.parameters();
+            let r = group.factor.as_mat().get(.., ..size);
+            r.transpose() * r
+        };
         Ok(Profile {
-            factor: self.in_order.whitened(colours)?,
+            grams: factor.groups().iter().map(gram).collect(),
+            factor,
             sensitivities: &self.sensitivities,
             map: &self.map,
             prior: &self.prior,
@@ -167,6 +188,14 @@ impl Parts<'_> {
             newton: estimator.settings.newton,
         })
     }
+}
+
+/// Gives all torques the median correlation.
+fn in_common(colours: &mut [Colour]) {
+    let mut all: Vec<f64> = colours.iter().map(|colour| colour.correlation).collect();
+    all.sort_by(f64::total_cmp);
+    let Some(&median) = all.get(all.len() / 2) else { return };
+    colours.iter_mut().for_each(|colour| colour.correlation = median);
 }
 
 impl Estimator for ConcentratedLikelihood {
@@ -190,17 +219,23 @@ impl Estimator for ConcentratedLikelihood {
         let mut x = parts.prior.start(&present.standard, &present_parameters[rigid..]);
         let mut colours = vec![Colour { correlation: 0.0, felt: 0.0 }; design.rows().len()];
         let mut covariance = None;
-        for round in 0..self.settings.rounds.max(1) {
+        let ConcentratedSettings { rounds, rounds_in_common, steps_a_round, settled, .. } = self.settings;
+        for round in 0..rounds.max(1) {
+            let last = round + 1 >= rounds;
             let profile = parts.profile(self, &colours)?;
-            let found: Minimum = profile.minimum(x);
+            let found: Minimum =
+                profile.minimum(x, if last { self.settings.newton.most_steps } else { steps_a_round });
             (x, covariance) = (found.x, found.covariance);
             let w = &parts.map * &x;
-            let next = parts.in_order.colours(w.col_as_slice(0), self.settings.largest_correlation);
+            let mut next = parts.colours(self, w.col_as_slice(0));
+            if round < rounds_in_common {
+                in_common(&mut next);
+            }
             let change = |(one, other): (&Colour, &Colour)| {
                 (one.correlation - other.correlation).abs().max((one.felt - other.felt).abs())
             };
             let changed = colours.iter().zip(&next).map(change).fold(0.0, f64::max);
-            if changed < self.settings.settled || round + 1 == self.settings.rounds {
+            if round >= rounds_in_common && found.settled && changed < settled {
                 break;
             }
             colours = next;
@@ -223,7 +258,7 @@ impl Estimator for ConcentratedLikelihood {
         parameters: &[f64],
     ) -> Result<Option<f64>, EstimationError> {
         let parts = self.parts(design, evidence)?;
-        let colours = parts.in_order.colours(parameters, self.settings.largest_correlation);
+        let colours = parts.colours(self, parameters);
         Ok(Some(parts.profile(self, &colours)?.likelihood(&column(parameters))))
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Where the noise of a period is ρ times that of the period before and something new, the rows
 //! Φ_t − ρ·Φ_{t−1} have the new alone. ρ is not known when a log is read, but R of \[Φ_{t−1} Φ_t\] gives R of
-//! these rows for any ρ. What the log's torque has beside the command ([`MotionLog::command`]) is a column of
+//! these rows for any ρ. What the log's torque has beside the command ([`MotionLog::commands`]) is a column of
 //! its own, so that how much of it the motion felt can be asked later, too.
 
 use crate::{EstimationError, Evidence, MotionLog, foresight};
@@ -78,7 +78,7 @@ impl InOrder {
     ) -> Result<(), EstimationError> {
         let limits: Vec<f64> =
             (0..measured.joints).map(|joint| design.tree().joint(joint).limits.effort).collect();
-        let commands = measured.command(&limits);
+        let commands = measured.commands(&limits);
         let counted = measured.counted_rows();
         let none;
         let foreseen = match foreseen {
@@ -151,9 +151,11 @@ impl InOrder {
     }
 
     /// The colour of each torque's noise under parameters `w`: the felt share and the correlation that leave
-    /// least, found one after the other until they stay.
-    pub fn colours(&self, w: &[f64], largest: f64) -> Vec<Colour> {
-        let colour = |group: &Group| {
+    /// least, found one after the other until they stay. `least` is the variance of each torque's noise that
+    /// nothing is believed to fall short of, and that is white: a residual below it has no colour.
+    pub fn colours(&self, w: &[f64], least: &[f64], largest: f64) -> Vec<Colour> {
+        let colour = |(group, least): (&Group, &f64)| {
+            let least = least * group.factor.rows() as f64;
             let half = group.factor.columns() / 2;
             let own = half - BESIDE;
             let first = self.factor.parameter_count() / 2;
@@ -188,14 +190,14 @@ impl InOrder {
                     product(a, b) - felt * (product(a, b + 2) + product(a + 2, b))
                         + felt * felt * product(a + 2, b + 2)
                 };
-                colour.correlation = (left(1, 0) / left(0, 0)).clamp(-largest, largest);
+                colour.correlation = (left(1, 0) / (left(0, 0) + least)).clamp(-largest, largest);
                 if !(colour.correlation.is_finite() && colour.felt.is_finite()) {
                     return Colour { correlation: 0.0, felt: 0.0 };
                 }
             }
             colour
         };
-        self.factor.groups().iter().map(colour).collect()
+        self.factor.groups().iter().zip(least).map(colour).collect()
     }
 }
 

@@ -23,6 +23,9 @@ pub struct MotionLog {
     /// which it did not are no rows of a robot on a fixed base, and do not count.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub still: Vec<bool>,
+    /// Torques that were commanded \[N·m, N\], one for each of `tau`; empty where nobody wrote them down.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub command: Vec<f64>,
     /// What the controller was asked for at each row; none where the log does not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub asked: Option<Asked>,
@@ -61,6 +64,7 @@ impl MotionLog {
             qdd: recording.qdd.clone().unwrap_or_default(),
             tau: recording.tau.clone(),
             still: Vec::new(),
+            command: Vec::new(),
             asked: None,
         })
     }

@@ -16,6 +16,8 @@ use phiw_regressor::least_squares::{Group, GroupedFactor};
 /// The objective over x: standard parameters, then effects.
 pub(super) struct Profile<'a> {
     pub factor: GroupedFactor,
+    /// RᵀR of each torque: for steps only, so half the digits are enough.
+    pub grams: Vec<Mat<f64>>,
     pub sensitivities: &'a [Sensitivity],
     /// w = map·x.
     pub map: &'a Mat<f64>,
@@ -32,6 +34,8 @@ pub(super) struct Minimum {
     pub x: Mat<f64>,
     /// Inverse curvature there; none if it is not positive definite.
     pub covariance: Option<Mat<f64>>,
+    /// Whether it was reached within the steps that were allowed.
+    pub settled: bool,
 }
 
 impl Profile<'_> {
@@ -80,16 +84,16 @@ impl Profile<'_> {
         self.likelihood(&(self.map * x)) + self.prior_weight * divergence
     }
 
-    /// Damped Newton steps from `x`, which is inside.
-    pub fn minimum(&self, mut x: Mat<f64>) -> Minimum {
+    /// Damped Newton steps from `x`, which is inside, `most_steps` of them at most.
+    pub fn minimum(&self, mut x: Mat<f64>, most_steps: usize) -> Minimum {
         let settings = &self.newton;
         let parameters = self.map.nrows();
         let mut curvature = Mat::zeros(parameters, parameters);
         let mut freshness = 0;
         let mut cost = self.cost(&x);
         let share = self.instants_weight();
-        let mut covariance = None;
-        for step in 0..settings.most_steps {
+        let (mut covariance, mut settled) = (None, false);
+        for step in 0..most_steps {
             let w = self.map * &x;
             let responses: Vec<Option<Response>> =
                 self.sensitivities.iter().map(|sensitivity| Response::of(sensitivity, &w)).collect();
@@ -124,12 +128,13 @@ impl Profile<'_> {
             let decrement: f64 = (0..x.nrows()).map(|k| direction[(k, 0)] * gradient[(k, 0)]).sum();
             covariance = Some(factor.solve(Mat::<f64>::identity(x.nrows(), x.nrows())));
             let moved = self.line_search(&mut x, &mut cost, &direction, decrement);
-            let settled = decrement.max(0.0).sqrt() < settings.settled && step > freshness;
-            if !moved || settled || decrement < settings.least_decrement {
+            let near = decrement.max(0.0).sqrt() < settings.settled && step > freshness;
+            settled = !moved || near || decrement < settings.least_decrement;
+            if settled {
                 break;
             }
         }
-        Minimum { x, covariance }
+        Minimum { x, covariance, settled }
     }
 
     /// Adds the squares' part of gradient and curvature, and returns what is to be taken off the latter as a
@@ -145,7 +150,7 @@ impl Profile<'_> {
             let r = group.factor.as_mat().get(.., ..size);
             let precision = rows / square;
             let own = r.transpose() * left;
-            let gram = r.transpose() * r;
+            let gram = &self.grams[index];
             let scale = precision * (2.0 / rows).sqrt();
             for (row, &parameter) in group.parameters.iter().enumerate() {
                 gradient[(parameter, 0)] += precision * own[(row, 0)];

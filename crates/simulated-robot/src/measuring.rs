@@ -21,8 +21,20 @@ pub struct Measuring {
     pub torque_noise_correlation: f64,
     /// Which torque is logged.
     pub logged: LoggedTorque,
-    /// Whether the log says what the controller was asked for ([`MotionLog::asked`]).
-    pub reference: bool,
+    /// What the log says of the controller beside the torques.
+    pub controller: KnownOfController,
+}
+
+/// What a log says of the controller.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum KnownOfController {
+    /// The commands themselves ([`MotionLog::command`]).
+    #[default]
+    Commands,
+    /// What it was asked for ([`MotionLog::asked`]), and not with which gains it answered.
+    Reference,
+    /// Nothing.
+    Nothing,
 }
 
 /// Which torque a log has, before its errors.
@@ -71,6 +83,11 @@ impl Measuring {
         }
     }
 
+    /// Whether the log's torques are the commands.
+    fn is_exact(&self) -> bool {
+        self.torque_noise == 0.0 && self.logged == LoggedTorque::Commanded
+    }
+
     /// The log of a run, without [`MotionLog::still`] and [`MotionLog::asked`].
     ///
     /// # Errors
@@ -91,6 +108,9 @@ impl Measuring {
                 log
             }
         };
+        if self.controller == KnownOfController::Commands && !self.is_exact() {
+            log.command = torques(&run.history, &run.history.command, &log);
+        }
         if self.logged == LoggedTorque::Delivered {
             log.tau = torques(&run.history, &run.history.delivered, &log);
         }

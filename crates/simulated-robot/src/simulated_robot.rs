@@ -1,6 +1,6 @@
 //! A simulated robot that tries motions, over any backend.
 
-use crate::measuring::asked;
+use crate::measuring::{KnownOfController, asked};
 use crate::{Controller, Measuring};
 use phiw_curriculum::motion::Motion;
 use phiw_curriculum::{CurriculumError, Experiment, Trial};
@@ -211,7 +211,7 @@ impl Experiment for SimulatedRobot {
                 ..self.measuring.log(&run, &self.tree, &self.timing, rng)?
             },
         };
-        let measured = match self.measuring.reference && measured.rows() > 1 {
+        let measured = match self.measuring.controller == KnownOfController::Reference && measured.rows() > 1 {
             true => MotionLog { asked: Some(self.asked(robot, model, motion, &measured)?), ..measured },
             false => measured,
         };

@@ -11,7 +11,7 @@ use phiw_curriculum::{
 use phiw_estimation::{
     ConcentratedLikelihood, Estimator, LeastSquares, MotionLikelihood, Robot, RobotModel, RowsAt,
 };
-use phiw_simulated_robot::{Encoders, LoggedTorque, Measuring, SimulatedRobot};
+use phiw_simulated_robot::{Encoders, KnownOfController, LoggedTorque, Measuring, SimulatedRobot};
 use rand::Rng;
 
 /// Bits of the encoders.
@@ -42,6 +42,27 @@ pub enum SensorName {
     SlowEncoders,
 }
 
+/// What the log says of the controller beside the torques.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ControllerName {
+    /// Its commands.
+    Commands,
+    /// What it was asked for.
+    Reference,
+    /// Nothing.
+    Nothing,
+}
+
+impl From<ControllerName> for KnownOfController {
+    fn from(name: ControllerName) -> Self {
+        match name {
+            ControllerName::Commands => KnownOfController::Commands,
+            ControllerName::Reference => KnownOfController::Reference,
+            ControllerName::Nothing => KnownOfController::Nothing,
+        }
+    }
+}
+
 /// Who estimates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum EstimatorName {
@@ -70,8 +91,8 @@ pub struct Cell {
     pub estimator: EstimatorName,
     /// Weight of the prior.
     pub prior_weight: Option<f64>,
-    /// Whether the log has the reference.
-    pub reference: bool,
+    /// What the log says of the controller.
+    pub controller: ControllerName,
 }
 
 /// What a run came to.
@@ -161,7 +182,7 @@ impl Cell {
                 torque_noise: in_log,
                 torque_noise_correlation: self.correlation,
                 logged,
-                reference: self.reference,
+                controller: self.controller.into(),
             },
             ..robot
         }

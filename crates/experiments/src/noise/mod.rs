@@ -30,7 +30,7 @@ mod table;
 use crate::environment;
 use crate::paper::{RunArguments, Setup};
 use anyhow::Context;
-use cell::{Cell, EstimatorName, NoiseIn, SensorName};
+use cell::{Cell, ControllerName, EstimatorName, NoiseIn, SensorName};
 use phiw::console::Console;
 use rayon::prelude::*;
 
@@ -55,9 +55,9 @@ pub struct Arguments {
     /// Weight of the prior of the estimator that finds the noise out.
     #[arg(long)]
     prior_weight: Option<f64>,
-    /// Keep the reference out of the log.
-    #[arg(long)]
-    without_reference: bool,
+    /// What the log says of the controller beside the torques.
+    #[arg(long, default_value = "commands")]
+    controller: ControllerName,
 }
 
 impl Arguments {
@@ -86,7 +86,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
                         sensors,
                         estimator,
                         prior_weight: arguments.prior_weight,
-                        reference: !arguments.without_reference,
+                        controller: arguments.controller,
                     };
                     let first = arguments.run.first_seed;
                     let seeds: Vec<u64> = (first..first + arguments.run.seeds).collect();
