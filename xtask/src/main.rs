@@ -48,7 +48,7 @@ enum Task {
 fn main() -> anyhow::Result<ExitCode> {
     match Arguments::parse().task {
         Task::Run(arguments) => {
-            mujoco::fetch_or_go_on_without();
+            mujoco::fetch_if(true);
             run::command(&arguments).map(|()| ExitCode::SUCCESS)
         }
         Task::SyntheticLog(arguments) => synthetic_log::command(&arguments).map(|()| ExitCode::SUCCESS),
@@ -58,15 +58,11 @@ fn main() -> anyhow::Result<ExitCode> {
         Task::Mujoco(arguments) => mujoco::command(&arguments),
         Task::Oracle(arguments) => oracle::command(&arguments),
         Task::Paper(arguments) => {
-            if arguments.needs_mujoco() {
-                mujoco::fetch_or_go_on_without();
-            }
+            mujoco::fetch_if(arguments.needs_mujoco());
             paper::command(&arguments).map(|()| ExitCode::SUCCESS)
         }
         Task::Noise(arguments) => {
-            if arguments.needs_mujoco() {
-                mujoco::fetch_or_go_on_without();
-            }
+            mujoco::fetch_if(arguments.needs_mujoco());
             noise::command(&arguments).map(|()| ExitCode::SUCCESS)
         }
         Task::Plant(arguments) => plant::command(&arguments).map(|()| ExitCode::SUCCESS),

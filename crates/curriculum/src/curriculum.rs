@@ -11,7 +11,9 @@ use crate::random::{Purpose, random};
 use crate::relaxation::{ConditionRelaxation, Relaxation};
 use crate::selection::{MotionCandidates, Selection, SmallestCondition, Triangle};
 use crate::{CurriculumError, CurriculumRun, Experiment, IterationRecord};
-use phiw_estimation::{Estimate, Estimator, Evidence, EvidenceSettings, MotionLog, Robot, RobotModel, RowsAt};
+use phiw_estimation::{
+    Estimate, Estimator, Evidence, EvidenceSettings, MotionLog, Robot, RobotModel, RowsAt,
+};
 use phiw_identification::EffectSpec;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

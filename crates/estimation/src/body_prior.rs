@@ -40,7 +40,9 @@ impl BodyPrior {
         let mean_mass = masses.iter().sum::<f64>() / masses.len().max(1) as f64;
         let rounded: Vec<[f64; PARAMETERS_PER_BODY]> = described
             .iter()
-            .map(|body| round(body, roundness, settings.least_mass * mean_mass, settings.least_radius * lengths))
+            .map(|body| {
+                round(body, roundness, settings.least_mass * mean_mass, settings.least_radius * lengths)
+            })
             .collect();
         // What is nothing at all stays for the general remedy.
         for standard in possible_priors(&rounded, lengths, &settings) {
@@ -126,7 +128,8 @@ impl BodyPrior {
             let Some(factor) = Cholesky::of(ROWS, |row, column| own.entry(row, column)) else { continue };
             let inverse = factor.inverse();
             // P⁻¹E_k of each parameter.
-            let moved: Vec<Vec<f64>> = directions.iter().map(|direction| product(&inverse, direction)).collect();
+            let moved: Vec<Vec<f64>> =
+                directions.iter().map(|direction| product(&inverse, direction)).collect();
             for k in 0..PARAMETERS_PER_BODY {
                 let row = PARAMETERS_PER_BODY * place + k;
                 let towards: f64 = body.inverse.iter().zip(&directions[k]).map(|(a, b)| a * b).sum();
@@ -173,7 +176,9 @@ fn round(
     let mean = about_centre.max(LEFT_OF_INERTIA * about_joint).max(3.0 * mass * least_radius.powi(2)) / 3.0;
     let Ok(eigen) = Mat::from_fn(3, 3, about).self_adjoint_eigen(Side::Lower) else { return *body };
     let lifted = |row: usize, column: usize| -> f64 {
-        (0..3).map(|k| eigen.U()[(row, k)] * eigen.U()[(column, k)] * eigen.S()[k].max(roundness * mean)).sum()
+        (0..3)
+            .map(|k| eigen.U()[(row, k)] * eigen.U()[(column, k)] * eigen.S()[k].max(roundness * mean))
+            .sum()
     };
     let second = |row: usize, column: usize| lifted(row, column) + mass * centre[row] * centre[column];
     let (x, y, z) = (second(0, 0), second(1, 1), second(2, 2));
@@ -217,4 +222,56 @@ fn length(design: &Design) -> f64 {
     let lengths = design.tree().bodies().iter().skip(1).map(|body| norm(body.origin.translation.0));
     let apart: Vec<f64> = lengths.filter(|length| *length > 0.0).collect();
     apart.iter().sum::<f64>() / apart.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use phiw_dynamics::random_tree::{RandomTreeOptions, random_tree};
+    use phiw_regressor::BaseParameters;
+
+    #[test]
+    fn gradient_and_curvature_are_those_of_the_divergence() -> Result<(), Box<dyn std::error::Error>> {
+        let tree = random_tree(3, &RandomTreeOptions::default())?;
+        let model = RobotModel { standard: tree.inertial_parameters(), effects: Vec::new() };
+        let design =
+            Design::new(tree.clone(), BaseParameters::of_tree(&tree, Default::default())?, Vec::new());
+        let prior = BodyPrior::new(&design, &model, 0.4)?;
+        let at = |moved: usize, step: f64| {
+            let mut x = prior.start(&model.standard, &[]) * faer::Scale(1.2);
+            x[(moved, 0)] += step;
+            x
+        };
+        let derivatives = |x: &Mat<f64>| {
+            let (mut gradient, mut hessian) =
+                (Mat::zeros(prior.size(), 1), Mat::zeros(prior.size(), prior.size()));
+            prior.add_to(x, 2.0, &mut gradient, &mut hessian);
+            (gradient, hessian)
+        };
+        let (gradient, hessian) = derivatives(&at(0, 0.0));
+        for index in 0..PARAMETERS_PER_BODY.min(prior.size()) {
+            // Parameters of a body differ by orders of magnitude: so do the steps, by the curvature.
+            let step = 1e-4 / hessian[(index, index)].sqrt();
+            let (up, down) = (at(index, step), at(index, -step));
+            let slope = (prior.divergence(&up) - prior.divergence(&down)) / step;
+            let scale = hessian[(index, index)].sqrt();
+            assert!((slope - gradient[(index, 0)]).abs() < 1e-4 * scale, "{index}: {slope}");
+            let (above, below) = (derivatives(&up).0, derivatives(&down).0);
+            for other in 0..PARAMETERS_PER_BODY {
+                let bend = (above[(other, 0)] - below[(other, 0)]) / (2.0 * step);
+                let size = scale * hessian[(other, other)].sqrt();
+                assert!((bend - hessian[(other, index)]).abs() < 1e-3 * size, "{index}, {other}: {bend}");
+            }
+        }
+        Ok(())
+    }
+
+    /// Bodies with each number drawn by itself are mostly impossible.
+    #[test]
+    fn whatever_was_believed_the_prior_is_possible() {
+        let bodies = [[2.0, 0.6, -2.0, 1.0, 0.1, 0.6, 0.2, -0.3, 0.1, 0.3], [0.0; 10], [1.0; 10]];
+        for body in bodies {
+            assert!(PseudoInertia::of_parameters(&round(&body, 0.4, 0.1, 0.02)).is_possible(), "{body:?}");
+        }
+    }
 }

@@ -74,9 +74,7 @@ impl MotionLog {
             })
             .collect();
         if left > EXACT * EXACT * all {
-            own.into_iter()
-                .enumerate()
-                .for_each(|(row, torque)| command[row * self.joints + joint] = torque);
+            own.into_iter().enumerate().for_each(|(row, torque)| command[row * self.joints + joint] = torque);
         }
     }
 }

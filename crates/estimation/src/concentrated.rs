@@ -27,8 +27,8 @@ use phiw_identification::Design;
 ///   or was delivered and moved the robot. The share that did is a coefficient of its own.
 ///
 /// Bodies are possible: the prior is the log-det divergence from what was believed at first, and frictions
-/// stay positive. Without [`crate::MotionLog::asked`] the log's torque is taken for the command: right for a
-/// robot that logs its commands, and where a torque sensor's noise is small beside the actuators'.
+/// stay positive. Where the log knows neither commands nor reference, its torque is taken for the command: right where
+/// that is what it is, or a torque sensor's noise is small beside the actuators'.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConcentratedLikelihood {
     /// What was believed before anything was measured.
@@ -47,14 +47,19 @@ pub struct ConcentratedSettings {
     /// How round the bodies are that are believed at first: least second moment about the centre of mass
     /// along any axis, over the mean of all axes. Default: 0.4.
     pub roundness: f64,
-    /// Times that parameters and colours are found one after the other, at most. Default: 14.
-    pub rounds: usize,
-    /// Of these, the first so many take the torques' median correlation for all: under a bad first belief
-    /// the residual of a single torque is no noise yet, and may keep the estimate from ever leaving it.
-    /// Default: 5.
+    /// Rounds at first in which the prior weighs more, each a step nearer to its own weight, and the noise
+    /// counts as white: the path leads from what was believed to the estimate through possible bodies.
+    /// Default: 6.
+    pub tempered_rounds: usize,
+    /// How many times more it weighs in one of these than in the next. Default: 4.
+    pub tempering: f64,
+    /// Rounds after these that take the torques' median correlation for all: under a bad belief the residual
+    /// of a single torque is no noise yet, and may keep the estimate from ever leaving it. Default: 4.
     pub rounds_in_common: usize,
+    /// Rounds after these at most, each torque with its own correlation. Default: 6.
+    pub rounds: usize,
     /// Newton steps of a round at most, but of the last: what is found anew a moment later need not be
-    /// found exactly. Default: 6.
+    /// found exactly. Default: 8.
     pub steps_a_round: usize,
     /// Change of a correlation from which on another round is worth it. Default: 0.005.
     pub settled: f64,
@@ -74,9 +79,11 @@ impl Default for ConcentratedSettings {
         ConcentratedSettings {
             prior_weight: 1.0,
             roundness: 0.4,
-            rounds: 14,
-            rounds_in_common: 5,
-            steps_a_round: 6,
+            tempered_rounds: 6,
+            tempering: 4.0,
+            rounds_in_common: 4,
+            rounds: 6,
+            steps_a_round: 8,
             settled: 0.005,
             largest_correlation: 0.98,
             least_noise: 3e-3,
@@ -219,23 +226,33 @@ impl Estimator for ConcentratedLikelihood {
         let mut x = parts.prior.start(&present.standard, &present_parameters[rigid..]);
         let mut colours = vec![Colour { correlation: 0.0, felt: 0.0 }; design.rows().len()];
         let mut covariance = None;
-        let ConcentratedSettings { rounds, rounds_in_common, steps_a_round, settled, .. } = self.settings;
-        for round in 0..rounds.max(1) {
-            let last = round + 1 >= rounds;
-            let profile = parts.profile(self, &colours)?;
-            let found: Minimum =
-                profile.minimum(x, if last { self.settings.newton.most_steps } else { steps_a_round });
+        let settings = &self.settings;
+        let common = settings.tempered_rounds + settings.rounds_in_common;
+        let rounds = common + settings.rounds.max(1);
+        for round in 0..rounds {
+            let hotter = settings.tempered_rounds.saturating_sub(round) as i32;
+            let profile = Profile {
+                prior_weight: settings.prior_weight * settings.tempering.powi(hotter),
+                ..parts.profile(self, &colours)?
+            };
+            let last = round + 1 == rounds;
+            let steps = if last { settings.newton.most_steps } else { settings.steps_a_round };
+            let found: Minimum = profile.minimum(x, steps);
             (x, covariance) = (found.x, found.covariance);
             let w = &parts.map * &x;
             let mut next = parts.colours(self, w.col_as_slice(0));
-            if round < rounds_in_common {
-                in_common(&mut next);
+            match round {
+                _ if round < settings.tempered_rounds => {
+                    next.iter_mut().for_each(|colour| colour.correlation = 0.0)
+                }
+                _ if round < common => in_common(&mut next),
+                _ => (),
             }
             let change = |(one, other): (&Colour, &Colour)| {
                 (one.correlation - other.correlation).abs().max((one.felt - other.felt).abs())
             };
             let changed = colours.iter().zip(&next).map(change).fold(0.0, f64::max);
-            if round >= rounds_in_common && found.settled && changed < settled {
+            if round >= common && found.settled && changed < settings.settled {
                 break;
             }
             colours = next;

@@ -52,7 +52,9 @@ impl MotionLog {
             while nearest + 1 < places.len() && away(nearest + 1) <= away(nearest) {
                 nearest += 1;
             }
-            log.tau.extend_from_slice(recording.tau.get(nearest * joints..(nearest + 1) * joints).unwrap_or(&[]));
+            log.tau.extend_from_slice(
+                recording.tau.get(nearest * joints..(nearest + 1) * joints).unwrap_or(&[]),
+            );
         }
         Ok(log)
     }

@@ -113,10 +113,10 @@ impl InOrder {
             }
             Ok(())
         })?;
-        let groups = builders.iter_mut().zip(self.factor.groups()).map(|(builder, group)| Group {
-            parameters: group.parameters.clone(),
-            factor: builder.factor(),
-        });
+        let groups = builders
+            .iter_mut()
+            .zip(self.factor.groups())
+            .map(|(builder, group)| Group { parameters: group.parameters.clone(), factor: builder.factor() });
         let added = GroupedFactor::new(self.factor.parameter_count(), groups.collect())?;
         self.factor = self.factor.merge(&added)?;
         Ok(())
@@ -172,7 +172,7 @@ impl InOrder {
                 }
             });
             let parts = group.factor.as_mat() * map;
-            let product = |a: usize, b: usize| (parts.col(a).transpose() * parts.col(b)) as f64;
+            let product = |a: usize, b: usize| parts.col(a).transpose() * parts.col(b);
             let command = group.factor.right_hand_side_sum_of_squares();
             let mut colour = Colour { correlation: 0.0, felt: 0.0 };
             let logs_differ = product(3, 3) > DIFFERS * command;
@@ -212,5 +212,55 @@ impl Evidence {
         self.in_order.as_ref().ok_or(EstimationError::Log(
             "its rows were not taken in order: ask the evidence for them (EvidenceSettings::in_order)",
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use phiw_dynamics::random_tree::{RandomTreeOptions, random_tree};
+    use phiw_regressor::BaseParameters;
+
+    /// Rows that are whitened one by one are the oracle.
+    #[test]
+    fn the_factor_of_whitened_rows_follows_for_any_colour() -> Result<(), Box<dyn std::error::Error>> {
+        let tree = random_tree(5, &RandomTreeOptions::default())?;
+        let design =
+            Design::new(tree.clone(), BaseParameters::of_tree(&tree, Default::default())?, Vec::new());
+        let (joints, rows) = (tree.joint_count(), 40);
+        let wave = |shift: f64| -> Vec<f64> {
+            (0..rows * joints).map(|index| ((0.7 + shift) * index as f64 + shift).sin()).collect()
+        };
+        let [q, qd, tau, command] = [0.1, 0.3, 0.5, 0.8].map(wave);
+        let log = MotionLog { joints, period_s: 0.01, q, qd, tau, command, ..MotionLog::default() };
+        let mut in_order = InOrder::none(&design)?;
+        in_order.add(&design, &[], &log)?;
+        let colour = Colour { correlation: 0.6, felt: 0.3 };
+        let whitened = in_order.whitened(&vec![colour; design.rows().len()])?;
+        let mut all = Vec::new();
+        foresight::rows(&design, &vec![false; design.parameter_count()], &log, |row| {
+            all.push(row.to_vec());
+            Ok(())
+        })?;
+        for (torque, (layout, group)) in design.rows().iter().zip(whitened.groups()).enumerate() {
+            let own = |row: usize| {
+                let mut values = all[row][layout.range.clone()].to_vec();
+                let last = values.len() - 1;
+                let command = log.command[row * joints + torque];
+                values[last] = command + colour.felt * (values[last] - command);
+                values
+            };
+            let mut builder = FactorBuilder::new(layout.range.len());
+            for row in 1..all.len() {
+                let pairs = own(row).into_iter().zip(own(row - 1));
+                builder.push_row(&pairs.map(|(now, before)| now - 0.6 * before).collect::<Vec<_>>())?;
+            }
+            let w: Vec<f64> = (0..layout.parameters.len()).map(|index| 0.1 * index as f64).collect();
+            let (found, expected) =
+                (group.factor.residual_sum_of_squares(&w)?, builder.factor().residual_sum_of_squares(&w)?);
+            assert!((found / expected - 1.0).abs() < 1e-9, "{torque}: {found}, {expected}");
+            assert_eq!(group.parameters, layout.parameters);
+        }
+        Ok(())
     }
 }

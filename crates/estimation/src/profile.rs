@@ -98,8 +98,12 @@ impl Profile<'_> {
             let responses: Vec<Option<Response>> =
                 self.sensitivities.iter().map(|sensitivity| Response::of(sensitivity, &w)).collect();
             if step < settings.fresh_steps || step % settings.curvature_every.max(1) == 0 {
-                curvature =
-                    log_determinant_curvature(self.sensitivities, &responses, parameters, settings.instants_every);
+                curvature = log_determinant_curvature(
+                    self.sensitivities,
+                    &responses,
+                    parameters,
+                    settings.instants_every,
+                );
                 curvature *= faer::Scale(share);
                 freshness = step;
             }

@@ -226,11 +226,7 @@ impl ComputedTorque {
     ///
     /// # Errors
     /// A slice does not fit the model.
-    pub fn feed_forward(
-        &mut self,
-        [q, v, a]: [&[f64]; 3],
-        torque: &mut [f64],
-    ) -> Result<(), DimensionError> {
+    pub fn feed_forward(&mut self, [q, v, a]: [&[f64]; 3], torque: &mut [f64]) -> Result<(), DimensionError> {
         self.model.torque(q, v, a, torque)
     }
 

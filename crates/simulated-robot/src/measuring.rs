@@ -72,13 +72,7 @@ impl Measuring {
             None => exact.clone(),
             Some(Encoders { bits, period_s, clock }) => {
                 let steps = Sensors::default().with_encoder_bits(bits, joints);
-                Sensors {
-                    period_s,
-                    torque_window_s: 0.0,
-                    clock,
-                    derivatives: Derivatives::Unlogged,
-                    ..steps
-                }
+                Sensors { period_s, torque_window_s: 0.0, clock, derivatives: Derivatives::Unlogged, ..steps }
             }
         }
     }

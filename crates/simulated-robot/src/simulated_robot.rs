@@ -211,7 +211,8 @@ impl Experiment for SimulatedRobot {
                 ..self.measuring.log(&run, &self.tree, &self.timing, rng)?
             },
         };
-        let measured = match self.measuring.controller == KnownOfController::Reference && measured.rows() > 1 {
+        let measured = match self.measuring.controller == KnownOfController::Reference && measured.rows() > 1
+        {
             true => MotionLog { asked: Some(self.asked(robot, model, motion, &measured)?), ..measured },
             false => measured,
         };

@@ -150,8 +150,7 @@ impl Cell {
         };
         let mut run = CurriculumRun::new(seed, initial.clone());
         curriculum.run::<CurriculumError>(&mut run, |_| Ok(()))?;
-        let [first, last] =
-            [&initial, &run.model].map(|model| setup.score(model, None, &setup.validation));
+        let [first, last] = [&initial, &run.model].map(|model| setup.score(model, None, &setup.validation));
         let (first, last) = (first?, last?);
         Ok(Outcome {
             rmse_w: [first.rmse_w, last.rmse_w],
