@@ -46,25 +46,23 @@ enum Task {
 }
 
 fn main() -> anyhow::Result<ExitCode> {
-    match Arguments::parse().task {
-        Task::Run(arguments) => {
-            mujoco::fetch_if(true);
-            run::command(&arguments).map(|()| ExitCode::SUCCESS)
-        }
+    let task = Arguments::parse().task;
+    mujoco::fetch_if(match &task {
+        Task::Run(_) => true,
+        Task::Paper(arguments) => arguments.needs_mujoco(),
+        Task::Noise(arguments) => arguments.needs_mujoco(),
+        _ => false,
+    });
+    match task {
+        Task::Run(arguments) => run::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::SyntheticLog(arguments) => synthetic_log::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Retarget(arguments) => retarget::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Test(arguments) => test::command(&arguments),
         Task::Torture(arguments) => torture::command(&arguments),
         Task::Mujoco(arguments) => mujoco::command(&arguments),
         Task::Oracle(arguments) => oracle::command(&arguments),
-        Task::Paper(arguments) => {
-            mujoco::fetch_if(arguments.needs_mujoco());
-            paper::command(&arguments).map(|()| ExitCode::SUCCESS)
-        }
-        Task::Noise(arguments) => {
-            mujoco::fetch_if(arguments.needs_mujoco());
-            noise::command(&arguments).map(|()| ExitCode::SUCCESS)
-        }
+        Task::Paper(arguments) => paper::command(&arguments).map(|()| ExitCode::SUCCESS),
+        Task::Noise(arguments) => noise::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Plant(arguments) => plant::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Consistent(arguments) => consistent::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Undeclared(arguments) => undeclared::command(&arguments).map(|()| ExitCode::SUCCESS),
