@@ -195,7 +195,7 @@ fn real_motions_of_the_seated_set() {
         return;
     };
     let held = vec![("torso/joint_3".to_owned(), 0.0), ("head/joint_1".to_owned(), 0.0)];
-    let tree = read_urdf_file(urdf, &UrdfOptions { floating_base: false, held }).unwrap().tree;
+    let tree = read_urdf_file(urdf, &UrdfOptions { held, ..UrdfOptions::default() }).unwrap().tree;
     let read = |name: &str| read_recording(&motions.join(name), None).unwrap();
     for torso_from_reach in [false, true] {
         let options = RetargetOptions { torso_from_reach, ..Default::default() };

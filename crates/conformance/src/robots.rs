@@ -104,7 +104,7 @@ fn models() -> PathBuf {
 }
 
 fn read(path: &Path, floating_base: bool, held: &[(String, f64)]) -> Result<Tree, Failure> {
-    let options = UrdfOptions { floating_base, held: held.to_vec() };
+    let options = UrdfOptions { floating_base, held: held.to_vec(), ..UrdfOptions::default() };
     let reading = read_urdf_file(path, &options)
         .map_err(|error| Failure::Wrong(format!("{}: {error}", path.display())))?;
     Ok(reading.tree)

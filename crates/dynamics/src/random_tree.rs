@@ -118,7 +118,7 @@ pub fn random_urdf(seed: u64, options: &RandomTreeOptions) -> String {
 /// # Errors
 /// [`UrdfError::NoMovingJoints`] for a fixed base without joints.
 pub fn random_tree(seed: u64, options: &RandomTreeOptions) -> Result<Tree, UrdfError> {
-    let reading = UrdfOptions { floating_base: options.floating_base, held: Vec::new() };
+    let reading = UrdfOptions { floating_base: options.floating_base, ..UrdfOptions::default() };
     Ok(read_urdf(&random_urdf(seed, options), &reading)?.tree)
 }
 

@@ -76,6 +76,7 @@ proptest! {
         let reading = UrdfOptions {
             floating_base: options.floating_base,
             held: vec![(whole.joint(joint).joint.clone(), q[at_q])],
+            ..UrdfOptions::default()
         };
         let merged = read_urdf(&random_urdf(seed, &options), &reading).unwrap().tree;
         prop_assert_eq!(merged.joint_count(), whole.joint_count() - 1);

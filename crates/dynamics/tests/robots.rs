@@ -15,8 +15,8 @@ fn read(path: &str, options: &UrdfOptions) -> Option<UrdfReading> {
 fn check(path: &str, held: &[&str], joints: usize) {
     let held = held.iter().map(|joint| (joint.to_string(), 0.0)).collect();
     for floating_base in [false, true] {
-        let options = UrdfOptions { floating_base, held: Vec::clone(&held) };
-        let Some(UrdfReading { tree, findings }) = read(path, &options) else { return };
+        let options = UrdfOptions { floating_base, held: Vec::clone(&held), ..UrdfOptions::default() };
+        let Some(UrdfReading { tree, findings, .. }) = read(path, &options) else { return };
         println!("{path}: {} bodies, {} joints", tree.bodies().len(), tree.joint_count());
         findings.iter().for_each(|finding| println!("  {finding}"));
         assert_eq!(tree.joint_count(), joints, "{path}");

@@ -60,7 +60,7 @@ proptest! {
     #[test]
     fn random_robots_survive(seed in any::<u64>(), options in options(), hold in any::<bool>()) {
         let held = if hold { vec![("joint_1".to_owned(), 0.4)] } else { Vec::new() };
-        let reading = UrdfOptions { floating_base: options.floating_base, held };
+        let reading = UrdfOptions { floating_base: options.floating_base, held, ..UrdfOptions::default() };
         round_trip(&random_urdf(seed, &options), &reading, seed);
     }
 }
@@ -82,7 +82,7 @@ fn real_robots_survive() {
             continue;
         };
         for floating_base in [false, true] {
-            round_trip(&xml, &UrdfOptions { floating_base, held: Vec::new() }, 7);
+            round_trip(&xml, &UrdfOptions { floating_base, ..UrdfOptions::default() }, 7);
         }
     }
 }

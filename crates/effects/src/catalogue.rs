@@ -1,11 +1,12 @@
-//! The catalogue finds kinds of effects by name, declares them for a robot, and builds them from a model's
-//! file.
+//! The catalogue finds kinds of effects by name, and builds them from a model's file.
 
-use crate::{EffectKind, FittedEffect, Mechanisms, SignalRanges};
-use crate::{coupling, drift, drive, elasticity, external, friction, hysteresis, position, sensing};
+use crate::declaration::{cannot_act, joint_indices, nearest};
+use crate::{EffectKind, FittedEffect, Mechanisms};
+use crate::{coupling, drift, drive, efficiency, elasticity, external, friction, hysteresis};
+use crate::{position, position_map, sensing};
 use phiw_dynamics::Tree;
 use phiw_identification::effect::{EffectError, EffectParameter, JointProperty};
-use phiw_identification::{Effect, EffectCatalogue, EffectSpec, Variants};
+use phiw_identification::{Effect, EffectCatalogue, EffectSpec};
 
 /// Kinds of effects by name, in the order of simplicity: of two that explain alike, the earlier is preferred.
 pub struct Catalogue {
@@ -40,6 +41,8 @@ impl Default for Catalogue {
                 Box::new(external::GravityTilt),
                 Box::new(external::Payload),
                 Box::new(external::ExternalForce),
+                Box::new(efficiency::DriveEfficiency),
+                Box::new(position_map::PositionMap),
             ],
         }
     }
@@ -64,8 +67,7 @@ impl Catalogue {
     pub fn kind(&self, name: &str) -> Result<&dyn EffectKind, EffectError> {
         self.kinds().find(|kind| kind.name() == name).ok_or_else(|| {
             let known: Vec<String> = self.kinds().map(|kind| kind.name().to_owned()).collect();
-            let distance = |other: &&String| strsim::damerau_levenshtein(other, name);
-            let nearest = known.iter().min_by_key(distance).filter(|other| distance(other) <= 5).cloned();
+            let nearest = nearest(name, &known);
             EffectError::UnknownKind { kind: name.to_owned(), nearest, known }
         })
     }
@@ -87,49 +89,14 @@ impl Catalogue {
         let found = FittedEffect::new(spec, parameters, fitted);
         self.kind(&spec.kind).map_or_else(|_| found.plainly(), |kind| kind.sentence(&found))
     }
-
-    /// A kind on every joint of the robot, each with the constants that the data may choose from.
-    ///
-    /// # Errors
-    /// The kind is unknown, or cannot be declared for all joints at once.
-    pub fn declare(
-        &self,
-        name: &str,
-        tree: &Tree,
-        ranges: &SignalRanges,
-    ) -> Result<Vec<Variants>, EffectError> {
-        let kind = self.kind(name)?;
-        let Some(declared) = kind.declared_constants() else {
-            return Err(EffectError::NotDeclarable { kind: name.to_owned() });
-        };
-        let variants = |site: Vec<usize>| -> Variants {
-            let scanned = kind.scan(&site, ranges).into_iter().filter(|constants| {
-                declared.iter().all(|(name, value)| constants.get(name).is_none_or(|other| other == value))
-            });
-            scanned.map(|constants| kind.build(tree, &site, &constants)).collect()
-        };
-        Ok(kind.sites(tree).into_iter().map(variants).collect())
-    }
 }
 
 impl EffectCatalogue for Catalogue {
     fn build(&self, spec: &EffectSpec, tree: &Tree) -> Result<Box<dyn Effect>, EffectError> {
         let kind = self.kind(&spec.kind)?;
-        let site: Result<Vec<usize>, EffectError> = spec
-            .joints
-            .iter()
-            .map(|joint| {
-                let unknown = EffectError::UnknownJoint { kind: spec.kind.clone(), joint: joint.clone() };
-                tree.joint_index(joint).ok_or(unknown)
-            })
-            .collect();
-        let site = site?;
+        let site = joint_indices(&spec.kind, &spec.joints, tree)?;
         if !kind.accepts(tree, &site) {
-            return Err(EffectError::WrongJoints {
-                kind: spec.kind.clone(),
-                needed: kind.acts_on(),
-                found: site.len(),
-            });
+            return Err(cannot_act(kind, tree, &spec.joints));
         }
         Ok(kind.build(tree, &site, &spec.constants))
     }

@@ -32,9 +32,6 @@ impl EffectKind for ThermalDrift {
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
         around(found, TIME_CONSTANT, step)
     }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
-    }
     fn telling_motion(&self) -> &'static str {
         "the same motion cold and warm"
     }

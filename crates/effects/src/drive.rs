@@ -82,9 +82,6 @@ impl EffectKind for TorqueGain {
     fn name(&self) -> &str {
         "torque_gain"
     }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
-    }
     fn telling_motion(&self) -> &'static str {
         "a known load on the joint"
     }

@@ -18,9 +18,6 @@ impl EffectKind for JointElasticity {
     fn name(&self) -> &str {
         "joint_elasticity"
     }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
-    }
     fn telling_motion(&self) -> &'static str {
         "quick reversals, so that the torque changes fast"
     }

@@ -15,9 +15,6 @@ impl EffectKind for Payload {
     fn name(&self) -> &str {
         "payload"
     }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
-    }
     fn needs_held_model(&self) -> bool {
         true
     }
@@ -68,9 +65,6 @@ pub struct ExternalForce;
 impl EffectKind for ExternalForce {
     fn name(&self) -> &str {
         "external_force"
-    }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
     }
     fn telling_motion(&self) -> &'static str {
         "rests in many poses, with and without what pulls"
@@ -177,9 +171,6 @@ impl EffectKind for GravityTilt {
     }
     fn acts_on(&self) -> &'static str {
         "the whole robot (no joint is named)"
-    }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
     }
     fn telling_motion(&self) -> &'static str {
         "rests in many poses of the first joint"

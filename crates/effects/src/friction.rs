@@ -132,6 +132,9 @@ impl EffectKind for Asymmetric {
         let (joint, halves) = (found.joints(), halves.join(" and "));
         format!("{joint} rubs differently in its two directions: half the difference is {halves}.")
     }
+    fn form_of(&self) -> &'static [&'static str] {
+        &["viscous_friction", "coulomb_friction"]
+    }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));
         let viscous = ("fv_difference", ParameterKind::PerVelocity, f64::NEG_INFINITY);
@@ -170,6 +173,9 @@ impl EffectKind for Quadratic {
         let (joint, coefficient) = (found.joints(), found.quantity(0));
         format!("The friction of {joint} bends with the square of the speed: {coefficient}.")
     }
+    fn form_of(&self) -> &'static [&'static str] {
+        &["viscous_friction", "coulomb_friction"]
+    }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
@@ -203,9 +209,6 @@ impl EffectKind for Stribeck {
         near.extend(around(found, EXPONENT, step));
         near
     }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
-    }
     fn telling_motion(&self) -> &'static str {
         "a slow motion, well below the speed at which friction is lowest"
     }
@@ -219,6 +222,9 @@ impl EffectKind for Stribeck {
     }
     fn dissipates(&self) -> bool {
         true
+    }
+    fn form_of(&self) -> &'static [&'static str] {
+        &["viscous_friction", "coulomb_friction"]
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));

@@ -27,9 +27,6 @@ impl EffectKind for Hysteresis {
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
         around(found, PRESLIDING, step)
     }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
-    }
     fn telling_motion(&self) -> &'static str {
         "small slow strokes of growing size about one position"
     }
@@ -40,6 +37,9 @@ impl EffectKind for Hysteresis {
             found.quantity(0),
             found.constant(PRESLIDING)
         )
+    }
+    fn form_of(&self) -> &'static [&'static str] {
+        &["viscous_friction", "coulomb_friction"]
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let formula = Dahl { joint: site[0], presliding: constant(constants, PRESLIDING, 0.05) };

@@ -61,9 +61,9 @@ pub trait EffectKind: Send + Sync {
         Vec::new()
     }
 
-    /// Constants to use when the kind is declared for all joints; `None` if that makes no sense.
+    /// Constants that are fixed where the kind is declared; `None` if the data choose all of them.
     fn declared_constants(&self) -> Option<Constants> {
-        Some(Constants::new())
+        None
     }
 
     /// Whether its parameters may have changed against a held model that has it already: the change is then
@@ -98,6 +98,12 @@ pub trait EffectKind: Send + Sync {
         &[]
     }
 
+    /// Names of the simpler kinds whose form it polishes: it enters a model with these on the same joint, and
+    /// has a name of its own only where it does what they cannot.
+    fn form_of(&self) -> &'static [&'static str] {
+        &[]
+    }
+
     /// Names of its constants that belong to the joint rather than to the effect: where it is in a model,
     /// other kinds on the same site take the values that it has.
     fn constants_of_the_site(&self) -> &'static [&'static str] {
@@ -128,6 +134,12 @@ pub trait EffectKind: Send + Sync {
         false
     }
 
+    /// Whether it has so many parameters that it can imitate other kinds: it gives way to simpler ones that
+    /// do its work.
+    fn is_general_form(&self) -> bool {
+        false
+    }
+
     /// Whether it changes with the time since the session began, so that logs whose clocks each begin anew
     /// cannot tell it.
     fn needs_session_time(&self) -> bool {
@@ -149,6 +161,8 @@ pub struct JointRange {
     pub torque_rms: f64,
     /// Largest torque \[N·m, N\].
     pub torque_peak: f64,
+    /// RMS of what the model so far leaves of the torque, zero where nothing is fitted yet \[N·m, N\].
+    pub residual_rms: f64,
 }
 
 /// What the training logs cover: bounds for the constants to try.

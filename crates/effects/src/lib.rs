@@ -3,8 +3,10 @@
 mod catalogue;
 mod columns;
 mod coupling;
+mod declaration;
 mod drift;
 mod drive;
+mod efficiency;
 mod elasticity;
 mod external;
 mod fitted;
@@ -13,7 +15,9 @@ mod hysteresis;
 mod kind;
 mod mechanism;
 mod position;
+mod position_map;
 mod sensing;
+mod trigonometric_spline;
 
 pub use catalogue::{Catalogue, sentence};
 pub use columns::{Formula, OwnTorque, ParameterKind, smooth_sign};

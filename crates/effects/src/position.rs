@@ -111,9 +111,6 @@ impl EffectKind for TorqueRipple {
         };
         vec![near(1.0 - spread), near(1.0 + spread)]
     }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
-    }
     fn telling_motion(&self) -> &'static str {
         "slow motion at constant speed"
     }
@@ -174,9 +171,6 @@ impl EffectKind for EndStop {
                 near
             })
             .to_vec()
-    }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
     }
     fn telling_motion(&self) -> &'static str {
         "slow motion up to the limit and back"

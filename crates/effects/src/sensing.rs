@@ -33,9 +33,6 @@ impl EffectKind for TimeDelay {
     fn acts_on(&self) -> &'static str {
         "one joint, or all joints"
     }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
-    }
     fn telling_motion(&self) -> &'static str {
         "quick reversals of the torque"
     }
@@ -137,9 +134,6 @@ impl EffectKind for EncoderOffset {
     fn name(&self) -> &str {
         "encoder_offset"
     }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
-    }
     fn telling_motion(&self) -> &'static str {
         "rests in many poses of the joint and of those behind it"
     }
@@ -225,7 +219,10 @@ pub struct ActuatorSaturation;
 const LIMIT: &str = "limit";
 /// Share of the limit that the model's torque reaches where the drive clips; the model was fitted with the
 /// clipping, and is not exact.
-const REACHED: f64 = 0.8;
+const REACHED: f64 = 0.9;
+/// How far the peaks of noise stand out, in RMS of the filtered residual: those of a few thousand samples
+/// reach four times their own RMS.
+const NOISE_PEAK: f64 = 4.0;
 /// What the share of the part beyond the limit that is missing may be.
 const CLIPPED_SHARE: (f64, f64) = (0.5, 1.5);
 
@@ -237,7 +234,9 @@ impl EffectKind for ActuatorSaturation {
         // A level that most samples exceed is implausible for a drive, and its column would be the torque
         // itself.
         let range = ranges.joints[site[0]];
-        let (lowest, highest) = (1.2 * range.torque_rms, 0.97 * range.torque_peak);
+        // What exceeds it must be more than the noise that the measured torque holds.
+        let beyond = (0.03 * range.torque_peak).max(NOISE_PEAK * range.residual_rms);
+        let (lowest, highest) = (1.2 * range.torque_rms, range.torque_peak - beyond);
         if lowest >= highest {
             return Vec::new();
         }
@@ -250,9 +249,6 @@ impl EffectKind for ActuatorSaturation {
         [1.0 - spread, 1.0 + spread]
             .map(|factor| Constants::from([(LIMIT.to_owned(), limit * factor)]))
             .to_vec()
-    }
-    fn declared_constants(&self) -> Option<Constants> {
-        None
     }
     fn telling_motion(&self) -> &'static str {
         "a motion that asks for more torque than the drive has"

@@ -37,8 +37,13 @@ struct Zoo {
 impl Zoo {
     fn new(seed: u64, joints: usize) -> Self {
         let tree = random_tree(seed, &RandomTreeOptions { joints, ..RandomTreeOptions::default() }).unwrap();
-        let joint =
-            JointRange { position: (-1.0, 1.0), velocity_rms: 0.8, torque_rms: 2.0, torque_peak: TORQUE };
+        let joint = JointRange {
+            position: (-1.0, 1.0),
+            velocity_rms: 0.8,
+            torque_rms: 2.0,
+            torque_peak: TORQUE,
+            ..JointRange::default()
+        };
         let ranges = SignalRanges {
             joints: vec![joint; joints],
             session: (0.0, 60.0),

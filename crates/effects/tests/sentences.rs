@@ -60,11 +60,25 @@ const SENTENCES: &[(&str, &str)] = &[
     ("gravity_tilt", "The base is not level: gravity leans by 3.27 degrees."),
     ("payload", "The link behind shoulder carries 0.500 kg more than the model knows."),
     ("external_force", "Something pulls at the link behind shoulder (a hose, a cable): 0.500 N along x."),
+    (
+        "drive_efficiency",
+        "The transmission of shoulder has an efficiency of 0.67 where it drives its load and 0.75 where its load drives it.",
+    ),
+    (
+        "position_map",
+        "The torque of shoulder depends on its position in no simple form (a cable, a hose, cogging): it varies by 0.148 N·m RMS from -1.000 to 1.000 rad.",
+    ),
 ];
 
 /// The kind on its first site, with the last of its constants and parameters 0.5, 0.25, 0.125, …
 fn said(tree: &Tree, kind: &dyn EffectKind) -> String {
-    let joint = JointRange { position: (-1.0, 1.0), velocity_rms: 0.8, torque_rms: 2.0, torque_peak: 9.0 };
+    let joint = JointRange {
+        position: (-1.0, 1.0),
+        velocity_rms: 0.8,
+        torque_rms: 2.0,
+        torque_peak: 9.0,
+        ..JointRange::default()
+    };
     let ranges = SignalRanges {
         joints: vec![joint; 2],
         session: (0.0, 60.0),

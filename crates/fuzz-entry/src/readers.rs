@@ -32,7 +32,9 @@ fn file(bytes: &[u8], ending: &str) -> Option<NamedTempFile> {
 pub fn urdf(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     for floating_base in [false, true] {
-        let Ok(reading) = read_urdf(text, &UrdfOptions { floating_base, held: Vec::new() }) else { continue };
+        let Ok(reading) = read_urdf(text, &UrdfOptions { floating_base, ..UrdfOptions::default() }) else {
+            continue;
+        };
         let tree = reading.tree;
         let mut q = vec![0.3; tree.configuration_size()];
         if floating_base {

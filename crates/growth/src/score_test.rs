@@ -258,6 +258,7 @@ fn ranges(robot: &Robot, logs: &[MotionLog]) -> SignalRanges {
             velocity_rms: rms(|log| &log.qd),
             torque_rms: rms(|log| &log.tau),
             torque_peak: each(|log| &log.tau).fold(0.0, |peak, torque| peak.max(torque.abs())),
+            residual_rms: 0.0,
         }
     };
     SignalRanges {

@@ -1,13 +1,16 @@
 //! The columns of a model: which parameter acts on which torque, and the numbers of one sample.
 
 use crate::effect::{Effect, EffectParameter, Evaluator};
+use crate::model::with_masses;
 use crate::reference::ReferenceModel;
 use crate::sample::{BlockReference, Needs, Sample};
+use phiw_dynamics::check::check_size;
 use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
 use phiw_dynamics::{DimensionError, Tree};
-use phiw_regressor::{BaseParameters, JointTorqueRegressor, RegressorScratch};
+use phiw_regressor::{BaseParameters, JointTorqueRegressor, RegressorError, RegressorScratch};
 use phiw_telemetry::Block;
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The columns of one torque, in the order of its row.
@@ -47,7 +50,7 @@ pub struct Design {
     tree: Tree,
     base: BaseParameters,
     regressor: JointTorqueRegressor,
-    effects: Vec<Box<dyn Effect>>,
+    effects: Vec<Arc<dyn Effect>>,
     /// First parameter of each effect, and one past the last.
     effect_parameters: Vec<Range<usize>>,
     effect_columns: Vec<Range<usize>>,
@@ -82,6 +85,10 @@ pub struct DesignScratch<'a> {
 impl Design {
     /// The columns of the base parameters and of `effects`, in that order.
     pub fn new(tree: Tree, base: BaseParameters, effects: Vec<Box<dyn Effect>>) -> Self {
+        Self::of_shared(tree, base, effects.into_iter().map(Arc::from).collect())
+    }
+
+    fn of_shared(tree: Tree, base: BaseParameters, effects: Vec<Arc<dyn Effect>>) -> Self {
         let regressor = JointTorqueRegressor::new(&tree);
         let (mut effect_parameters, mut effect_columns) = (Vec::new(), Vec::new());
         let (mut parameter, mut column) = (base.count(), 0);
@@ -191,15 +198,40 @@ impl Design {
         self
     }
 
+    /// The same with its own model as the reference: `parameters` are those of all its columns. So the columns
+    /// of a fitted model are made wherever it is used.
+    ///
+    /// # Errors
+    /// The parameters are not this design's.
+    pub fn with_own_reference(self, parameters: &[f64]) -> Result<Self, RegressorError> {
+        let all: Vec<usize> = (0..self.effects.len()).collect();
+        let reference = self.reference_of(parameters, &all)?;
+        Ok(self.with_reference(reference))
+    }
+
+    /// The model with these of its effects, as a reference; `parameters` are those of all columns.
+    pub(crate) fn reference_of(
+        &self,
+        parameters: &[f64],
+        effects: &[usize],
+    ) -> Result<ReferenceModel, RegressorError> {
+        check_size("parameters", parameters.len(), self.parameter_count())?;
+        let mut tree = self.tree.clone();
+        let inertial = &parameters[..self.base.count()];
+        tree.set_inertial_parameters(&self.base.to_standard(inertial, &with_masses(&self.tree))?)?;
+        let with_values = |&effect: &usize| {
+            (Arc::clone(&self.effects[effect]), parameters[self.effect_parameters(effect)].to_vec())
+        };
+        Ok(ReferenceModel::new(tree).with_shared_effects(effects.iter().map(with_values).collect()))
+    }
+
     /// The design with only the `chosen` effects, in that order.
     pub fn keep(self, chosen: &[usize]) -> Self {
-        let mut effects: Vec<Option<Box<dyn Effect>>> = self.effects.into_iter().map(Some).collect();
-        let kept =
-            chosen.iter().filter_map(|&effect| effects.get_mut(effect).and_then(Option::take)).collect();
+        let kept = chosen.iter().filter_map(|&effect| self.effects.get(effect).cloned()).collect();
         Design {
             reference: self.reference,
             rest_speeds: self.rest_speeds,
-            ..Design::new(self.tree, self.base, kept)
+            ..Design::of_shared(self.tree, self.base, kept)
         }
     }
 
@@ -212,7 +244,7 @@ impl Design {
         &self.base
     }
     /// The effects beside the rigid body.
-    pub fn effects(&self) -> &[Box<dyn Effect>] {
+    pub fn effects(&self) -> &[Arc<dyn Effect>] {
         &self.effects
     }
     /// The parameters of an effect, as indices into all parameters.

@@ -2,6 +2,7 @@
 //!
 //! This crate knows no effect by name. A catalogue (`phiw-effects` is one) or a user brings them.
 
+pub use crate::effect_selector::EffectSelector;
 pub use crate::reference::ReferenceModel;
 pub use crate::sample::{BlockReference, Needs, Sample};
 
@@ -177,27 +178,47 @@ pub enum EffectError {
         known: Vec<String>,
     },
     /// No such joint.
-    #[error("effect `{kind}` names the joint `{joint}`, which the robot does not have")]
+    #[error("effect `{kind}` names the joint `{joint}`, which the robot does not have or which does not move{}; moving joints are: {}", nearest.as_ref().map(|name| format!(" (did you mean `{name}`?)")).unwrap_or_default(), known.join(", "))]
     UnknownJoint {
         /// The effect.
         kind: String,
         /// The joint.
         joint: String,
+        /// The nearest joint that moves.
+        nearest: Option<String>,
+        /// All joints that move.
+        known: Vec<String>,
     },
-    /// The wrong number of joints.
-    #[error("effect `{kind}` acts on {needed}, but {found} joints are named")]
-    WrongJoints {
+    /// Joints on which the kind cannot act.
+    #[error("effect `{kind}` acts on {needed} and cannot act on {}; {}", quoted(joints), possible(sites))]
+    CannotActThere {
         /// The effect.
         kind: String,
         /// What it acts on, in words.
         needed: &'static str,
-        /// How many joints were named.
-        found: usize,
+        /// The joints that were named.
+        joints: Vec<String>,
+        /// Where it can act on this robot.
+        sites: Vec<Vec<String>>,
     },
-    /// The effect exists only as a correction found by tracing.
-    #[error("effect `{kind}` cannot be declared for all joints at once: it is found by `phiw explain`")]
-    NotDeclarable {
-        /// The effect.
-        kind: String,
-    },
+}
+
+/// Names in a message; a robot can have hundreds.
+const NAMED: usize = 20;
+
+fn quoted(joints: &[String]) -> String {
+    let names: Vec<String> = joints.iter().map(|joint| format!("`{joint}`")).collect();
+    if names.is_empty() { "this robot".to_owned() } else { names.join(" and ") }
+}
+
+fn possible(sites: &[Vec<String>]) -> String {
+    let sites: Vec<String> = sites.iter().map(|joints| joints.join("+")).collect();
+    match sites.as_slice() {
+        [] => "leave it out: this robot has no joint for it".to_owned(),
+        [whole] if whole.is_empty() => "name it without a joint".to_owned(),
+        sites if sites.len() > NAMED => {
+            format!("it can on {} and {} more", sites[..NAMED].join(", "), sites.len() - NAMED)
+        }
+        sites => format!("it can on {}", sites.join(", ")),
+    }
 }

@@ -164,6 +164,23 @@ fn jackknife(
     determined: &[usize],
     weights: &[f64],
 ) -> Result<Option<Vec<Vec<f64>>>, RegressorError> {
+    let Some(mut solutions) = left_out(folds, determined, weights)? else { return Ok(None) };
+    let count = solutions.len() as f64;
+    let means: Vec<f64> = (0..determined.len())
+        .map(|parameter| solutions.iter().map(|solution| solution[parameter]).sum::<f64>() / count)
+        .collect();
+    for solution in &mut solutions {
+        solution.iter_mut().zip(&means).for_each(|(value, mean)| *value -= mean);
+    }
+    Ok(Some(solutions))
+}
+
+/// The solutions that leave out one fold each; `None` where there are too few folds.
+pub(crate) fn left_out(
+    folds: &[GroupedFactor],
+    determined: &[usize],
+    weights: &[f64],
+) -> Result<Option<Vec<Vec<f64>>>, RegressorError> {
     if folds.len() < 4 {
         return Ok(None);
     }
@@ -178,13 +195,6 @@ fn jackknife(
             Err(RegressorError::RankDeficient { .. }) => return Ok(None),
             Err(error) => return Err(error),
         }
-    }
-    let count = solutions.len() as f64;
-    let means: Vec<f64> = (0..determined.len())
-        .map(|parameter| solutions.iter().map(|solution| solution[parameter]).sum::<f64>() / count)
-        .collect();
-    for solution in &mut solutions {
-        solution.iter_mut().zip(&means).for_each(|(value, mean)| *value -= mean);
     }
     Ok(Some(solutions))
 }

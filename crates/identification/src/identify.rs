@@ -6,9 +6,11 @@ use crate::reference::ReferenceModel;
 use crate::{BlockSource, Design, Effect, Fold, IdentificationError};
 use phiw_dynamics::Tree;
 use phiw_limits::Limits;
-use phiw_regressor::factor::FactorBuilder;
+use phiw_regressor::factor::{Factor, FactorBuilder};
 use phiw_regressor::least_squares::{GroupedFactor, WeightedSolution, weighted_least_squares};
 use phiw_regressor::{BaseParameters, BaseParametersOptions, RegressorError};
+use std::collections::BTreeSet;
+use std::ops::Range;
 
 /// The same effect with several values of its constants, one of which the data will choose; the first is the
 /// simplest.
@@ -74,11 +76,12 @@ pub fn identify(
         // Columns that need the model's torque take the URDF's model in the first pass (zero without
         // inertials).
         for _ in 0..REFERENCE_PASSES {
-            let reference = ReferenceModel::new(fitted_tree(&design, &slots, &folds[..train.len()])?);
+            let reference = fitted_reference(&design, &slots, &folds[..train.len()])?;
             design = design.with_reference(reference);
             folds = accumulate(&design, &all_folds, sources)?;
         }
     }
+    let needs_reference = design.needs().of_reference();
     let chosen = choose(&design, &slots, &merge(&folds[..train.len()])?)?;
     let kept: Vec<usize> =
         (0..base.count()).chain(chosen.iter().flat_map(|&effect| design.effect_parameters(effect))).collect();
@@ -86,8 +89,13 @@ pub fn identify(
         *fold = fold.select(&kept)?;
     }
     let design = design.keep(&chosen);
+    let fitted = fit(&design, &folds[..train.len()])?;
+    let design = design.with_own_reference(&fitted.parameters)?;
+    if needs_reference {
+        // The error is that of the model as it is used: with its own torque in the columns that need one.
+        folds = accumulate(&design, &all_folds, sources)?;
+    }
     let held_out_folds = folds.split_off(train.len());
-    let fitted = fit(&design, &folds)?;
     Ok(Identified {
         train: torque_error(&folds, &fitted.parameters)?,
         held_out: torque_error(&held_out_folds, &fitted.parameters)?,
@@ -102,12 +110,12 @@ pub fn identify(
 /// that the logs can tell.
 const REFERENCE_PASSES: usize = 2;
 
-/// The robot with the inertial parameters that the training folds tell with the columns as they are.
-fn fitted_tree(
+/// The model that the training folds tell with the columns as they are.
+fn fitted_reference(
     design: &Design,
-    slots: &[std::ops::Range<usize>],
+    slots: &[Range<usize>],
     train: &[GroupedFactor],
-) -> Result<Tree, IdentificationError> {
+) -> Result<ReferenceModel, IdentificationError> {
     let factors = merge(train)?;
     let chosen = choose(design, slots, &factors)?;
     let undetermined = undetermined_with(design, &chosen, &factors)?;
@@ -117,12 +125,9 @@ fn fitted_tree(
         .filter(|parameter| !undetermined.contains(parameter))
         .collect();
     let solution = weighted_least_squares(&factors.select(&determined)?)?;
-    let mut parameters = vec![0.0; base.count()];
-    let inertial = determined.iter().zip(&solution.parameters).filter(|(column, _)| **column < base.count());
-    inertial.for_each(|(&column, value)| parameters[column] = *value);
-    let mut tree = design.tree().clone();
-    tree.set_inertial_parameters(&base.to_standard(&parameters, &crate::model::with_masses(design.tree()))?)?;
-    Ok(tree)
+    let mut parameters = vec![0.0; design.parameter_count()];
+    determined.iter().zip(&solution.parameters).for_each(|(&column, value)| parameters[column] = *value);
+    Ok(design.reference_of(&parameters, &chosen)?)
 }
 
 /// Share of a torque's residual variance that a variant of a declared effect must save over a simpler one.
@@ -135,7 +140,7 @@ const SWEEPS: usize = 2;
 /// The pooled error would let the torque that fits worst decide for all.
 fn choose(
     design: &Design,
-    slots: &[std::ops::Range<usize>],
+    slots: &[Range<usize>],
     factors: &GroupedFactor,
 ) -> Result<Vec<usize>, RegressorError> {
     let mut chosen: Vec<usize> = slots.iter().map(|slot| slot.start).collect();
@@ -161,14 +166,15 @@ fn choose(
             if variants.len() <= 1 {
                 continue;
             }
-            let kept = columns(&chosen, Some(slot));
-            let rest = Rest::new(design, factors, &solution, &kept, chosen[slot])?;
-            let mut merits = Vec::with_capacity(variants.len());
-            for variant in variants.clone() {
+            let with = |variant: usize| {
                 let mut trial = chosen.clone();
                 trial[slot] = variant;
-                merits.push(rest.log_error(factors, &columns(&trial, Some(slot)))?);
-            }
+                Columns::new(columns(&trial, Some(slot)), design.effect_parameters(variant))
+            };
+            let rest = Rest::new(design, factors, &solution, &with(chosen[slot]), variants.clone())?;
+            let merits: Result<Vec<f64>, RegressorError> =
+                variants.clone().map(|variant| rest.log_error(factors, &with(variant))).collect();
+            let merits = merits?;
             let best = merits.iter().copied().fold(f64::INFINITY, f64::min);
             let margin = 0.5 * rest.own_rows(factors) * WORTH_A_VARIANT;
             let simplest = merits.iter().position(|merit| *merit <= best + margin).unwrap_or_default();
@@ -207,11 +213,26 @@ fn solve_determined(factors: &GroupedFactor) -> Result<WeightedSolution, Regress
     }
 }
 
-/// The torques that a slot's effect does not act on, merged once for all its variants.
+/// The columns of a fit, and which of them are those of the variant that is on trial.
+struct Columns {
+    kept: Vec<usize>,
+    /// Places of the variant's columns in `kept`.
+    variant: Range<usize>,
+}
+
+impl Columns {
+    fn new(kept: Vec<usize>, parameters: Range<usize>) -> Self {
+        let first = kept.iter().position(|column| *column == parameters.start).unwrap_or(kept.len());
+        Columns { kept, variant: first..first + parameters.len() }
+    }
+}
+
+/// The torques that no variant of a slot acts on, merged once for all of them.
 struct Rest {
-    /// Torques that the effect acts on.
+    /// Torques that a variant acts on.
     own: Vec<usize>,
-    others: phiw_regressor::factor::Factor,
+    /// Over the columns of the others, the variant's left out.
+    others: Factor,
     weights: Vec<f64>,
 }
 
@@ -220,21 +241,24 @@ impl Rest {
         design: &Design,
         factors: &GroupedFactor,
         solution: &WeightedSolution,
-        kept: &[usize],
-        effect: usize,
+        columns: &Columns,
+        variants: Range<usize>,
     ) -> Result<Self, RegressorError> {
-        let own: Vec<usize> = design.effects()[effect].entries().iter().map(|entry| entry.row).collect();
+        let entries = variants.flat_map(|effect| design.effects()[effect].entries());
+        let own: BTreeSet<usize> = entries.map(|entry| entry.row).collect();
         let weights: Vec<f64> = solution.group_std.iter().map(|std| 1.0 / std).collect();
-        let selected = factors.select(kept)?;
-        let mut builder = FactorBuilder::new(kept.len() + 1);
+        let Columns { kept, variant } = columns;
+        let shared: Vec<usize> = [&kept[..variant.start], &kept[variant.end..]].concat();
+        let selected = factors.select(&shared)?;
+        let mut builder = FactorBuilder::new(shared.len() + 1);
         for (row, group) in selected.groups().iter().enumerate() {
             if !own.contains(&row) {
                 let mut columns = group.parameters.clone();
-                columns.push(kept.len());
+                columns.push(shared.len());
                 builder.push_factor(&group.factor, &columns, weights[row])?;
             }
         }
-        Ok(Rest { own, others: builder.factor(), weights })
+        Ok(Rest { own: own.into_iter().collect(), others: builder.factor(), weights })
     }
 
     /// Rows of the torques that the effect acts on.
@@ -242,11 +266,13 @@ impl Rest {
         self.own.iter().map(|&row| factors.groups()[row].factor.rows() as f64).sum()
     }
 
-    /// Σ rows·log(RMSE) of the fit with `kept` columns, whose numbering is that of the slot's own variant.
-    fn log_error(&self, factors: &GroupedFactor, kept: &[usize]) -> Result<f64, RegressorError> {
+    /// Σ rows·log(RMSE) of the fit with these columns.
+    fn log_error(&self, factors: &GroupedFactor, columns: &Columns) -> Result<f64, RegressorError> {
+        let Columns { kept, variant } = columns;
         let mut builder = FactorBuilder::new(kept.len() + 1);
-        let all: Vec<usize> = (0..=kept.len()).collect();
-        builder.push_factor(&self.others, &all, 1.0)?;
+        let of_others: Vec<usize> = (0..variant.start).chain(variant.end..kept.len()).collect();
+        let with_torque: Vec<usize> = of_others.iter().copied().chain([kept.len()]).collect();
+        builder.push_factor(&self.others, &with_torque, 1.0)?;
         let mut renumbered = vec![None; factors.parameter_count()];
         kept.iter().enumerate().for_each(|(new, &old)| renumbered[old] = Some(new));
         let mut own = Vec::new();
@@ -279,7 +305,8 @@ impl Rest {
             }
             Err(error) => return Err(error),
         };
-        let others = self.others.residual_sum_of_squares(&solution)?;
+        let of_others: Vec<f64> = of_others.iter().map(|&column| solution[column]).collect();
+        let others = self.others.residual_sum_of_squares(&of_others)?;
         let mut total = 0.5 * self.others.rows() as f64 * others.max(f64::MIN_POSITIVE).ln();
         for (factor, targets) in &own {
             let parameters: Vec<f64> = targets.iter().map(|&column| solution[column]).collect();

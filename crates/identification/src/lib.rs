@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod accuracy;
+pub mod bandwidth;
 pub mod block_source;
 pub mod checks;
 pub mod consistent;
@@ -10,6 +11,7 @@ pub mod model;
 
 mod accumulate;
 mod covariance;
+mod effect_selector;
 mod error;
 mod factor_rows;
 mod fit;

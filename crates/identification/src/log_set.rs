@@ -28,7 +28,8 @@ impl LogSet {
     /// Share of each training log that is held out when no log is given for validation.
     pub const HELD_OUT_SHARE: f64 = 0.3;
 
-    /// Surveys the logs, checks them against the robot, and chooses how to condition them.
+    /// Surveys the logs, checks them against the robot, and chooses from the training logs how to condition
+    /// all of them.
     ///
     /// # Errors
     /// A log that cannot be read or does not fit the robot, or a joint that moves in none.
@@ -88,7 +89,9 @@ impl LogSet {
         phiw_telemetry::arrange_session(&mut surveys);
         let (training, held_out) = surveys.split_at(train.len());
         check_logs(tree, training, held_out)?;
-        let conditioning = Conditioning::choose(&surveys, options)?;
+        let conditioning = Conditioning::choose(training, options)?;
+        // Cut-offs that were told must fit the logs held out, too.
+        held_out.iter().try_for_each(|survey| conditioning.plan(survey).map(drop))?;
         Ok(LogSet { train: train.len(), conditioning, surveys })
     }
 
@@ -103,6 +106,11 @@ impl LogSet {
     /// How the logs are conditioned.
     pub fn conditioning(&self) -> &Conditioning {
         &self.conditioning
+    }
+    /// Conditions all logs with another cut-off of the parallel filter \[Hz\], one that the training logs told
+    /// (see [`bandwidth`](crate::bandwidth)).
+    pub fn set_parallel_cutoff(&mut self, cutoff_hz: f64) {
+        self.conditioning.parallel_cutoff_hz = cutoff_hz;
     }
     /// Whether the end of each training log is held out, since no other log is given.
     pub fn splits_training_logs(&self) -> bool {
@@ -164,10 +172,7 @@ impl LogSet {
 
     /// The logs as sources of blocks.
     pub fn sources<'a>(&'a self, progress: Progress<'a>) -> Vec<LogFile<'a>> {
-        self.surveys
-            .iter()
-            .map(|survey| LogFile { survey, conditioning: &self.conditioning, progress })
-            .collect()
+        self.surveys.iter().map(|survey| LogFile::new(survey, &self.conditioning, progress)).collect()
     }
 }
 
@@ -202,6 +207,12 @@ pub struct LogFile<'a> {
     survey: &'a Survey,
     conditioning: &'a Conditioning,
     progress: Progress<'a>,
+}
+
+impl<'a> LogFile<'a> {
+    pub(crate) fn new(survey: &'a Survey, conditioning: &'a Conditioning, progress: Progress<'a>) -> Self {
+        LogFile { survey, conditioning, progress }
+    }
 }
 
 impl BlockSource for LogFile<'_> {

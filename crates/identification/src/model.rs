@@ -3,7 +3,7 @@
 use crate::checks::check_size_of_robot;
 use crate::consistent::Consistent;
 use crate::covariance::Covariance;
-use crate::effect::EffectError;
+use crate::effect::{EffectError, EffectSelector};
 use crate::factor_rows::FactorRows;
 use crate::fit::Fit;
 pub use crate::model_sources::{BaseMap, DataFingerprint, DataRole};
@@ -34,7 +34,7 @@ pub struct Model {
     pub joints: Vec<String>,
     /// Joints of the URDF that were held, and where \[rad, m\].
     pub held: Vec<(String, f64)>,
-    /// Kinds that were declared, `rigid_body` first.
+    /// What was declared, `rigid_body` first: `KIND`, or `KIND:JOINT[+JOINT…]` (see [`EffectSelector`]).
     pub declared: Vec<String>,
     /// The base parameters.
     pub base_parameters: Vec<NamedParameter>,
@@ -125,7 +125,8 @@ fn finite(value: f64) -> Option<f64> {
 }
 
 impl Model {
-    /// The model of a fit. `declared` are the kinds that the user declared; `held` the joints that were held.
+    /// The model of a fit. `declared` is what the user declared, in the form of [`EffectSelector`]; `held` are
+    /// the joints that were held.
     ///
     /// # Errors
     /// The fit is not of this design.
@@ -153,13 +154,18 @@ impl Model {
             let unit = standard_unit(leading % PARAMETERS_PER_BODY);
             named(index, parameter_name(design.tree(), leading), unit.to_owned())
         };
+        let selectors: Vec<EffectSelector> = declared.iter().map(|text| EffectSelector::read(text)).collect();
         let effect = |index: usize| {
             let effect = &design.effects()[index];
             let spec = effect.spec();
             let parameters = design.effect_parameters(index).zip(effect.parameters());
             let parameters =
                 parameters.map(|(parameter, info)| named(parameter, info.name, info.unit)).collect();
-            EffectParameters { declared: declared.contains(&spec.kind), spec, parameters }
+            EffectParameters {
+                declared: selectors.iter().any(|declared| declared.holds(&spec)),
+                spec,
+                parameters,
+            }
         };
         Ok(Model {
             schema: SCHEMA,

@@ -7,11 +7,12 @@ use crate::sample::{BlockReference, Needs, Sample};
 use phiw_dynamics::scalar::Dual;
 use phiw_dynamics::{DimensionError, Tree, Workspace};
 use phiw_telemetry::Block;
+use std::sync::Arc;
 
 /// The robot with the parameters that a fit has found so far.
 pub struct ReferenceModel {
     tree: Tree,
-    effects: Vec<(Box<dyn Effect>, Vec<f64>)>,
+    effects: Vec<(Arc<dyn Effect>, Vec<f64>)>,
 }
 
 impl ReferenceModel {
@@ -21,7 +22,13 @@ impl ReferenceModel {
     }
 
     /// The same with effects and their parameters. Those that need a reference themselves are left out.
-    pub fn with_effects(mut self, effects: Vec<(Box<dyn Effect>, Vec<f64>)>) -> Self {
+    pub fn with_effects(self, effects: Vec<(Box<dyn Effect>, Vec<f64>)>) -> Self {
+        self.with_shared_effects(
+            effects.into_iter().map(|(effect, parameters)| (Arc::from(effect), parameters)).collect(),
+        )
+    }
+
+    pub(crate) fn with_shared_effects(mut self, effects: Vec<(Arc<dyn Effect>, Vec<f64>)>) -> Self {
         self.effects = effects.into_iter().filter(|(effect, _)| effect.needs().is_empty()).collect();
         self
     }

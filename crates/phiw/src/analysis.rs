@@ -3,6 +3,7 @@
 use crate::session::Session;
 use crate::traces::Traces;
 use crate::{Error, fingerprint, possible_bodies, warnings};
+use phiw_identification::bandwidth::Bandwidth;
 use phiw_identification::consistent::{Consistent, ConsistentSettings, consistent};
 use phiw_identification::effect::JointProperty;
 use phiw_identification::fitting::merge;
@@ -26,6 +27,8 @@ pub struct Analysis<'a> {
     pub traces: Traces,
     /// RMS of the noise in each joint's filtered torque \[N·m, N\].
     pub noise_floor: Vec<f64>,
+    /// What other cut-offs would do, where it was asked.
+    pub bandwidth: Option<Bandwidth>,
     /// What a reader should know before trusting a number.
     pub warnings: Vec<String>,
 }
@@ -40,7 +43,7 @@ impl<'a> Analysis<'a> {
         let at_rest = session.joints_without_held_out_motion(&identified.held_out_folds)?;
         let conditioning = session.logs.conditioning();
         let cutoffs = (conditioning.cutoff_hz, conditioning.parallel_cutoff_hz);
-        let model = Model::of_fit(design, fit, &session.declared, &session.arguments.hold, cutoffs)?
+        let model = Model::of_fit(design, fit, &session.declared, &session.held, cutoffs)?
             .with_sources(&session.xml, fingerprint::of_session(session)?);
         let settings = ConsistentSettings::default();
         let consistent =
@@ -52,7 +55,22 @@ impl<'a> Analysis<'a> {
         let mut warnings = warnings::all(session, identified);
         warnings.extend(possible_bodies::warning(&model, &consistent, fit));
         warnings.extend(warnings::at_rest_where_held_out(session, &at_rest));
-        Ok(Analysis { session, identified, model, consistent, traces, noise_floor, warnings })
+        Ok(Analysis {
+            session,
+            identified,
+            model,
+            consistent,
+            traces,
+            noise_floor,
+            bandwidth: None,
+            warnings,
+        })
+    }
+
+    /// The same with what other cut-offs would do.
+    pub fn with_bandwidth(mut self, bandwidth: Option<Bandwidth>) -> Self {
+        self.warnings.extend(bandwidth.iter().flat_map(crate::bandwidth::warnings));
+        Analysis { bandwidth, ..self }
     }
 
     /// Names of the robot's joints.

@@ -75,6 +75,9 @@ pub struct ExplainArguments {
     /// named.
     #[arg(long, value_name = "COUNT", default_value_t = 0)]
     pub draws: u32,
+    /// Effects that are not sought: a kind anywhere, or on the joints named. Declared effects stay.
+    #[arg(long, value_name = "KIND[:JOINT[+JOINT…]],…", value_delimiter = ',')]
+    pub exclude: Vec<String>,
 }
 
 /// Arguments of `phiw predict`.
@@ -87,7 +90,7 @@ pub struct PredictArguments {
     #[arg(value_name = "LOG", required = true)]
     pub logs: Vec<PathBuf>,
     /// Joints that stand still in the logs, at 0 or at a value (rad, m); they need no column. What the model
-    /// holds need not be named.
+    /// holds need not be named. In a name, * stands for any letters and ? for one: --hold 'left_*'.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
     pub hold: Vec<(String, f64)>,
     /// Cut-off of the low-pass over positions (Hz); by default the model's.
@@ -113,7 +116,8 @@ pub struct SimulateArguments {
     /// Logs (CSV) with measured torques.
     #[arg(value_name = "LOG", required = true)]
     pub logs: Vec<PathBuf>,
-    /// Joints that stand still, as the model was made with; they need not be named.
+    /// Joints that stand still, as the model was made with; they need not be named. In a name, * stands for
+    /// any letters and ? for one: --hold 'left_*'.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
     pub hold: Vec<(String, f64)>,
     /// Folder for simulation.json, simulation.csv and the picture simulation.svg; it is made if it is absent.
@@ -133,7 +137,8 @@ pub struct CheckArguments {
     /// Logs (CSV).
     #[arg(value_name = "LOG", required = true)]
     pub logs: Vec<PathBuf>,
-    /// Joints of the URDF that do not move, at 0 or at a value (rad, m); they need no column in the log.
+    /// Joints of the URDF that do not move, at 0 or at a value (rad, m); they need no column in the log. In a
+    /// name, * stands for any letters and ? for one: --hold 'left_*'.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
     pub hold: Vec<(String, f64)>,
     /// Folder for check.json, the same as numbers; it is made if it is absent.
@@ -170,7 +175,8 @@ pub struct RetargetArguments {
     /// Which marker sits where; by default the built-in map that names most markers of the recordings.
     #[arg(long, value_name = "MAP.toml")]
     pub map: Option<PathBuf>,
-    /// Joints of the URDF that do not move, at 0 or at a value (rad, m).
+    /// Joints of the URDF that do not move, at 0 or at a value (rad, m). In a name, * stands for any letters
+    /// and ? for one: --hold 'left_*'.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
     pub hold: Vec<(String, f64)>,
     /// Torso and head follow reach and gaze of the hands: for recordings that hold neither. The results say
@@ -214,10 +220,12 @@ pub struct NextArguments {
     /// logs.
     #[arg(long, value_name = "MODEL.json", conflicts_with = "declare")]
     pub model: Option<PathBuf>,
-    /// Effects beside the rigid body, on every joint: viscous_friction, coulomb_friction, rotor_inertia, …
-    #[arg(long, value_name = "EFFECT,…", value_delimiter = ',')]
+    /// Effects beside the rigid body, wherever they can act or on the joints named: viscous_friction,
+    /// coulomb_friction:j1+j2, transmission_coupling:j5+j6, …
+    #[arg(long, value_name = "KIND[:JOINT[+JOINT…]],…", value_delimiter = ',')]
     pub declare: Vec<String>,
-    /// Joints of the URDF that do not move, at 0 or at a value (rad, m).
+    /// Joints of the URDF that do not move, at 0 or at a value (rad, m). In a name, * stands for any letters
+    /// and ? for one: --hold 'left_*'.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
     pub hold: Vec<(String, f64)>,
     /// How far off the URDF's inertial parameters may be, as a share of each body's magnitude: what the logs
@@ -281,10 +289,12 @@ pub struct SessionArguments {
     /// Logs that its error is measured on; without any, the last 30 % of each training log are held out.
     #[arg(long, value_name = "LOG", num_args = 1..)]
     pub validate: Vec<PathBuf>,
-    /// Effects beside the rigid body, on every joint: viscous_friction, coulomb_friction, rotor_inertia, …
-    #[arg(long, value_name = "EFFECT,…", value_delimiter = ',')]
+    /// Effects beside the rigid body, wherever they can act or on the joints named: viscous_friction,
+    /// coulomb_friction:j1+j2, transmission_coupling:j5+j6, …
+    #[arg(long, value_name = "KIND[:JOINT[+JOINT…]],…", value_delimiter = ',')]
     pub declare: Vec<String>,
-    /// Joints of the URDF that do not move, at 0 or at a value (rad, m); they need no column in the log.
+    /// Joints of the URDF that do not move, at 0 or at a value (rad, m); they need no column in the log. In a
+    /// name, * stands for any letters and ? for one: --hold 'left_*'.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
     pub hold: Vec<(String, f64)>,
     /// Cut-off of the low-pass over positions (Hz); by default chosen from the logs' spectra.
@@ -367,7 +377,7 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 /// A word as a shell reads it back.
-fn quoted(word: &str) -> String {
+pub(crate) fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "_-./,=:+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         return word.to_owned();

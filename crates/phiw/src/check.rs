@@ -3,7 +3,7 @@
 use crate::arguments::CheckArguments;
 use crate::console::Console;
 use crate::output::check_folder;
-use crate::warnings::{file_name, of_log};
+use crate::warnings::{file_name, of_log, snapped};
 use crate::{Error, session};
 use phiw_dynamics::Tree;
 use phiw_identification::checks::{InputError, check_excitation, check_logs, robot_findings};
@@ -39,7 +39,8 @@ pub fn check(arguments: &CheckArguments, console: &Console) -> Result<CheckOutco
         }
         None => None,
     };
-    let (tree, _, _) = session::read_robot(&arguments.session())?;
+    let robot = session::read_robot(&arguments.session())?;
+    let tree = &robot.tree;
     let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
     let mut surveys = Vec::new();
     for path in &arguments.logs {
@@ -47,10 +48,11 @@ pub fn check(arguments: &CheckArguments, console: &Console) -> Result<CheckOutco
         surveys.push(phiw_telemetry::survey(path, &joints, TorqueColumns::Optional, &mut progress)?);
     }
     console.finish();
-    let findings = robot_findings(&tree, &surveys, &CheckSettings::default());
-    let refused = [check_logs(&tree, &surveys, &[]).err(), check_excitation(&tree, &surveys).err()];
+    let findings = robot_findings(tree, &surveys, &CheckSettings::default());
+    let refused = [check_logs(tree, &surveys, &[]).err(), check_excitation(tree, &surveys).err()];
     let refused: Vec<String> = refused.iter().flatten().map(InputError::to_string).collect();
-    let report = report(&tree, &surveys, &findings, &refused);
+    let notes = Vec::from_iter(snapped(robot.snapped));
+    let report = report(tree, &surveys, &findings, (&notes, &refused));
     if let Some((folder, _lock)) = &place {
         let text = serde_json::to_string_pretty(&report)
             .map_err(|source| Error::Json { file: RESULT_FILE, source })?;
@@ -58,7 +60,7 @@ pub fn check(arguments: &CheckArguments, console: &Console) -> Result<CheckOutco
             .map_err(|source| Error::Unreadable { path: folder.into(), source })?;
         replace_files(&Disk, folder, RESULT_FILE, &[ResultFile::new(RESULT_FILE, text + "\n")])?;
     }
-    Ok(CheckOutcome { summary: summary(&surveys, &findings, &refused), report })
+    Ok(CheckOutcome { summary: summary(&surveys, &findings, (&notes, &refused)), report })
 }
 
 /// One warning for each thing that was found, with the number of logs that show it; without what the
@@ -104,9 +106,16 @@ fn logs_in_words(logs: &[usize], surveys: &[Survey]) -> String {
     }
 }
 
-fn summary(surveys: &[Survey], findings: &[(usize, Finding)], refused: &[String]) -> String {
+fn summary(
+    surveys: &[Survey],
+    findings: &[(usize, Finding)],
+    (notes, refused): (&[String], &[String]),
+) -> String {
     let mut text = String::new();
     // Writing to a string does not fail.
+    for note in notes {
+        let _ = writeln!(text, "note: {note}\n");
+    }
     for survey in surveys {
         let _ = writeln!(
             text,
@@ -136,7 +145,12 @@ fn summary(surveys: &[Survey], findings: &[(usize, Finding)], refused: &[String]
     text
 }
 
-fn report(tree: &Tree, surveys: &[Survey], findings: &[(usize, Finding)], refused: &[String]) -> Value {
+fn report(
+    tree: &Tree,
+    surveys: &[Survey],
+    findings: &[(usize, Finding)],
+    (notes, refused): (&[String], &[String]),
+) -> Value {
     let finding = |(log, finding): &(usize, Finding)| {
         json!({
             "log": surveys[*log].path.display().to_string(),
@@ -164,6 +178,7 @@ fn report(tree: &Tree, surveys: &[Survey], findings: &[(usize, Finding)], refuse
         "robot": tree.name(),
         "logs": surveys.iter().map(log).collect::<Vec<_>>(),
         "findings": findings.iter().map(finding).collect::<Vec<_>>(),
+        "notes": notes,
         "refused": refused,
     })
 }

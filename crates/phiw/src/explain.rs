@@ -1,7 +1,7 @@
 //! `phiw explain`: the declared model, what it lacks, and the error before and after.
 
 use crate::analysis::{Analysis, noise_floor};
-use crate::arguments::ExplainArguments;
+use crate::arguments::{ExplainArguments, quoted};
 use crate::console::Console;
 use crate::draws::Draws;
 use crate::explain_page;
@@ -9,11 +9,11 @@ use crate::identify::{Outcome, outputs};
 use crate::model_file::ModelFile;
 use crate::output::take_folder;
 use crate::report_json::{by_joint, report_json};
-use crate::session::Session;
-use crate::{Error, summary};
-use phiw_effects::SignalRanges;
+use crate::session::{Session, read_robot};
+use crate::{Error, bandwidth, summary};
+use phiw_effects::{Catalogue, SignalRanges};
 use phiw_identification::fitting::TorqueError;
-use phiw_identification::{Data, Identified, Model, identify};
+use phiw_identification::{Data, EffectSpec, Identified, Model, identify};
 use phiw_report::ReportJson;
 use phiw_report::json::{
     DrawsJson, EffectJson, EvidenceJson, JointMap, NamedInDrawsJson, ParameterJson, ProgramJson,
@@ -26,7 +26,7 @@ use std::fmt::Write;
 /// A model to start from: its effects' specs, its parameters, and what was known if it is held.
 struct Start {
     model: Model,
-    specs: Vec<phiw_identification::EffectSpec>,
+    specs: Vec<EffectSpec>,
     parameters: Vec<f64>,
     held: Option<HeldModel>,
 }
@@ -40,12 +40,17 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
     let inputs: Vec<_> = arguments.session.inputs().into_iter().chain(arguments.model.clone()).collect();
     let place = take_folder(&arguments.session.out, &inputs, "phiw explain")?;
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
+    let excluded = excluded(arguments)?;
     let mut session = Session::open(&arguments.session, &progress)?;
+    let bandwidth = match arguments.model {
+        Some(_) => None,
+        None => bandwidth::of_session(&session, &progress)?,
+    };
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
-    let Traced { start, floor, mut tracing } = traced(arguments, &session, &data)?;
+    let Traced { start, floor, mut tracing } = traced(arguments, &excluded, &session, &data)?;
     let names = |data: &Data<'_>| {
-        let Traced { tracing, .. } = traced(arguments, &session, data)?;
+        let Traced { tracing, .. } = traced(arguments, &excluded, &session, data)?;
         Ok(tracing.effects.into_iter().map(|effect| effect.spec).collect())
     };
     let draws = Draws::take(arguments.draws, &data, names)?;
@@ -59,7 +64,7 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
 
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
-    let mut analysis = Analysis::new(&session, &data, &tracing.model)?;
+    let mut analysis = Analysis::new(&session, &data, &tracing.model)?.with_bandwidth(bandwidth);
     analysis.noise_floor = floor;
     analysis.warnings.extend(tracing.not_judged.iter().map(|(kind, joints)| {
         format!("{kind} of {} could not be judged on these logs (its columns are not finite): not all of it was sought", joints.join(", "))
@@ -89,7 +94,10 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
 pub fn command_line(arguments: &ExplainArguments) -> String {
     let mut line = arguments.session.command_line("explain");
     if let Some(model) = &arguments.model {
-        line.push_str(&format!(" --model {}", model.display()));
+        line.push_str(&format!(" --model {}", quoted(&model.display().to_string())));
+    }
+    if !arguments.exclude.is_empty() {
+        line.push_str(&format!(" --exclude {}", quoted(&arguments.exclude.join(","))));
     }
     if arguments.draws > 0 {
         line.push_str(&format!(" --draws {}", arguments.draws));
@@ -105,8 +113,19 @@ struct Traced {
 }
 
 /// Identifies the declared model on `data` (or takes the held one), and traces its residual.
-fn traced(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Result<Traced, Error> {
+fn traced(
+    arguments: &ExplainArguments,
+    excluded: &[EffectSpec],
+    session: &Session,
+    data: &Data<'_>,
+) -> Result<Traced, Error> {
     let start = start(arguments, session, data)?;
+    // What is declared and excluded is not sought, but stays; what is held may not be found to have changed.
+    let stays = |other: &EffectSpec| {
+        let is_other = |own: &EffectSpec| own.kind == other.kind && own.joints == other.joints;
+        start.held.is_none() && start.specs.iter().any(is_other)
+    };
+    let excluded = excluded.iter().filter(|other| !stays(other)).cloned().collect();
     let floor = noise_floor(session, data, &start.model)?;
     let conditioning = session.logs.conditioning();
     let plan = conditioning.plan(&session.logs.surveys()[0])?;
@@ -122,8 +141,21 @@ fn traced(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> R
         noise_floor: floor.clone(),
         rows_per_independent: (plan.output_rate_hz() / (2.0 * conditioning.parallel_cutoff_hz)).max(1.0),
     };
-    let tracing = trace(input, &TraceOptions::default())?;
+    let tracing = trace(input, &TraceOptions { excluded, ..TraceOptions::default() })?;
     Ok(Traced { start: start.model, floor, tracing })
+}
+
+/// The candidates that are taken out.
+fn excluded(arguments: &ExplainArguments) -> Result<Vec<EffectSpec>, Error> {
+    let catalogue = Catalogue::default();
+    let texts = arguments.exclude.iter().map(|text| text.trim()).filter(|text| !text.is_empty());
+    let texts: Vec<&str> = texts.collect();
+    if texts.is_empty() {
+        return Ok(Vec::new());
+    }
+    let robot = read_robot(&arguments.session)?;
+    let excluded = texts.into_iter().map(|text| catalogue.excluded(text, &robot.tree));
+    Ok(excluded.collect::<Result<Vec<_>, _>>()?.concat())
 }
 
 fn draws_in_words(draws: &DrawsJson) -> String {
@@ -138,12 +170,12 @@ fn draws_in_words(draws: &DrawsJson) -> String {
 fn start(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Result<Start, Error> {
     let cutoffs = (session.logs.conditioning().cutoff_hz, session.logs.conditioning().parallel_cutoff_hz);
     let Some(path) = &arguments.model else {
-        let identified: Identified = identify(&session.tree, session.effects()?, data)
+        let identified: Identified = identify(&session.tree, session.effects(data)?, data)
             .map_err(|error| session.of_training_logs(error))?;
         session.joints_without_held_out_motion(&identified.held_out_folds)?;
         let Identified { design, fit, .. } = &identified;
         return Ok(Start {
-            model: Model::of_fit(design, fit, &session.declared, &session.arguments.hold, cutoffs)?,
+            model: Model::of_fit(design, fit, &session.declared, &session.held, cutoffs)?,
             specs: design.effects().iter().map(|effect| effect.spec()).collect(),
             parameters: fit.parameters.clone(),
             held: None,

@@ -61,8 +61,12 @@ pub fn headline(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<String> {
     let mut lines = Vec::new();
     match tracing.verdict {
         trace::Verdict::Sufficient => lines.push(format!(
-            "The declared model ({declared}) is sufficient: what it leaves, {} % of RMS torque held out, is noise.",
-            percent(before)
+            "The declared model ({declared}) is sufficient: what it leaves, {} % of RMS torque held out, {}.",
+            percent(before),
+            match tracing.remaining.disturbances.is_empty() {
+                true => "is noise",
+                false => "follows nothing that was measured",
+            }
         )),
         trace::Verdict::Unexplained => lines.push(format!(
             "The declared model ({declared}) leaves {} % of RMS torque held out, with structure that no effect of the catalogue accounts for.",
@@ -82,7 +86,27 @@ pub fn headline(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<String> {
     if !tracing.remaining.joints.is_empty() {
         lines.push(describe(tracing));
     }
+    lines.extend(disturbances(tracing));
     lines
+}
+
+/// A sentence on what is larger than noise and follows nothing.
+fn disturbances(tracing: &Tracing) -> Option<String> {
+    let of_joint = |disturbance: &trace::Disturbance| {
+        format!(
+            "{} ({:.2} times its noise floor, correlation over a third of a second {:.2})",
+            disturbance.joint,
+            disturbance.rmse / disturbance.noise_floor,
+            disturbance.autocorrelation
+        )
+    };
+    let joints: Vec<String> = tracing.remaining.disturbances.iter().map(of_joint).collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "A disturbance that follows nothing measured is left on {}: no effect is missing for it.",
+            joints.join(", ")
+        )
+    })
 }
 
 /// A sentence for each effect; for a kind on each of several joints, one.

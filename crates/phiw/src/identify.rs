@@ -8,7 +8,7 @@ use crate::identified_urdf::identified_urdf;
 use crate::output::take_folder;
 use crate::report_json::report_json;
 use crate::session::Session;
-use crate::{Error, page, summary};
+use crate::{Error, bandwidth, page, summary};
 use phiw_report::ReportJson;
 use phiw_result_folder::{Disk, ResultFile, replace_folder};
 use std::path::PathBuf;
@@ -36,11 +36,12 @@ pub fn identify(arguments: &SessionArguments, console: &Console) -> Result<Outco
     let place = take_folder(&arguments.out, &arguments.inputs(), "phiw identify")?;
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
     let session = Session::open(arguments, &progress)?;
+    let bandwidth = bandwidth::of_session(&session, &progress)?;
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
-    let identified = phiw_identification::identify(&session.tree, session.effects()?, &data)
+    let identified = phiw_identification::identify(&session.tree, session.effects(&data)?, &data)
         .map_err(|error| session.of_training_logs(error))?;
-    let analysis = Analysis::new(&session, &data, &identified)?;
+    let analysis = Analysis::new(&session, &data, &identified)?.with_bandwidth(bandwidth);
     console.finish();
 
     let report = report_json(&analysis);

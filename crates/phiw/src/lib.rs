@@ -2,6 +2,7 @@
 
 pub mod analysis;
 pub mod arguments;
+pub mod bandwidth;
 pub mod check;
 pub mod console;
 mod date;

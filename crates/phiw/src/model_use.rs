@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::model_file::ModelFile;
 use phiw_dynamics::Tree;
-use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+use phiw_dynamics::urdf::{UrdfOptions, held_joints, read_urdf};
 use phiw_effects::Catalogue;
 use phiw_identification::held_joints::HeldJoints;
 use phiw_identification::{Design, IdentificationError, LogFile, LogSet, Model, Progress};
@@ -107,8 +107,13 @@ impl ModelUse {
 
 /// The joints that are held beyond those of the model.
 fn extra_holds(model: &Model, path: &Path, hold: &[(String, f64)]) -> Result<Vec<(String, f64)>, Error> {
+    let named = match &model.urdf {
+        Some(xml) => held_joints(xml, hold)
+            .map_err(|source| Error::RobotOfModel { path: path.to_owned(), source: Box::new(source) })?,
+        None => hold.to_vec(),
+    };
     let mut extra = Vec::new();
-    for (joint, asked) in hold {
+    for (joint, asked) in &named {
         match model.held.iter().find(|(held, _)| held == joint) {
             Some((_, held)) if (held - asked).abs() <= SAME_POSITION => {}
             Some(&(_, held)) => {
@@ -125,7 +130,7 @@ fn extra_holds(model: &Model, path: &Path, hold: &[(String, f64)]) -> Result<Vec
 fn robot(model: &Model, path: &Path, also: &[(String, f64)]) -> Result<Tree, Error> {
     let Some(xml) = &model.urdf else { return Err(Error::ModelWithoutRobot { path: path.to_owned() }) };
     let held = model.held.iter().chain(also).cloned().collect();
-    let reading = read_urdf(xml, &UrdfOptions { held, ..UrdfOptions::default() })
+    let reading = read_urdf(xml, &UrdfOptions { held, snap: true, ..UrdfOptions::default() })
         .map_err(|source| Error::RobotOfModel { path: path.to_owned(), source: Box::new(source) })?;
     if reading.tree.is_floating() {
         return Err(Error::FloatingBase { path: path.to_owned() });

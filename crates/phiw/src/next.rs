@@ -49,8 +49,8 @@ pub fn next(arguments: &NextArguments, console: &Console) -> Result<NextOutcome,
     }
     let place = Lock::acquire(&arguments.out, "phiw next")?;
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
-    let (tree, xml, findings) = session::read_robot(&arguments.session())?;
-    let standing = Standing::read(arguments, &xml)?;
+    let session::RobotOfUrdf { tree, xml, findings, held, .. } = session::read_robot(&arguments.session())?;
+    let standing = Standing::read(arguments, &xml, &held)?;
     let motions = motions::read(&arguments.motions, &tree, &progress)?;
     let named = [Some(&arguments.urdf), arguments.support.as_ref(), arguments.model.as_ref()];
     let inputs = named.into_iter().flatten().chain(&arguments.measured).chain(&motions.files).cloned();

@@ -3,8 +3,9 @@
 use crate::analysis::Analysis;
 use crate::traces::Role;
 use crate::warnings::file_name;
-use crate::{date, not_identified, parameters, possible_bodies};
+use crate::{bandwidth, date, not_identified, parameters, possible_bodies};
 use phiw_identification::LogSet;
+use phiw_identification::effect::EffectSelector;
 use phiw_report::IdentificationPage;
 use phiw_report::number::{percent, significant};
 use phiw_report::page::{
@@ -31,7 +32,10 @@ pub fn page(analysis: &Analysis<'_>, command_line: String) -> IdentificationPage
             .collect(),
         conditioning: ConditioningSection {
             entries: conditioning_entries(analysis),
-            pictures: spectra(analysis),
+            pictures: spectra(analysis)
+                .into_iter()
+                .chain(analysis.bandwidth.as_ref().map(bandwidth::picture))
+                .collect(),
         },
         parameters: parameters::parameters(analysis),
         base_parameters: parameters::base_parameters(analysis),
@@ -43,10 +47,14 @@ pub fn page(analysis: &Analysis<'_>, command_line: String) -> IdentificationPage
     }
 }
 
-/// The declared model in words: `rigid body, viscous friction`.
+/// The declared model in words: `rigid body, viscous friction of j1 and j2`.
 pub fn declared_in_words(analysis: &Analysis<'_>) -> String {
-    let words: Vec<String> = analysis.model.declared.iter().map(|kind| kind.replace('_', " ")).collect();
-    words.join(", ")
+    let in_words = |declared: &String| {
+        let EffectSelector { kind, joints } = EffectSelector::read(declared);
+        let of_joints = joints.map(|joints| format!(" of {}", joints.join(" and "))).unwrap_or_default();
+        kind.replace('_', " ") + &of_joints
+    };
+    analysis.model.declared.iter().map(in_words).collect::<Vec<String>>().join(", ")
 }
 
 fn headline(analysis: &Analysis<'_>) -> Vec<String> {
@@ -83,7 +91,7 @@ fn headline(analysis: &Analysis<'_>) -> Vec<String> {
 
 fn inputs(analysis: &Analysis<'_>) -> Vec<InputFile> {
     let session = analysis.session;
-    let held = &session.arguments.hold;
+    let held = &session.held;
     let mut content = counted(session.tree.joint_count(), "moving joint");
     if !held.is_empty() {
         let names: Vec<String> = held.iter().map(|(joint, value)| format!("{joint} at {value}")).collect();
@@ -190,6 +198,9 @@ pub fn conditioning_entries(analysis: &Analysis<'_>) -> Vec<(String, String)> {
     );
     let parallel = significant(conditioning.parallel_cutoff_hz, 3);
     entry("Low-pass of columns and torque", format!("{zero_phase} {parallel} Hz, the same over both"));
+    if let Some(found) = &analysis.bandwidth {
+        entry("Other cut-offs of columns and torque", bandwidth::in_words(found));
+    }
     for survey in session.logs.surveys() {
         let Ok(plan) = conditioning.plan(survey) else { continue };
         entry(&file_name(&survey.path), log_conditioning(survey, &plan));

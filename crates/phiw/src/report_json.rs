@@ -2,8 +2,8 @@
 
 use crate::analysis::Analysis;
 use crate::page::conditioning_entries;
-use crate::possible_bodies;
 use crate::traces::Role;
+use crate::{bandwidth, possible_bodies};
 use phiw_identification::fitting::TorqueError;
 use phiw_report::ReportJson;
 use phiw_report::json::{
@@ -51,6 +51,7 @@ pub fn program(analysis: &Analysis<'_>) -> ProgramJson {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         warnings: analysis.warnings.clone(),
         conditioning: entries.map(|(quantity, value)| (quantity, value.into())).collect(),
+        bandwidth: analysis.bandwidth.as_ref().map(bandwidth::json),
         relative_with_rests: Some(RelativeErrors {
             train: analysis.traces.relative_with_rests(Role::Train),
             validate: analysis.traces.relative_with_rests(Role::HeldOut),

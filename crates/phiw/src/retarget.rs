@@ -42,7 +42,7 @@ pub fn retarget(arguments: &RetargetArguments, console: &Console) -> Result<Reta
     remove_partial_files(&Disk, &arguments.out);
     let limits = Limits::default();
     let urdf = read_text(&arguments.urdf, limits.urdf_bytes)?;
-    let options = UrdfOptions { floating_base: false, held: arguments.hold.clone() };
+    let options = UrdfOptions { held: arguments.hold.clone(), ..UrdfOptions::default() };
     let reading = read_urdf(&urdf, &options)
         .map_err(|source| Error::Urdf { path: arguments.urdf.clone(), source: Box::new(source) })?;
     let map = match &arguments.map {

@@ -3,15 +3,16 @@
 use crate::Error;
 use crate::arguments::SessionArguments;
 use crate::input::read_text;
-use phiw_dynamics::urdf::{Finding, UrdfOptions, read_urdf};
+use phiw_dynamics::urdf::{Finding, UrdfOptions, UrdfReading, read_urdf};
 use phiw_dynamics::{DimensionError, JointType, Tree};
 use phiw_effects::{Catalogue, SignalRanges};
 use phiw_identification::checks::{InputError, check_excitation};
-use phiw_identification::effect::EffectError;
+use phiw_identification::effect::{EffectError, EffectSelector};
 use phiw_identification::fitting::torques_with_enough_rows;
 use phiw_identification::{BlockSource, Data, IdentificationError, LogFile, LogSet, Progress, Variants};
 use phiw_limits::Limits;
 use phiw_regressor::least_squares::GroupedFactor;
+use phiw_residual::trace::ranges_of_residual;
 use phiw_telemetry::ConditioningOptions;
 use std::path::PathBuf;
 
@@ -23,7 +24,11 @@ pub struct Session {
     pub xml: String,
     /// What in the URDF should not be trusted.
     pub findings: Vec<Finding>,
-    /// Declared kinds of effects, each once, `rigid_body` left out.
+    /// Joints that are held, by name, and where \[rad, m\].
+    pub held: Vec<(String, f64)>,
+    /// Number of angles and axes of the URDF that were made exact (see [`UrdfOptions::snap`]).
+    pub snapped: usize,
+    /// Declared effects in the syntax of `--declare`, each kind united, `rigid_body` left out.
     pub declared: Vec<String>,
     /// The kinds that there are.
     pub catalogue: Catalogue,
@@ -51,15 +56,27 @@ impl Session {
     /// An input is wrong: robot, effect, or log.
     pub fn open_unexcited(arguments: &SessionArguments, progress: Progress<'_>) -> Result<Self, Error> {
         let catalogue = Catalogue::default();
-        let declared = declared(&arguments.declare, &catalogue)?;
-        let (tree, xml, findings) = read_robot(arguments)?;
+        known_kinds(&arguments.declare, &catalogue)?;
+        let robot = read_robot(arguments)?;
+        let declared = catalogue.united(&arguments.declare, &robot.tree)?;
         let options = ConditioningOptions {
             cutoff_hz: arguments.cutoff_hz,
             parallel_cutoff_hz: arguments.parallel_cutoff_hz,
             ..ConditioningOptions::default()
         };
-        let logs = LogSet::open_unexcited(&tree, &arguments.train, &arguments.validate, &options, progress)?;
-        Ok(Session { tree, xml, findings, declared, catalogue, logs, arguments: arguments.clone() })
+        let logs =
+            LogSet::open_unexcited(&robot.tree, &arguments.train, &arguments.validate, &options, progress)?;
+        Ok(Session {
+            tree: robot.tree,
+            xml: robot.xml,
+            findings: robot.findings,
+            held: robot.held,
+            snapped: robot.snapped,
+            declared,
+            catalogue,
+            logs,
+            arguments: arguments.clone(),
+        })
     }
 
     /// The same error, with the training logs' names if it is about all of them.
@@ -69,11 +86,26 @@ impl Session {
 
     /// The declared effects, each with the constants that the data choose from.
     ///
+    /// A kind whose constants are seen only in what is left of the torque (the periods of a ripple) takes
+    /// them from the residual of the others.
+    ///
     /// # Errors
-    /// A kind cannot be declared.
-    pub fn effects(&self) -> Result<Vec<Variants>, EffectError> {
+    /// A log cannot be read, or holds too little for the others.
+    pub fn effects(&self, data: &Data<'_>) -> Result<Vec<Variants>, Error> {
         let ranges = SignalRanges::of_surveys(self.logs.training());
-        let effects = self.declared.iter().map(|kind| self.catalogue.declare(kind, &self.tree, &ranges));
+        let declare =
+            |ranges: &SignalRanges, declared: &String| self.catalogue.declare(declared, &self.tree, ranges);
+        let of_motion = |declared: &&String| self.catalogue.is_scanned(declared, &self.tree, &ranges);
+        if self.declared.iter().all(|declared| of_motion(&declared)) {
+            let effects = self.declared.iter().map(|declared| declare(&ranges, declared));
+            return Ok(effects.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect());
+        }
+        let others = self.declared.iter().filter(of_motion).map(|declared| declare(&ranges, declared));
+        let others = others.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
+        let fitted = phiw_identification::identify(&self.tree, others, data)
+            .map_err(|error| self.of_training_logs(error))?;
+        let ranges = ranges_of_residual(&fitted.design, &fitted.fit.parameters, data, ranges)?;
+        let effects = self.declared.iter().map(|declared| declare(&ranges, declared));
         Ok(effects.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
     }
 
@@ -134,30 +166,41 @@ pub(crate) fn of_training_logs(error: IdentificationError, logs: &[PathBuf]) -> 
 /// Logs that a message names.
 const LOGS_NAMED: usize = 5;
 
-/// Each declared kind once, if all are known.
-pub(crate) fn declared(names: &[String], catalogue: &Catalogue) -> Result<Vec<String>, EffectError> {
-    let mut declared: Vec<String> = Vec::new();
-    for name in names.iter().map(|name| name.trim()).filter(|name| !name.is_empty() && *name != "rigid_body")
-    {
-        if catalogue.kind(name)?.declared_constants().is_none() {
-            return Err(EffectError::NotDeclarable { kind: name.to_owned() });
-        }
-        if !declared.iter().any(|other| other == name) {
-            declared.push(name.to_owned());
-        }
+/// The first kind that is unknown, before anything else is looked at: it needs no robot.
+///
+/// # Errors
+/// There is one.
+pub(crate) fn known_kinds(declared: &[String], catalogue: &Catalogue) -> Result<(), EffectError> {
+    let kinds = declared.iter().map(|declared| EffectSelector::read(declared).kind);
+    for kind in kinds.filter(|kind| !kind.is_empty() && kind != "rigid_body") {
+        catalogue.kind(&kind)?;
     }
-    Ok(declared)
+    Ok(())
 }
 
-/// The robot on its fixed base, the URDF's text, and what in it should not be trusted.
-pub(crate) fn read_robot(arguments: &SessionArguments) -> Result<(Tree, String, Vec<Finding>), Error> {
+/// A robot on its fixed base, as its URDF describes it.
+pub(crate) struct RobotOfUrdf {
+    pub tree: Tree,
+    /// The URDF's text.
+    pub xml: String,
+    /// What in it should not be trusted.
+    pub findings: Vec<Finding>,
+    /// Joints that are held, by name, and where \[rad, m\].
+    pub held: Vec<(String, f64)>,
+    /// Number of angles and axes that were made exact.
+    pub snapped: usize,
+}
+
+/// The robot of a session.
+pub(crate) fn read_robot(arguments: &SessionArguments) -> Result<RobotOfUrdf, Error> {
     let path = || arguments.urdf.clone();
     let xml = read_text(&arguments.urdf, Limits::default().urdf_bytes)?;
-    let options = UrdfOptions { held: arguments.hold.clone(), ..UrdfOptions::default() };
+    let options = UrdfOptions { held: arguments.hold.clone(), snap: true, ..UrdfOptions::default() };
     let reading =
         read_urdf(&xml, &options).map_err(|source| Error::Urdf { path: path(), source: Box::new(source) })?;
     if reading.tree.is_floating() {
         return Err(Error::FloatingBase { path: path() });
     }
-    Ok((reading.tree, xml, reading.findings))
+    let UrdfReading { tree, findings, held, snapped } = reading;
+    Ok(RobotOfUrdf { tree, xml, findings, held, snapped })
 }

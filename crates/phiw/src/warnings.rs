@@ -6,7 +6,7 @@ use phiw_telemetry::Survey;
 use phiw_telemetry::segments::GapReason;
 use std::path::Path;
 
-/// All warnings: about the logs, then about the fit.
+/// All warnings: about the logs and the URDF, then about the fit.
 pub fn all(session: &Session, identified: &Identified) -> Vec<String> {
     let logs = &session.logs;
     let mut warnings: Vec<String> = logs
@@ -20,6 +20,7 @@ pub fn all(session: &Session, identified: &Identified) -> Vec<String> {
             )
         })
         .collect();
+    warnings.extend(snapped(session.snapped));
     warnings.extend(twice_in_training(logs.training()));
     warnings.extend(logs.surveys().iter().flat_map(of_log));
     warnings.extend(crate::check::warnings(&session.tree, logs.surveys()));
@@ -30,6 +31,20 @@ pub fn all(session: &Session, identified: &Identified) -> Vec<String> {
         );
     }
     warnings
+}
+
+/// The number of angles and axes of a URDF that were made exact, if there were any.
+pub fn snapped(count: usize) -> Option<String> {
+    let values = match count {
+        0 => return None,
+        1 => "1 angle or axis of the URDF is a right angle but for its rounding, and is".to_owned(),
+        count => {
+            format!("{count} angles or axes of the URDF are right angles but for their rounding, and are")
+        }
+    };
+    Some(format!(
+        "{values} taken as exact (within 1e-4 rad): as written, parameters would look identifiable that are not; write π/2 as 1.5707963267948966"
+    ))
 }
 
 /// Joints that do not move in what is held out: an error of zero there means nothing.

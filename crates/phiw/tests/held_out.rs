@@ -3,6 +3,7 @@
 mod synthetic;
 
 use assert_cmd::Command;
+use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_report::ReportJson;
 use phiw_telemetry::Recording;
 use std::fs;
@@ -151,4 +152,34 @@ fn short_logs_and_effects_that_need_the_models_torque_end_in_a_result_or_a_reaso
     }
     // Both commands, on the log whose rows suffice for training but not for what is held out.
     assert!(results >= 2 && nothing_held_out >= 2, "{results} {nothing_held_out}");
+}
+
+/// Every log had a say in the cut-offs, so a faster, quieter or slower sampled log held out changed the fit.
+#[test]
+fn a_validation_log_of_other_noise_does_not_change_the_parameters() {
+    let mut random = RandomNumbers::new(3);
+    let mut noisy = |mut log: Recording, size: f64| {
+        log.q.iter_mut().for_each(|q| *q += size * random.uniform(-1.0, 1.0));
+        log
+    };
+    let train = noisy(synthetic::recording(1, 40.0), 1e-4);
+    let quiet = synthetic::recording(2, 20.0);
+    let loud = noisy(quiet.clone(), 1e-2);
+    let mut shaking = quiet.clone();
+    for (row, t) in quiet.t.iter().enumerate() {
+        (0..3).for_each(|joint| shaking.q[3 * row + joint] += 0.01 * (60.0 * t).sin());
+    }
+    let mut sparse = quiet.clone();
+    let every_eighth = |values: &[f64], width: usize| -> Vec<f64> {
+        values.chunks_exact(width).step_by(8).flatten().copied().collect()
+    };
+    sparse.t = every_eighth(&quiet.t, 1);
+    sparse.q = every_eighth(&quiet.q, 3);
+    sparse.tau = every_eighth(&quiet.tau, 3);
+    let fitted = [&quiet, &loud, &shaking, &sparse].map(|validate| {
+        let (output, folder) = run("identify", &train, Some(validate));
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        fs::read_to_string(folder.path().join("out/identified.urdf")).unwrap()
+    });
+    assert!(fitted.iter().all(|urdf| *urdf == fitted[0]));
 }

@@ -228,3 +228,20 @@ fn a_held_joint_needs_no_column() {
     assert!(error.to_string().contains("no column `q.finger`"), "{error}");
     assert_eq!(error.exit_status(), 2);
 }
+
+#[test]
+fn other_cut_offs_are_compared_in_the_band_of_the_report() {
+    let identification = Identification::new(&["viscous_friction"], unspoiled);
+    let program = identification.outcome.report.phiw.clone().unwrap();
+    let found = program.bandwidth.unwrap();
+    let chosen: Vec<f64> =
+        found.curve.iter().filter(|cutoff| cutoff.chosen).map(|cutoff| cutoff.cutoff_hz).collect();
+    assert_eq!(chosen, [found.reference_hz]);
+    assert!(found.curve.len() > 2 && found.better_hz.is_none() && found.moved.is_empty(), "{found:?}");
+    assert!(!program.warnings.iter().any(|warning| warning.contains("cut-off")), "{:?}", program.warnings);
+    assert!(identification.text("report.html").contains("Other cut-offs of columns and torque"));
+
+    let arguments = SessionArguments { parallel_cutoff_hz: Some(3.0), ..identification.arguments.clone() };
+    let told = identify(&arguments, &Console::silent()).unwrap().report.phiw.unwrap().bandwidth.unwrap();
+    assert_eq!(told.reference_hz, 3.0);
+}

@@ -180,7 +180,10 @@ fn options_that_make_no_sense() {
         |scene| scene.more("--declare rigid_body,viscous_frction"),
         &["there is no effect `viscous_frction`", "did you mean `viscous_friction`"],
     );
-    check(|scene| scene.more("--declare payload"), &["`payload` cannot be declared for all joints at once"]);
+    check(
+        |scene| scene.more("--declare transmission_coupling:joint_1+joint_2+joint_3"),
+        &["`transmission_coupling` acts on two joints", "it can on joint_1+joint_2"],
+    );
     check(
         |scene| scene.more("--cutoff-hz 90"),
         &["train.csv: a cut-off of 90 Hz does not fit a sample rate of 200.0 Hz", "up to 70.0 Hz"],

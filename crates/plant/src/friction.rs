@@ -55,6 +55,16 @@ pub enum Friction {
         /// See the type.
         width: f64,
     },
+    /// The torque that goes into the rigid body, over `driving` where it has the sign of the motion, times
+    /// `driven` where it has not: what a transmission delivers of what it is given, either way.
+    Efficiency {
+        /// Efficiency from the motor to the load, in (0, 1].
+        driving: f64,
+        /// Efficiency from the load to the motor, in [0, 1].
+        driven: f64,
+        /// See the type.
+        width: f64,
+    },
     /// exp(−t/T)·(fv·q̇ + fc·sign(q̇)) over the time t since the plant was switched on.
     Thermal {
         /// fv at t = 0 \[N·m·s/rad, N·s/m\].
@@ -88,6 +98,10 @@ impl Friction {
             }
             Friction::Quadratic { coefficient } => coefficient * speed * speed.abs(),
             Friction::LoadDependent { coefficient, width } => coefficient * load.abs() * sign(width),
+            Friction::Efficiency { driving, driven, width } => {
+                let at_motor = if load * speed > 0.0 { load / driving } else { load * driven };
+                (at_motor - load) * sign(width).abs()
+            }
             Friction::Thermal { coefficient, torque, time_constant_s, width } => {
                 (-t_s / time_constant_s).exp() * (coefficient * speed + torque * sign(width))
             }
@@ -103,6 +117,7 @@ impl Friction {
             Friction::Stribeck { .. } => "stribeck_friction",
             Friction::Quadratic { .. } => "quadratic_friction",
             Friction::LoadDependent { .. } => "load_dependent_friction",
+            Friction::Efficiency { .. } => "drive_efficiency",
             Friction::Thermal { .. } => "thermal_drift",
         }
     }
@@ -125,6 +140,10 @@ impl Friction {
             Friction::LoadDependent { coefficient, width } => {
                 numbers(vec![("coefficient", coefficient)], vec![("width", width)])
             }
+            Friction::Efficiency { driving, driven, width } => numbers(
+                vec![("driven", driven), ("1 − driving", 1.0 - driving), ("1 − driven", 1.0 - driven)],
+                vec![("driving", driving), ("width", width)],
+            ),
             Friction::Thermal { coefficient, torque, time_constant_s, width } => numbers(
                 vec![("coefficient", coefficient), ("torque", torque)],
                 vec![("time constant", time_constant_s), ("width", width)],

@@ -1,4 +1,4 @@
-//! Torques of a joint's angle: springs, balancers, ripple, stops.
+//! Torques of a joint's angle: springs, balancers, ripple, stops, cables.
 
 use crate::numbers::Numbers;
 
@@ -34,6 +34,12 @@ pub enum Mechanism {
         /// Phase \[rad\].
         phase: f64,
     },
+    /// What cables and hoses do as they bend, slip and catch: torques that were measured at angles, which
+    /// ascend; linear between two of them, and those of the first and the last beyond.
+    Cable {
+        /// Angles, each with its torque; at least one.
+        points: Vec<[f64; 2]>,
+    },
     /// torque·((q − threshold)/depth)^exponent beyond the threshold: what brakes near a joint's limit.
     EndStop {
         /// Where it sets in.
@@ -53,6 +59,14 @@ impl Mechanism {
     /// Torque that the joint must deliver at an angle.
     pub fn torque(&self, q: f64) -> f64 {
         match *self {
+            Mechanism::Cable { ref points } => {
+                let Some(last) = points.len().checked_sub(1) else { return 0.0 };
+                let next = points.partition_point(|[angle, _]| *angle <= q);
+                let [before, behind] = [points[next.saturating_sub(1)], points[next.min(last)]];
+                let width = behind[0] - before[0];
+                let share = if width > 0.0 { (q - before[0]) / width } else { 0.0 };
+                before[1] + share * (behind[1] - before[1])
+            }
             Mechanism::Spring { stiffness, rest } => stiffness * (q - rest),
             Mechanism::Balancer { torque, zero, arm, rest } => {
                 let (sine, cosine) = (q - zero).sin_cos();
@@ -78,6 +92,7 @@ impl Mechanism {
             Mechanism::Spring { .. } => "joint_spring",
             Mechanism::Balancer { .. } => "gravity_balancer",
             Mechanism::Ripple { .. } => "torque_ripple",
+            Mechanism::Cable { .. } => "position_map",
             Mechanism::EndStop { .. } => "end_stop",
         }
     }
@@ -86,6 +101,11 @@ impl Mechanism {
     pub(crate) fn numbers(&self) -> Numbers {
         let numbers = |free, positive| Numbers { free, positive, ..Numbers::default() };
         match *self {
+            Mechanism::Cable { ref points } => {
+                let all = points.iter().flat_map(|&[angle, torque]| [("angle", angle), ("torque", torque)]);
+                let ways = points.windows(2).map(|pair| ("way between angles", pair[1][0] - pair[0][0]));
+                numbers(all.collect(), ways.chain([("number of angles", points.len() as f64)]).collect())
+            }
             Mechanism::Spring { stiffness, rest } => {
                 numbers(vec![("stiffness", stiffness), ("rest", rest)], vec![])
             }

@@ -80,6 +80,18 @@ fn frictions_of_load_and_time() {
         5e-3,
         &on(1, |step| 0.2 * (step.rigid[1] - rotor * step.a[1]).abs() * (step.v[1] / 0.02).tanh()),
     );
+    // The motor delivers the load's torque over the one efficiency, or times the other.
+    let law = Friction::Efficiency { driving: 0.8, driven: 0.6, width: 0.02 };
+    check(
+        "puma560",
+        PlantEffect::Friction { joint: 1, law },
+        5e-3,
+        &on(1, |step| {
+            let load = step.rigid[1] - rotor * step.a[1];
+            let at_motor = if load * step.v[1] > 0.0 { load / 0.8 } else { load * 0.6 };
+            (at_motor - load) * (step.v[1] / 0.02).tanh().abs()
+        }),
+    );
     // A second to settle comes before the motion, and time runs then too.
     let law = Friction::Thermal { coefficient: 6.0, torque: 5.0, time_constant_s: 3.0, width: 0.02 };
     check(
@@ -156,6 +168,10 @@ fn torques_of_the_angle() {
     check(Mechanism::Ripple { torque: 2.0, cycles: 30.0, phase: 0.4 }, 1e-3, &|q| {
         2.0 * (30.0 * q + 0.4).sin()
     });
+    // A curve that a table with steps of 0.02 rad knows to some 1e-3 of it.
+    let curve = |q: f64| 3.0 * (-(3.0 * (q - 0.2)).powi(2)).exp() + (2.0 * q).sin();
+    let points = (-200..=200).map(|step| 0.02 * f64::from(step)).map(|q| [q, curve(q)]).collect();
+    check(Mechanism::Cable { points }, 5e-3, &curve);
     let balancer = Mechanism::Balancer { torque: 6.0, zero: 0.2, arm: 0.4, rest: 0.3 };
     check(balancer, 1e-4, &|q| {
         let third_side = (1.0 + 0.16 - 0.8 * (q - 0.2_f64).cos()).sqrt();

@@ -147,6 +147,9 @@ pub struct ProgramJson {
     /// How the logs were conditioned: cut-off, decimation, segments, samples skipped.
     #[serde(default)]
     pub conditioning: IndexMap<String, serde_json::Value>,
+    /// What other cut-offs of the filter over columns and torque would do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bandwidth: Option<BandwidthJson>,
     /// The final model's pooled error with rests included: samples at which a joint stands still, where
     /// static friction may carry any torque, are left out of the errors above.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -163,6 +166,52 @@ pub struct ProgramJson {
     /// What it costs that the bodies can exist.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub consistency: Option<ConsistencyJson>,
+}
+
+/// Fits at several cut-offs of the filter over columns and torque, compared in one band.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct BandwidthJson {
+    /// Cut-off of the band that all are compared in: the one that the logs are conditioned with (Hz).
+    pub reference_hz: f64,
+    /// Cut-off whose fit is better there by more than scatter explains (Hz).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub better_hz: Option<f64>,
+    /// The cut-offs, ascending.
+    pub curve: Vec<CutoffJson>,
+    /// Parameters that depend on the cut-off, those that move most first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub moved: Vec<MovedParameterJson>,
+}
+
+/// The fit at one cut-off.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct CutoffJson {
+    /// The cut-off (Hz).
+    pub cutoff_hz: f64,
+    /// Pooled error on training motion left out, in the reference's band: RMS of the error over RMS of the
+    /// torque.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub left_out_relative: f64,
+    /// Share of the error's variance that it saves there beside the reference, mean over the joints.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub saving: f64,
+    /// Standard error of that.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub saving_std: f64,
+    /// Whether the logs are conditioned with it.
+    pub chosen: bool,
+}
+
+/// A parameter that depends on the cut-off.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct MovedParameterJson {
+    /// `joint_1.Izz` of the rigid body, `joint_1.fv` of an effect.
+    pub parameter: String,
+    /// The neighbouring cut-off at which it differs most (Hz).
+    pub cutoff_hz: f64,
+    /// How far it moves, in its standard deviations.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub deviations: f64,
 }
 
 /// The fit over bodies that can exist beside least squares.

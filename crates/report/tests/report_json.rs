@@ -85,6 +85,22 @@ fn additions_of_the_program_come_last() {
         version: "0.1.0".into(),
         warnings: vec!["train and validate are the same file".into()],
         conditioning: [("cut_off".to_string(), Value::from(5.2))].into_iter().collect(),
+        bandwidth: Some(BandwidthJson {
+            reference_hz: 10.0,
+            better_hz: Some(5.0),
+            curve: vec![CutoffJson {
+                cutoff_hz: 5.0,
+                left_out_relative: 0.04,
+                saving: 0.1,
+                saving_std: 0.02,
+                chosen: false,
+            }],
+            moved: vec![MovedParameterJson {
+                parameter: "joint_1.Izz".into(),
+                cutoff_hz: 5.0,
+                deviations: 7.5,
+            }],
+        }),
         relative_with_rests: Some(RelativeErrors { train: 0.2, validate: 0.25 }),
         evidence: vec![EvidenceJson {
             kind: "torque_offset".into(),

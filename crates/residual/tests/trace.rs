@@ -205,6 +205,39 @@ fn a_shared_transmission_is_named_with_both_joints() {
     check(shared, &[("transmission_coupling", &["shoulder", "elbow"])]);
 }
 
+/// Two bumps of the angle are neither a spring nor a ripple, nor both of them.
+#[test]
+fn a_cable_that_catches_is_a_position_map() {
+    let bump = |q: f64, center: f64, width: f64| (-0.5 * ((q - center) / width).powi(2)).exp();
+    check(
+        |state, torque| torque[1] += 1.2 * bump(state.q[1], -0.4, 0.2) - 0.9 * bump(state.q[1], 0.5, 0.25),
+        &[("position_map", &["elbow"])],
+    );
+}
+
+/// A stop that stiffens was named a map of the position, which follows it more closely with 24 numbers than
+/// the catalogue's stop does with three.
+#[test]
+fn a_stop_that_stiffens_is_a_stop_and_no_map() {
+    let tracing = traced(11, &|state, torque| {
+        torque[1] += 1.5 * ((state.q[1] - 0.9) / 0.3).max(0.0).powf(1.3);
+    });
+    assert_eq!(named(&tracing), [("end_stop".to_owned(), vec!["elbow".to_owned()])]);
+}
+
+/// Friction of the load is the same both ways.
+#[test]
+fn a_drive_that_is_harder_to_drive_back_has_an_efficiency_by_the_direction_of_power() {
+    check(
+        |state, torque| {
+            let speed = state.qd[0];
+            let load = torque[0] - 0.4 * speed - 0.6 * (speed / 0.01).tanh();
+            torque[0] += if load * speed > 0.0 { load / 0.95 - load } else { 0.5 * load - load };
+        },
+        &[("drive_efficiency", &["shoulder"])],
+    );
+}
+
 #[test]
 fn two_secrets_are_both_named() {
     let both = |state: &State<'_>, torque: &mut [f64]| {

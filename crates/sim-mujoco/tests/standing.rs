@@ -19,7 +19,7 @@ fn robot() -> Tree {
         <inertia ixx="0.05" iyy="0.05" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
       <joint name="shoulder" type="continuous"><parent link="box"/><child link="arm"/><origin xyz="0 0 0.4"/>
         <axis xyz="0 1 0"/><limit effort="100" velocity="10"/></joint></robot>"#;
-    read_urdf(urdf, &UrdfOptions { floating_base: true, held: Vec::new() }).unwrap().tree
+    read_urdf(urdf, &UrdfOptions { floating_base: true, ..UrdfOptions::default() }).unwrap().tree
 }
 
 fn floor(floor_friction: f64) -> World {

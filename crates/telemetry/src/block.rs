@@ -121,6 +121,21 @@ impl Block {
         }
     }
 
+    /// The same samples with another filter over columns and torque; the outputs lie its decimation apart.
+    ///
+    /// It must not reach further than the present one, whose reach the block overlaps its neighbours by: then
+    /// the outputs of all blocks together are again those of the whole segment.
+    pub fn with_filter(&self, filter: &Arc<ParallelFilter>) -> Self {
+        let own = |first: usize, last: usize| first..(last + self.filter.decimation()).min(self.len());
+        let own = match self.outputs.as_slice() {
+            [] => 0..0,
+            [first, .., last] => own(*first, *last),
+            [only] => own(*only, *only),
+        };
+        let outputs = own.step_by(filter.decimation()).collect();
+        Block { outputs, filter: filter.clone(), ..self.clone() }
+    }
+
     /// The filter that goes over columns and torque.
     pub fn parallel_filter(&self) -> &ParallelFilter {
         &self.filter

@@ -9,6 +9,9 @@ pub struct CheckSettings {
     /// Share of the velocity's power that a lag costs; 0.0025 is an error of 5 % of its root mean square,
     /// which is that of good frictions.
     pub lag_cost: f64,
+    /// Share of what is unexplained that is left at the lag, below which a lag is one however little it costs:
+    /// a slow joint's velocity is as late as that of a quick one.
+    pub lag_left: f64,
     /// Distance of a velocity's scale from 1; gear ratios and radii are known better than this.
     pub scale_error: f64,
     /// Share of a velocity's power that may be unexplained for its scale to be judged.
@@ -51,6 +54,7 @@ impl Default for CheckSettings {
     fn default() -> Self {
         CheckSettings {
             lag_cost: 0.0025,
+            lag_left: 0.1,
             scale_error: 0.05,
             scale_unexplained: 0.05,
             zero_share: 0.02,
@@ -79,8 +83,9 @@ impl CheckSettings {
 
     pub(crate) fn is_late(&self, alignment: &Alignment) -> bool {
         let cost = alignment.unexplained - alignment.unexplained_at_lag;
-        let mended = alignment.unexplained_at_lag < 0.5 * alignment.unexplained;
-        cost > self.lag_cost && mended && alignment.lag.abs() > 0.5 * alignment.resolution
+        let left = alignment.unexplained_at_lag / alignment.unexplained;
+        let costs = cost > self.lag_cost && left < 0.5;
+        (costs || left < self.lag_left) && alignment.lag.abs() > 0.5 * alignment.resolution
     }
 
     pub(crate) fn is_scaled(&self, alignment: &Alignment) -> bool {
@@ -90,5 +95,28 @@ impl CheckSettings {
 
     pub(crate) fn has_dead_band(&self, alignment: &Alignment) -> bool {
         alignment.zero_share > self.zero_share && alignment.motion_at_zero > self.motion_at_zero
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// On a slow joint a lag costs little; its velocity was used, and a delay was named that was none.
+    #[test]
+    fn a_slow_joints_velocity_is_as_late_as_a_quick_ones() {
+        let alignment = |unexplained: f64, unexplained_at_lag: f64| Alignment {
+            lag: 0.03,
+            scale: 1.0,
+            unexplained,
+            unexplained_at_lag,
+            zero_share: 0.0,
+            motion_at_zero: 0.0,
+            resolution: 0.01,
+        };
+        let settings = CheckSettings::default();
+        assert!(settings.is_late(&alignment(0.02, 0.001)));
+        assert!(settings.is_late(&alignment(0.001, 0.00001)));
+        assert!(!settings.is_late(&alignment(0.001, 0.0005)));
     }
 }

@@ -58,17 +58,17 @@ pub struct Conditioning {
 }
 
 impl Conditioning {
-    /// Chooses one conditioning for the logs of a session: the same cut-offs for all.
+    /// Chooses one conditioning for the logs of a session from its training logs: the same cut-offs for all.
+    ///
+    /// Logs that a model is validated on have no say. Where such a log's sample rate cannot carry cut-offs
+    /// that were chosen from data, it is read with the highest that it can ([`Conditioning::plan`]).
     ///
     /// # Errors
-    /// [`LogError::Cutoff`] for a cut-off that some log's sample rate can't carry.
-    pub fn choose(surveys: &[Survey], options: &ConditioningOptions) -> Result<Self, LogError> {
+    /// [`LogError::Cutoff`] for a cut-off that some training log's sample rate can't carry.
+    pub fn choose(training: &[Survey], options: &ConditioningOptions) -> Result<Self, LogError> {
         let suggestions: Vec<_> =
-            surveys.iter().enumerate().flat_map(|(log, survey)| cutoff::suggest(survey, log)).collect();
-        let highest = surveys
-            .iter()
-            .map(|survey| cutoff::HIGHEST_SHARE * survey.rate_hz())
-            .fold(f64::INFINITY, f64::min);
+            training.iter().enumerate().flat_map(|(log, survey)| cutoff::suggest(survey, log)).collect();
+        let highest = training.iter().map(highest_hz).fold(f64::INFINITY, f64::min);
         let suggested = suggestions.iter().map(|suggestion| suggestion.cutoff_hz).fold(0.0, f64::max);
         let from_data = if suggested > 0.0 { suggested.min(highest) } else { highest };
         let cutoff_hz = options.cutoff_hz.unwrap_or(from_data);
@@ -82,15 +82,27 @@ impl Conditioning {
             suggestions,
             options: options.clone(),
         };
-        for survey in surveys {
+        for survey in training {
             conditioning.check(survey)?;
         }
         Ok(conditioning)
     }
 
+    /// Cut-offs of the positions' low-pass and of the parallel filter for a log, in Hz: those of the session,
+    /// unless data chose them and the log's sample rate cannot carry them.
+    pub fn cutoffs_for(&self, survey: &Survey) -> [f64; 2] {
+        let told = &self.options;
+        let cutoff_hz = match told.cutoff_hz {
+            Some(cutoff_hz) => cutoff_hz,
+            None => self.cutoff_hz.min(highest_hz(survey)),
+        };
+        let parallel = told.parallel_cutoff_hz.unwrap_or(self.parallel_cutoff_hz.min(cutoff_hz));
+        [cutoff_hz, parallel]
+    }
+
     pub(crate) fn check(&self, survey: &Survey) -> Result<(), LogError> {
         let highest_hz = HIGHEST_SHARE_BY_HAND * survey.rate_hz();
-        for cutoff_hz in [self.cutoff_hz, self.parallel_cutoff_hz] {
+        for cutoff_hz in self.cutoffs_for(survey) {
             let rate_hz = survey.rate_hz();
             let lowest_hz = LOWEST_SHARE_BY_HAND * rate_hz;
             if !(lowest_hz..=highest_hz).contains(&cutoff_hz) {
@@ -100,6 +112,11 @@ impl Conditioning {
         }
         Ok(())
     }
+}
+
+/// The highest cut-off that is chosen for a log, in Hz.
+fn highest_hz(survey: &Survey) -> f64 {
+    cutoff::HIGHEST_SHARE * survey.rate_hz()
 }
 
 /// What friction does at a reversal lies below this, however slow the motion is otherwise.

@@ -65,8 +65,9 @@ impl LogPlan {
             ClockChoice::Fixed(clock) => clock,
         };
         let period = survey.period;
-        let kernel = SmoothingKernel::new(LowPass::new(conditioning.cutoff_hz, ATTENUATION_DB), period);
-        let parallel = ParallelFilter::new(conditioning.parallel_cutoff_hz, period, options.decimation);
+        let [cutoff_hz, parallel_cutoff_hz] = conditioning.cutoffs_for(survey);
+        let kernel = SmoothingKernel::new(LowPass::new(cutoff_hz, ATTENUATION_DB), period);
+        let parallel = ParallelFilter::new(parallel_cutoff_hz, period, options.decimation);
         let edge = edge(&kernel);
         let measured = |plausible: &dyn Fn(&crate::joint_survey::JointSurvey) -> bool| {
             survey.joints.iter().map(|joint| options.use_measured_derivatives && plausible(joint)).collect()
@@ -84,7 +85,7 @@ impl LogPlan {
             measured_acceleration: measured(&|joint| {
                 joint.acceleration.is_some_and(|signal| signal.plausible())
             }),
-            motion_bandwidth_hz: conditioning.cutoff_hz / BANDWIDTHS,
+            motion_bandwidth_hz: cutoff_hz / BANDWIDTHS,
             kernel,
             parallel: Arc::new(parallel),
         }

@@ -116,6 +116,26 @@ proptest! {
     }
 
     #[test]
+    fn another_filter_gives_what_conditioning_with_it_gives(
+        rows in 200usize..900,
+        gaps in prop::collection::vec(0usize..900, 0..4),
+        block_samples in 1usize..400,
+    ) {
+        let recording = recording(rows, &gaps);
+        let options = |parallel_cutoff_hz, decimation| ConditioningOptions {
+            cutoff_hz: Some(20.0),
+            parallel_cutoff_hz: Some(parallel_cutoff_hz),
+            decimation: Some(decimation),
+            block_samples,
+            ..Default::default()
+        };
+        let (low, high) = (conditioning(&recording, options(3.0, 8)).0, conditioning(&recording, options(12.0, 2)));
+        let Ok(blocks) = recording.blocks(&low) else { return Ok(()) };
+        let filtered: Vec<Block> = blocks.iter().map(|block| block.with_filter(&high.1.parallel)).collect();
+        assert_same(&outputs(&filtered), &outputs(&recording.blocks(&high.0).unwrap()));
+    }
+
+    #[test]
     fn outputs_are_plain_convolutions(rows in 200usize..500, cutoff in 8.0f64..30.0, parallel in 8.0f64..30.0) {
         let recording = recording(rows, &[]);
         let options = ConditioningOptions {

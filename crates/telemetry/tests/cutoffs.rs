@@ -178,3 +178,21 @@ fn real_logs() {
     let slide = check(&["emps/train.csv"], &["slide"], 20.0..210.0);
     assert_ne!(slide[0].bound, Bound::SampleRate);
 }
+
+/// The slowest log of a session bounded the cut-off of all.
+#[test]
+fn a_log_without_a_say_is_read_with_the_cut_offs_that_its_sampling_carries() {
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let sines = sines(&mut rng);
+    let [fast, slow] = [500.0, 40.0].map(|rate| noisy(&sines, rate, 1e-6, &mut rng).survey().unwrap());
+    let options = ConditioningOptions::default();
+    let chosen = Conditioning::choose(std::slice::from_ref(&fast), &options).unwrap();
+    assert_eq!(chosen.cutoffs_for(&fast), [chosen.cutoff_hz, chosen.parallel_cutoff_hz]);
+    assert!(chosen.cutoff_hz > 8.0, "{chosen}");
+    assert_eq!(chosen.cutoffs_for(&slow), [8.0, 8.0]);
+    assert!((chosen.plan(&slow).unwrap().kernel.low_pass().cutoff_hz - 8.0).abs() < 1e-9);
+    // What the user says counts, or is refused.
+    let options = ConditioningOptions { cutoff_hz: Some(20.0), ..options };
+    let told = Conditioning::choose(&[fast], &options).unwrap();
+    assert!(told.plan(&slow).unwrap_err().to_string().contains("up to 14.0 Hz"));
+}

@@ -3,7 +3,7 @@
 use super::movement::Movement;
 use super::robot::{Inertial, Joint, JointKind, Link, Robot};
 use super::topology::Topology;
-use super::{Finding, UrdfError, UrdfReading};
+use super::{Finding, UrdfError};
 use super::{inertial, joint};
 use crate::inertia::{Inertia, PARAMETERS_PER_BODY};
 use crate::{Body, JointLimits, JointType, Placement, Tree, Vec3};
@@ -52,7 +52,7 @@ pub(super) fn assemble(
     topology: &Topology,
     movements: &[Movement],
     floating_base: bool,
-) -> Result<UrdfReading, UrdfError> {
+) -> Result<(Tree, Vec<Finding>), UrdfError> {
     robot.links.iter().try_for_each(inertial::check_finite)?;
     robot.joints.iter().try_for_each(joint::check_finite)?;
     let mut assembly = Assembly {
@@ -199,7 +199,7 @@ impl Assembly<'_> {
         self.push_children(child, Some(index), Placement::identity());
     }
 
-    fn finish(mut self) -> Result<UrdfReading, UrdfError> {
+    fn finish(mut self) -> Result<(Tree, Vec<Finding>), UrdfError> {
         if self.bodies.is_empty() {
             return Err(UrdfError::NoMovingJoints);
         }
@@ -218,7 +218,7 @@ impl Assembly<'_> {
             joint_bodies: self.joint_bodies,
             gravity: GRAVITY,
         };
-        Ok(UrdfReading { tree, findings: self.findings })
+        Ok((tree, self.findings))
     }
 
     fn report_masses(&mut self) {

@@ -155,6 +155,29 @@ pub enum UrdfError {
         /// The nearest name that there is.
         nearest: Option<String>,
     },
+    /// A pattern of joints that are to be held stands for none.
+    #[error(
+        "cannot hold `{pattern}`: no joint that moves by itself is called so; joints are {}",
+        quoted(joints)
+    )]
+    NothingToHold {
+        /// The pattern given.
+        pattern: String,
+        /// The joints that move by themselves.
+        joints: Vec<String>,
+    },
+    /// A joint that is to be held in two places.
+    #[error(
+        "cannot hold the joint `{joint}` at {} and at {}: name it once, or at one position",
+        positions[0],
+        positions[1]
+    )]
+    HeldTwice {
+        /// The joint.
+        joint: String,
+        /// Where it is to be held \[rad, m\].
+        positions: [f64; 2],
+    },
     /// A `<mimic>` follows a joint that is not in the URDF.
     #[error(
         "line {line}: joint `{joint}` mimics `{leader}`, but the URDF has no joint of that name{}",

@@ -8,6 +8,7 @@ mod assemble;
 mod error;
 mod finding;
 mod guard;
+mod held;
 mod inertial;
 mod joint;
 mod movement;
@@ -15,6 +16,7 @@ mod movement;
 mod oracle;
 mod reading;
 mod robot;
+mod snap;
 mod source;
 mod splice;
 mod topology;
@@ -35,7 +37,12 @@ pub struct UrdfOptions {
     /// root link has the same effect.
     pub floating_base: bool,
     /// Joints that are fixed, and at which position \[rad, m\]; what they carry is merged into their parent.
+    /// A name that no joint has may be a pattern of names: `*` stands for any letters, `?` for one.
     pub held: Vec<(String, f64)>,
+    /// Angles of the joints' frames within 1e-4 rad of a multiple of π/2 are taken as it, and axes as near to
+    /// a coordinate axis as that one: as an identification needs them, since an angle of 1.5708 makes
+    /// parameters identifiable that are not.
+    pub snap: bool,
 }
 
 /// A robot, and what is to be said of its URDF.
@@ -45,6 +52,10 @@ pub struct UrdfReading {
     pub tree: Tree,
     /// What should not be trusted, in the order of the bodies.
     pub findings: Vec<Finding>,
+    /// The joints that are held, by name, and where \[rad, m\].
+    pub held: Vec<(String, f64)>,
+    /// Number of angles and axes that were off a right angle by rounding, and have been made exact.
+    pub snapped: usize,
 }
 
 /// Reads a robot from the text of a URDF.
@@ -59,14 +70,29 @@ pub struct UrdfReading {
 pub fn read_urdf(xml: &str, options: &UrdfOptions) -> Result<UrdfReading, UrdfError> {
     let limits = Limits::default();
     guard::check(xml, &limits)?;
-    let robot = reading::read(&source::parse(xml)?)?;
+    let mut robot = reading::read(&source::parse(xml)?)?;
+    let snapped = if options.snap { snap::snap(&mut robot) } else { 0 };
     let topology = topology::Topology::new(&robot)?;
-    let movements = movement::movements(&robot, options)?;
+    let held = held::held_joints(&robot, &options.held)?;
+    let movements = movement::movements(&robot, &held)?;
     let joints = movements.iter().filter(|movement| **movement == movement::Movement::Free).count();
     if joints > limits.moving_joints {
         return Err(UrdfError::TooManyJoints { joints, most: limits.moving_joints });
     }
-    assemble::assemble(&robot, &topology, &movements, options.floating_base)
+    let (tree, findings) = assemble::assemble(&robot, &topology, &movements, options.floating_base)?;
+    let named = |(joint, position): (usize, f64)| (robot.joints[joint].name.clone(), position);
+    Ok(UrdfReading { tree, findings, held: held.into_iter().map(named).collect(), snapped })
+}
+
+/// The joints of a URDF that are held, by name, patterns resolved as in [`UrdfOptions::held`].
+///
+/// # Errors
+/// As [`read_urdf`]; a pattern that no joint has, or a joint held in two places.
+pub fn held_joints(xml: &str, held: &[(String, f64)]) -> Result<Vec<(String, f64)>, UrdfError> {
+    guard::check(xml, &Limits::default())?;
+    let robot = reading::read(&source::parse(xml)?)?;
+    let named = |(joint, position): (usize, f64)| (robot.joints[joint].name.clone(), position);
+    Ok(held::held_joints(&robot, held)?.into_iter().map(named).collect())
 }
 
 /// [`read_urdf`] from a file.

@@ -1,9 +1,9 @@
 //! Which joints move by themselves, which follow another, and which stand still.
 
+use super::UrdfError;
 use super::error::nearest;
 use super::joint::is_usable;
 use super::robot::{Joint, JointKind, Robot};
-use super::{UrdfError, UrdfOptions};
 use std::collections::HashMap;
 
 /// How a joint gets its position.
@@ -18,27 +18,12 @@ pub(super) enum Movement {
 }
 
 /// The movement of every joint, in the order of the file.
-pub(super) fn movements(robot: &Robot, options: &UrdfOptions) -> Result<Vec<Movement>, UrdfError> {
+///
+/// `held` are the places and positions of the joints that are held \[rad, m\].
+pub(super) fn movements(robot: &Robot, held: &[(usize, f64)]) -> Result<Vec<Movement>, UrdfError> {
     let indices: HashMap<&str, usize> =
         robot.joints.iter().enumerate().map(|(index, joint)| (joint.name.as_str(), index)).collect();
-    let mut held = HashMap::new();
-    for (name, position) in &options.held {
-        let Some(&index) = indices.get(name.as_str()) else {
-            return Err(UrdfError::UnknownHeldJoint {
-                joint: name.clone(),
-                nearest: nearest(name, indices.keys().copied()),
-            });
-        };
-        if !is_usable(*position) {
-            return Err(UrdfError::NotFinite {
-                line: None,
-                kind: "joint",
-                name: name.clone(),
-                field: "the held position",
-            });
-        }
-        held.insert(index, *position);
-    }
+    let held: HashMap<usize, f64> = held.iter().copied().collect();
     (0..robot.joints.len()).map(|joint| movement(robot, &indices, &held, joint)).collect()
 }
 

@@ -86,7 +86,8 @@ fn line(robot: &Robot, declared: &[&str]) -> anyhow::Result<Vec<String>> {
     let silent = |_: &str, _: u64, _: u64| ();
     let session = Session::open(&arguments, &silent)?;
     let sources = session.logs.sources(&silent);
-    let identified = identify(&session.tree, session.effects()?, &session.data(&sources))?;
+    let identified =
+        identify(&session.tree, session.effects(&session.data(&sources))?, &session.data(&sources))?;
     let Identified { design, fit, .. } = &identified;
     let model = Model::of_fit(design, fit, &session.declared, &[], (0.0, 0.0))?;
     let standard: Vec<f64> = model.bodies.iter().flat_map(|body| body.inertial).collect();

@@ -101,7 +101,7 @@ fn variants(file: &Path) -> Vec<Case> {
     for joints in std::iter::once(&[][..]).chain(held) {
         for floating_base in [false, true] {
             let held = joints.iter().map(|joint| (joint.to_string(), 0.0)).collect();
-            let options = UrdfOptions { floating_base, held };
+            let options = UrdfOptions { floating_base, held, ..UrdfOptions::default() };
             cases.push(Case { robot: robot.clone(), urdf: file.to_owned(), options });
         }
     }

@@ -77,7 +77,7 @@ impl Subject {
             ),
         };
         let read = |floating_base: bool| {
-            let options = UrdfOptions { floating_base, held: hold.clone() };
+            let options = UrdfOptions { floating_base, held: hold.clone(), ..UrdfOptions::default() };
             read_urdf_file(&urdf, &options).map(|reading| reading.tree)
         };
         let (tree, mut floating) = (read(false)?, read(true)?);

@@ -32,7 +32,7 @@ impl Scene {
             println!("skipped: ../shared/data/robots is absent; the robot is models/upper_body18.urdf");
             (root.join("models/upper_body18.urdf"), vec![])
         };
-        let options = UrdfOptions { floating_base: false, held: hold.clone() };
+        let options = UrdfOptions { held: hold.clone(), ..UrdfOptions::default() };
         let tree = read_urdf_file(&urdf, &options)?.tree;
         let seated = Some(root.join("../shared/data/motions/ue_adl/c3d")).filter(|folder| folder.is_dir());
         if seated.is_none() {

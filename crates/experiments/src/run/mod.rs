@@ -115,7 +115,8 @@ fn session(urdf: &Path, train: Vec<PathBuf>, validate: Vec<PathBuf>, out: PathBu
 }
 
 fn run(arguments: &SessionArguments) -> anyhow::Result<PathBuf> {
-    let arguments = ExplainArguments { session: arguments.clone(), model: None, draws: 0 };
+    let arguments =
+        ExplainArguments { session: arguments.clone(), model: None, draws: 0, exclude: Vec::new() };
     println!("{}\n", command_line(&arguments));
     let Outcome { summary, warnings, report_html, .. } = explain(&arguments, &Console::of_terminal(false))?;
     warnings.iter().for_each(|warning| println!("warning: {warning}"));

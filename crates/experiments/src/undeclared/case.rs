@@ -1,7 +1,7 @@
 //! One case: a robot, its motions, its secrets and its sensors, all from one seed.
 
 use super::draw::{Survey, catalogue, outside};
-use super::friction::Sign;
+use super::friction::{Friction, Sign};
 use super::kind::{Kind, Name};
 use super::plant::{Ordinary, Record, States, record, rigid_torque};
 use super::rng::{CaseRng, Stream};
@@ -162,11 +162,28 @@ impl<'a> Case<'a> {
         };
         if let Name::Catalogue(kind) = name {
             absorber.add_simpler(kind, joint, &records);
+            if kind == Kind::DriveEfficiency {
+                absorber.add(self.of_load(joint, coarse_rate));
+            }
         }
         let visible = absorber.visible(&records);
         let enough = if self.spec.suite == Suite::Outside { VISIBLE_OUTSIDE } else { VISIBLE };
         (visible >= enough && felt_in_every_log(&secret, tree, ordinary, &self.motions, times))
             .then(|| Drawn { material: secret.joints.clone(), secret, size, visible })
+    }
+
+    /// What friction of a joint's load adds along the training motions: samples × joints.
+    fn of_load(&self, joint: usize, rate: f64) -> Vec<f64> {
+        let name = Name::Catalogue(Kind::LoadDependentFriction);
+        let form = Form::Friction(Friction::LoadDependent);
+        let secret = Secret { name, joints: vec![joint], form, scale: 1.0 };
+        let one = |motion: &Trajectory| {
+            let times = even_times(motion, rate);
+            let record = record(&self.robot.tree, &self.ordinary, &[&secret], motion, &times);
+            let added = record.torque.iter().zip(&record.ideal).map(|(torque, ideal)| torque - ideal);
+            added.collect::<Vec<f64>>()
+        };
+        self.motions[..2].iter().flat_map(one).collect()
     }
 
     /// The same case with nothing undeclared: same robot, motions, sensors and noise.
@@ -333,6 +350,7 @@ pub fn survey<'r>(
 ) -> Survey<'r> {
     let joints = robot.joints();
     let mut range = vec![[f64::NEG_INFINITY, f64::INFINITY]; joints];
+    let mut arc = vec![[f64::INFINITY, f64::NEG_INFINITY]; joints];
     let mut squares = vec![[0.0; 2]; joints];
     let mut samples = 0.0;
     for (motion, times) in motions.iter().zip(times) {
@@ -340,8 +358,10 @@ pub fn survey<'r>(
         samples += times.len() as f64;
         for joint in 0..joints {
             let positions = || (0..times.len()).map(|sample| record.states.q(sample, joint));
-            range[joint][0] = range[joint][0].max(positions().fold(f64::INFINITY, f64::min));
-            range[joint][1] = range[joint][1].min(positions().fold(f64::NEG_INFINITY, f64::max));
+            let (lowest, highest) =
+                (positions().fold(f64::INFINITY, f64::min), positions().fold(f64::NEG_INFINITY, f64::max));
+            range[joint] = [range[joint][0].max(lowest), range[joint][1].min(highest)];
+            arc[joint] = [arc[joint][0].min(lowest), arc[joint][1].max(highest)];
             for sample in 0..times.len() {
                 squares[joint][0] += record.states.v(sample, joint).powi(2);
                 squares[joint][1] += record.ideal[sample * joints + joint].powi(2);
@@ -357,7 +377,16 @@ pub fn survey<'r>(
     }
     let rms = |part: usize| squares.iter().map(|square| (square[part] / samples).sqrt()).collect();
     let spans = motions.iter().map(|motion| [motion.start, motion.start + motion.duration]).collect();
-    Survey { tree: &robot.tree, range, speed: rms(0), torque: rms(1), width: ordinary.width, reach, spans }
+    Survey {
+        tree: &robot.tree,
+        range,
+        arc,
+        speed: rms(0),
+        torque: rms(1),
+        width: ordinary.width,
+        reach,
+        spans,
+    }
 }
 
 /// Whether each log shows the effect for a while: a stop that one of them never touches is not to be found

@@ -16,6 +16,8 @@ pub struct Survey<'a> {
     pub tree: &'a Tree,
     /// Lowest and highest position that every log reaches, joint by joint.
     pub range: Vec<[f64; 2]>,
+    /// Lowest and highest position that any log reaches, joint by joint.
+    pub arc: Vec<[f64; 2]>,
     /// Root mean square of the speed.
     pub speed: Vec<f64>,
     /// Root mean square of the torque.
@@ -123,6 +125,8 @@ pub fn catalogue(
         }
         Kind::QuadraticFriction => one(Friction::Quadratic),
         Kind::LoadDependentFriction => one(Friction::LoadDependent),
+        Kind::DriveEfficiency => one(efficiency(rng)),
+        Kind::PositionMap => mechanism(position_map(joint, survey, rng)?, rng.sign()),
         Kind::ThermalDrift => one(Friction::Thermal {
             time_constant: rng.log_uniform(10.0, 60.0),
             viscous: rng.uniform(0.2, 2.0) / speed,
@@ -237,6 +241,36 @@ fn hysteresis(joint: usize, survey: &Survey, rng: &mut CaseRng) -> Friction {
     let element =
         |(number, weight): (usize, &f64)| [distance * (number + 1) as f64 / count as f64, weight / total];
     Friction::Maxwell { elements: weights.iter().enumerate().map(element).collect() }
+}
+
+/// The same losses both ways are friction of the load: here they differ, or are those of one number (over
+/// it, or times it).
+fn efficiency(rng: &mut CaseRng) -> Friction {
+    let (well, badly) = (rng.uniform(0.9, 1.0), rng.uniform(0.4, 0.75));
+    match rng.index(3) {
+        0 => Friction::Efficiency { driving: well, driven: badly },
+        1 => Friction::Efficiency { driving: badly, driven: well },
+        _ => Friction::Efficiency { driving: badly, driven: badly },
+    }
+}
+
+/// Smooth over the arc that the logs show, and felt where all of them are.
+fn position_map(joint: usize, survey: &Survey, rng: &mut CaseRng) -> Option<Mechanism> {
+    let [low, high] = survey.range[joint];
+    let arc = survey.arc[joint][1] - survey.arc[joint][0];
+    if survey.travel(joint) < 0.4 * arc {
+        return None;
+    }
+    let count = 2 + rng.index(3);
+    if rng.chance(0.5) {
+        let mut bump = || {
+            let width = rng.uniform(0.08, 0.2) * arc;
+            [rng.uniform(low, high), width, rng.sign() * rng.uniform(0.4, 1.0)]
+        };
+        return Some(Mechanism::Bumps { bumps: (0..count).map(|_| bump()).collect() });
+    }
+    let mut wave = || [TAU * rng.uniform(0.6, 2.5) / arc, rng.uniform(0.0, TAU), rng.uniform(0.4, 1.0)];
+    Some(Mechanism::Beats { waves: (0..count).map(|_| wave()).collect() })
 }
 
 fn ripple(joint: usize, survey: &Survey, rng: &mut CaseRng) -> Option<Mechanism> {

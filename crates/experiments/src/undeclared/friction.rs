@@ -48,6 +48,9 @@ pub enum Friction {
     Quadratic,
     /// |τ of the rigid body|·sign(q̇).
     LoadDependent,
+    /// The torque of the rigid body over the one efficiency where it drives, times the other where it is
+    /// driven, less that torque itself; of one unit the losses are as they are.
+    Efficiency { driving: f64, driven: f64 },
     /// exp(−t/T) of viscous over a speed \[s/rad\] and Coulomb friction, over the session's time.
     Thermal { time_constant: f64, viscous: f64 },
     /// Maxwell slip: springs that slip, each with its yield distance \[rad\] and its share of the force.
@@ -93,6 +96,11 @@ impl Friction {
                         }
                         Friction::Quadratic => v * v.abs(),
                         Friction::LoadDependent => scene.rigid(sample, joint).abs() * sign(v),
+                        Friction::Efficiency { driving, driven } => {
+                            let load = scene.rigid(sample, joint);
+                            let motor = if load * v > 0.0 { load / driving } else { load * driven };
+                            (motor - load) * sign(v).abs()
+                        }
                         Friction::Thermal { time_constant, viscous } => {
                             (-scene.times[sample] / time_constant).exp() * (viscous * v + sign(v))
                         }

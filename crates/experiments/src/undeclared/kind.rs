@@ -1,4 +1,4 @@
-//! Names of effects: the 23 of the fixed formats, and what lies outside them.
+//! Names of effects: those of the fixed formats, and what lies outside them.
 
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +33,8 @@ pub enum Kind {
     EndStop,
     JointElasticity,
     ActuatorSaturation,
+    PositionMap,
+    DriveEfficiency,
 }
 
 /// An effect that no name of the catalogue fits.
@@ -71,6 +73,15 @@ pub enum Name {
 }
 
 impl Kind {
+    /// Kinds that have a suite of their own: the cases of the others stay what they were.
+    pub const NEW: [Kind; 2] = [Kind::PositionMap, Kind::DriveEfficiency];
+
+    /// All others.
+    pub fn of_other_suites() -> Vec<Kind> {
+        let all = <Kind as clap::ValueEnum>::value_variants().iter();
+        all.copied().filter(|kind| !Kind::NEW.contains(kind)).collect()
+    }
+
     /// The name in files.
     pub fn name(self) -> String {
         clap::ValueEnum::to_possible_value(&self)
@@ -109,7 +120,17 @@ impl Kind {
             || group(&[ViscousFriction, CoulombFriction, TransmissionCoupling])
             || group(&[RotorInertia, TransmissionCoupling, JointElasticity])
             || group(&[TorqueOffset, JointSpring, GravityBalancer, ExternalForce, GravityTilt])
-            || group(&[CoulombFriction, LoadDependentFriction])
+            || group(&[CoulombFriction, LoadDependentFriction, DriveEfficiency])
+            || group(&[TorqueGain, DriveEfficiency])
+            || (group(&[
+                PositionMap,
+                TorqueOffset,
+                JointSpring,
+                GravityBalancer,
+                ExternalForce,
+                TorqueRipple,
+                EndStop,
+            ]) && (self == PositionMap || other == PositionMap))
             || group(&[TorqueOffset, AsymmetricFriction])
             || group(&[JointSpring, EndStop, Hysteresis])
             || group(&[TimeDelay, JointElasticity, RotorInertia, ViscousFriction])

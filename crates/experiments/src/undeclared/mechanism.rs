@@ -23,6 +23,12 @@ pub enum Mechanism {
     AccelerationCoupling,
     /// The first feels the second's speed (`coulomb`: its sign).
     OneWay { driven: usize, driver: usize, coulomb: bool },
+    /// Bumps of the position, each with its centre, its width \[rad, m\] and its share: a hose that catches
+    /// and lets go.
+    Bumps { bumps: Vec<[f64; 3]> },
+    /// Sinusoids of the position, each with its periods a radian, its phase \[rad\] and its share: cogging
+    /// of parts that turn at ratios of no small numbers.
+    Beats { waves: Vec<[f64; 3]> },
     /// A spring on one side of a threshold.
     EndStop { threshold: f64, upper: bool, depth: f64, exponent: f64 },
     /// sin(ωt + φ).
@@ -69,6 +75,15 @@ impl Mechanism {
                 if *coulomb { scene.ordinary.sign(speed) } else { speed }
             }
             Mechanism::OneWay { .. } => 0.0,
+            Mechanism::Bumps { bumps } => {
+                let bump =
+                    |[center, width, share]: &[f64; 3]| share * (-0.5 * ((q - center) / width).powi(2)).exp();
+                bumps.iter().map(bump).sum()
+            }
+            Mechanism::Beats { waves } => {
+                let wave = |[cycles, phase, share]: &[f64; 3]| share * (cycles * q + phase).sin();
+                waves.iter().map(wave).sum()
+            }
             Mechanism::EndStop { threshold, upper, depth, exponent } => {
                 let side = if *upper { 1.0 } else { -1.0 };
                 side * ((q - threshold) * side / depth).max(0.0).powf(*exponent)

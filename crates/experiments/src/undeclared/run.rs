@@ -105,7 +105,12 @@ fn run_one(spec: &Spec, robots: &[Robot], tracer: &Tracer, options: &Options) ->
     };
     // The floor is what the noise leaves, and the experiment knows it: the same case without its secrets.
     let floors = match spec.suite {
-        Suite::One | Suite::Two | Suite::Three | Suite::WideEffects | Suite::WideOutside => tracer
+        Suite::One
+        | Suite::Two
+        | Suite::Three
+        | Suite::WideEffects
+        | Suite::WideOutside
+        | Suite::NewKinds => tracer
             .remainder(&case.without_secrets(), &temporary.path().join("twin"))
             .inspect_err(|error| eprintln!("{}: no noise floor: {error:#}", spec.seed))
             .ok(),

@@ -27,6 +27,8 @@ pub enum Suite {
     WideEffects,
     /// One effect that is not in the catalogue, and up to three that are, in every situation.
     WideOutside,
+    /// One of [`Kind::NEW`], which came to the catalogue last, in one case of three beside another effect.
+    NewKinds,
 }
 
 /// Development seeds are for looking at; reporting seeds only for reporting.
@@ -41,7 +43,7 @@ pub enum Seeds {
 
 impl Suite {
     /// All suites.
-    pub const ALL: [Suite; 8] = [
+    pub const ALL: [Suite; 9] = [
         Suite::One,
         Suite::Two,
         Suite::Three,
@@ -50,6 +52,7 @@ impl Suite {
         Suite::WideRight,
         Suite::WideEffects,
         Suite::WideOutside,
+        Suite::NewKinds,
     ];
     /// One to three effects on an otherwise right model, well excited.
     pub const OLD: [Suite; 5] = [Suite::One, Suite::Two, Suite::Three, Suite::Control, Suite::Outside];
@@ -72,6 +75,7 @@ impl Suite {
             Suite::WideRight => 750,
             Suite::WideEffects => 300,
             Suite::WideOutside => 120,
+            Suite::NewKinds => 120,
         }
     }
 
@@ -112,7 +116,7 @@ impl Spec {
         let suite = *Suite::ALL.get((seed % 1_000_000 / 100_000) as usize)?;
         let index = (seed % 100_000) as usize;
         let rng = &mut CaseRng::new(seed, u64::MAX >> 8, Stream::Secret);
-        let kinds = Kind::value_variants();
+        let kinds = Kind::of_other_suites();
         let mut spec = Spec {
             seed,
             suite,
@@ -137,6 +141,15 @@ impl Spec {
                 spec.secrets = vec![Name::Outside(strangers[index % strangers.len()])];
             }
             Suite::WideRight | Suite::WideEffects | Suite::WideOutside => spec.draw_wide(index, robots, rng),
+            Suite::NewKinds => {
+                let turns = Kind::NEW.len();
+                spec.robot = index / turns % robots;
+                let mut kinds = vec![Kind::NEW[index % turns]];
+                if index / turns % 3 == 2 {
+                    spec.join(&mut kinds, 2, rng);
+                }
+                spec.secrets = kinds.into_iter().map(Name::Catalogue).collect();
+            }
         }
         Some(spec)
     }
@@ -175,7 +188,7 @@ impl Spec {
                         | Kind::TorqueOffset
                 )
         };
-        let mut choices: Vec<Kind> = Kind::value_variants().iter().copied().filter(may_join).collect();
+        let mut choices: Vec<Kind> = Kind::of_other_suites().into_iter().filter(may_join).collect();
         for _ in 0..count {
             let kind = choices.swap_remove(rng.index(choices.len()));
             self.secrets.push(Name::Catalogue(kind));
@@ -184,21 +197,26 @@ impl Spec {
 
     fn draw_several(&mut self, count: usize, rng: &mut CaseRng) {
         self.held = rng.chance(0.2);
+        let mut kinds = Vec::new();
+        self.join(&mut kinds, count, rng);
+        self.secrets = kinds.into_iter().map(Name::Catalogue).collect();
+    }
+
+    /// Adds kinds of the other suites until there are `count`.
+    fn join(&self, kinds: &mut Vec<Kind>, count: usize, rng: &mut CaseRng) {
         let may_join = |kind: &Kind| match kind {
             // Simulated motion and deflected encoders would change what a second effect is: they are judged
             // alone.
             Kind::ActuatorSaturation | Kind::JointElasticity => false,
             kind => self.held || !kind.needs_held_model(),
         };
-        let choices: Vec<Kind> = Kind::value_variants().iter().copied().filter(may_join).collect();
-        let mut kinds: Vec<Kind> = Vec::new();
+        let choices: Vec<Kind> = Kind::of_other_suites().into_iter().filter(may_join).collect();
         while kinds.len() < count {
             let kind = rng.pick(&choices);
             if !kinds.iter().any(|other| kind.is_nested_with(*other)) {
                 kinds.push(kind);
             }
         }
-        self.secrets = kinds.into_iter().map(Name::Catalogue).collect();
     }
 
     /// Whether one of the secrets is this effect.

@@ -71,11 +71,12 @@ fn every_kind_is_drawn_in_its_size() {
     check(Suite::Two, 0..6);
     check(Suite::Three, 0..3);
     check(Suite::Outside, 0..8);
+    check(Suite::NewKinds, 0..4);
 }
 
 #[test]
 fn several_secrets_are_distinct_and_not_nested() {
-    for suite in [Suite::Two, Suite::Three] {
+    for suite in [Suite::Two, Suite::Three, Suite::NewKinds] {
         for index in 0..300 {
             let kinds: Vec<Kind> = spec(suite, index)
                 .secrets
@@ -101,7 +102,23 @@ fn suites_and_seeds_do_not_overlap() {
             }
         }
     }
-    assert_eq!(seen.len(), 2 * (1000 + 1170));
+    assert_eq!(seen.len(), 2 * (1000 + 1170 + 120));
+}
+
+/// Kinds that came to the catalogue later took the places of others in all cases that were drawn before.
+#[test]
+fn a_new_kind_changes_no_case_of_the_other_suites() {
+    for suite in Suite::ALL {
+        for index in 0..100 {
+            let spec = spec(suite, index);
+            let is_new = |name: &Name| Kind::NEW.iter().any(|kind| *name == Name::Catalogue(*kind));
+            assert_eq!(spec.secrets.iter().any(is_new), suite == Suite::NewKinds, "{}", spec.seed);
+        }
+    }
+    let kinds = (0..23).map(|index| spec(Suite::One, index).secrets[0].name()).collect::<Vec<_>>();
+    assert_eq!(kinds.first().map(String::as_str), Some("viscous_friction"));
+    assert_eq!(kinds.last().map(String::as_str), Some("actuator_saturation"));
+    assert_eq!(spec(Suite::One, 23).secrets, spec(Suite::One, 0).secrets);
 }
 
 /// Without its secrets, a robot's torque is M(q)·q̈ + h(q, q̇) and the declared friction, term by term.

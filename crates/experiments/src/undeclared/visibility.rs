@@ -49,14 +49,14 @@ impl Absorber {
         absorber
     }
 
-    /// Also what a simpler effect could pass for: an offset, or a spring.
+    /// Also what a simpler effect could pass for: an offset, a spring, or a sinusoid of the angle.
     pub fn add_simpler(&mut self, kind: Kind, joint: usize, records: &[Record]) {
         use Kind::{
             AsymmetricFriction, EncoderOffset, ExternalForce, GravityBalancer, GravityTilt, Hysteresis,
-            JointSpring, Payload,
+            JointSpring, Payload, PositionMap,
         };
         let offsets = match kind {
-            GravityBalancer | JointSpring | Hysteresis | AsymmetricFriction => joint..joint + 1,
+            GravityBalancer | JointSpring | Hysteresis | AsymmetricFriction | PositionMap => joint..joint + 1,
             // Felt along the chain: an offset on any of its joints.
             ExternalForce | Payload | GravityTilt | EncoderOffset => 0..self.joints,
             _ => 0..0,
@@ -64,8 +64,12 @@ impl Absorber {
         for joint in offsets {
             self.add_shape(records, joint, &|_, _, _| 1.0);
         }
-        if matches!(kind, GravityBalancer | Hysteresis) {
+        if matches!(kind, GravityBalancer | Hysteresis | PositionMap) {
             self.add_shape(records, joint, &|states, sample, joint| states.q(sample, joint));
+        }
+        if kind == PositionMap {
+            self.add_shape(records, joint, &|states, sample, joint| states.q(sample, joint).sin());
+            self.add_shape(records, joint, &|states, sample, joint| states.q(sample, joint).cos());
         }
     }
 

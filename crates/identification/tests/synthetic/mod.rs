@@ -53,7 +53,12 @@ pub struct OneKind;
 
 impl EffectCatalogue for OneKind {
     fn build(&self, spec: &EffectSpec, tree: &Tree) -> Result<Box<dyn Effect>, EffectError> {
-        let unknown = || EffectError::UnknownJoint { kind: spec.kind.clone(), joint: spec.joints[0].clone() };
+        let unknown = || EffectError::UnknownJoint {
+            kind: spec.kind.clone(),
+            joint: spec.joints[0].clone(),
+            nearest: None,
+            known: Vec::new(),
+        };
         Ok(Viscous::on(tree, tree.joint_index(&spec.joints[0]).ok_or_else(unknown)?))
     }
 }

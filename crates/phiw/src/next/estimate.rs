@@ -4,7 +4,7 @@ use super::motions::Motions;
 use crate::Error;
 use crate::arguments::NextArguments;
 use crate::model_file::ModelFile;
-use crate::session::{Session, declared};
+use crate::session::Session;
 use phiw_curriculum::CurriculumError;
 use phiw_curriculum::selection::{MotionCandidates, Triangle};
 use phiw_dynamics::Tree;
@@ -179,7 +179,7 @@ impl Known {
                 let build = |spec: &EffectSpec| Ok(vec![session.catalogue.build(spec, tree)?]);
                 specs(&design).iter().map(build).collect::<Result<_, Error>>()?
             }
-            None => session.effects()?,
+            None => session.effects(&data)?,
         };
         let Identified { design, train_folds, held_out_folds, .. } = identify(tree, effects, &data)?;
         // What was held out to choose constants has been measured, too.
@@ -207,8 +207,8 @@ impl Known {
 fn unmeasured_design(arguments: &NextArguments, tree: &Tree, motions: &Motions) -> Result<Design, Error> {
     let catalogue = Catalogue::default();
     let mut effects = Vec::new();
-    for kind in declared(&arguments.declare, &catalogue)? {
-        let variants = catalogue.declare(&kind, tree, &motions.ranges)?;
+    for declared in catalogue.united(&arguments.declare, tree)? {
+        let variants = catalogue.declare(&declared, tree, &motions.ranges)?;
         effects.extend(variants.into_iter().filter_map(|variants| variants.into_iter().next()));
     }
     // The factors of a motion, and those of all that is known.

@@ -18,16 +18,16 @@ pub struct Standing {
 }
 
 impl Standing {
-    /// Reads the URDF once more, as a robot that could fall.
-    pub fn read(arguments: &NextArguments, xml: &str) -> Result<Self, Error> {
+    /// Reads the URDF once more, as a robot that could fall; `held` are the joints that are held, by name.
+    pub fn read(arguments: &NextArguments, xml: &str, held: &[(String, f64)]) -> Result<Self, Error> {
         let read = |held: &[(String, f64)]| {
-            let options = UrdfOptions { floating_base: true, held: held.to_vec() };
+            let options = UrdfOptions { floating_base: true, held: held.to_vec(), snap: true };
             let wrong = |source| Error::Urdf { path: arguments.urdf.clone(), source: Box::new(source) };
             Ok::<Tree, Error>(read_urdf(xml, &options).map_err(wrong)?.tree)
         };
-        let base_link = read(&arguments.hold)?.bodies()[0].inertial;
+        let base_link = read(held)?.bodies()[0].inertial;
         let stance = match &arguments.support {
-            Some(path) => Some(stance(path, &read(&[])?, &arguments.hold)?),
+            Some(path) => Some(stance(path, &read(&[])?, held)?),
             None => None,
         };
         Ok(Standing { base_link, stance })

@@ -22,7 +22,7 @@ pub fn urdf() -> String {
 }
 
 pub fn tree(urdf: &str, floating_base: bool) -> Tree {
-    read_urdf(urdf, &UrdfOptions { floating_base, held: Vec::new() }).unwrap().tree
+    read_urdf(urdf, &UrdfOptions { floating_base, ..UrdfOptions::default() }).unwrap().tree
 }
 
 /// A motion of 6 s at 100 Hz that begins and ends at rest: sines under a smooth window, `speed` times as fast

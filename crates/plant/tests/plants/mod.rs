@@ -13,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 pub fn model(name: &str, floating_base: bool) -> Tree {
     let path = format!("{}/../../models/{name}.urdf", env!("CARGO_MANIFEST_DIR"));
     let xml = std::fs::read_to_string(&path).expect(&path);
-    read_urdf(&xml, &UrdfOptions { floating_base, held: Vec::new() }).expect(&path).tree
+    read_urdf(&xml, &UrdfOptions { floating_base, ..UrdfOptions::default() }).expect(&path).tree
 }
 
 /// The analytic backend, as a plant's builder.

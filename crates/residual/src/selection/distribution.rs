@@ -8,6 +8,12 @@ pub(super) fn fisher_tail(value: f64, numerator: f64, denominator: f64) -> f64 {
     incomplete_beta(denominator / (denominator + numerator * value), 0.5 * denominator, 0.5 * numerator)
 }
 
+/// P(t > `value`) for Student's distribution with `freedom` degrees of freedom.
+pub(crate) fn students_tail(value: f64, freedom: f64) -> f64 {
+    let half = 0.5 * fisher_tail(value * value, 1.0, freedom);
+    if value > 0.0 { half } else { 1.0 - half }
+}
+
 /// The regularised incomplete beta function I_x(a, b), by Lentz's continued fraction (Press et al., Numerical
 /// Recipes, 6.4).
 fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {

@@ -9,6 +9,7 @@
 //! with the price of a choice among many (Chen & Chen 2008): see [`criterion`].
 
 mod admissible;
+mod anew;
 mod criterion;
 mod cross_validation;
 mod design_effect;
@@ -24,6 +25,7 @@ mod wald;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use distribution::students_tail;
 pub(crate) use fit::Fit;
 pub(crate) use problem::{Hypothesis, Member, Prior, Problem, Torque, Variant};
 pub(crate) use products::Products;

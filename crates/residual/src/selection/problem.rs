@@ -24,9 +24,14 @@ impl Torque {
         Torque { parameters, folds, whole, least }
     }
 
-    /// Mean square of a residual, as far as it counts.
+    /// Mean square of a residual as it enters the criterion: what is as good as none is added, so that the
+    /// smaller a residual is the less it counts, but is never given away.
     pub fn variance(&self, rss: f64) -> f64 {
-        (rss / self.whole.rows().max(1.0)).max(self.least).max(f64::MIN_POSITIVE)
+        (self.mean_square(rss) + self.least).max(f64::MIN_POSITIVE)
+    }
+
+    pub fn mean_square(&self, rss: f64) -> f64 {
+        rss / self.whole.rows().max(1.0)
     }
 
     /// The column of a parameter.

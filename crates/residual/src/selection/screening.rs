@@ -102,12 +102,12 @@ pub(super) fn gain_of(fit: &Fit, squares: f64, rows: f64, torques: &[usize]) -> 
     -rows * (-(squares / all.max(f64::MIN_POSITIVE)).min(1.0 - 1e-9)).ln_1p()
 }
 
-/// What the criterion would gain if nothing were left of the torques.
+/// What the criterion would gain if nothing that counts were left of the torques.
 pub(super) fn most_of(problem: &Problem, fit: &Fit, rows: &[f64], torques: &[usize]) -> f64 {
     let of_torque = |&torque: &usize| {
         let own = &problem.torques[torque];
         if own.least > 0.0 {
-            rows[torque] * (own.variance(fit.rss[torque]) / own.least).ln()
+            rows[torque] * (own.mean_square(fit.rss[torque]) / own.least).ln().max(0.0)
         } else {
             f64::INFINITY
         }

@@ -58,6 +58,7 @@ pub(super) struct Model {
     pub settled: bool,
 }
 
+#[derive(Clone)]
 pub(super) struct Search<'a> {
     pub problem: &'a Problem,
     pub policy: Policy,
@@ -75,7 +76,7 @@ const FORWARD_PHASES: usize = 4;
 /// Times that forward, prune and swap follow each other.
 const ROUNDS: usize = 6;
 /// The criterion must fall by this much for a step: less says nothing.
-const LEAST_STEP: f64 = 0.5;
+pub(super) const LEAST_STEP: f64 = 0.5;
 /// By how much, and by which share, a hypothesis may gain less than the member whose place it would take, to
 /// first order, and still be fitted in full.
 pub(super) const NEAR: (f64, f64) = (20.0, 0.03);
@@ -142,6 +143,9 @@ impl<'a> Search<'a> {
             self.renew();
             while self.prune() {}
             self.sweep();
+            if self.choose_anew() {
+                self.sweep();
+            }
             while self.prune() {}
             self.renew();
             self.doubt();
@@ -166,7 +170,7 @@ impl<'a> Search<'a> {
         self.model.members.iter().any(|member| member.hypothesis == hypothesis)
     }
 
-    fn open(&self) -> Vec<usize> {
+    pub(super) fn open(&self) -> Vec<usize> {
         (0..self.problem.hypotheses.len())
             .filter(|&hypothesis| !self.closed[hypothesis] && !self.is_in(hypothesis))
             .collect()
@@ -179,6 +183,11 @@ impl<'a> Search<'a> {
         }
         let mut open = self.open();
         open.retain(|&hypothesis| !textbook || self.problem.hypotheses[hypothesis].textbook);
+        self.forward_among(open)
+    }
+
+    /// The same with hypotheses of `open` alone.
+    pub(super) fn forward_among(&mut self, open: Vec<usize>) -> bool {
         let screened = screen(self.problem, &self.model.fit, &self.rows, &open);
         let moves = self.moves(&screened);
         let larger = |added: Vec<Member>| (self.model.members.iter().copied().chain(added).collect(), ());
@@ -202,7 +211,7 @@ impl<'a> Search<'a> {
     }
 
     /// Leaves out what the criterion is better without: one member, or all of a kind.
-    fn prune(&mut self) -> bool {
+    pub(super) fn prune(&mut self) -> bool {
         let removable: Vec<Member> =
             self.model.members.iter().filter(|member| !self.is_declared(member)).copied().collect();
         let mut kinds: BTreeMap<usize, Vec<Member>> = BTreeMap::new();

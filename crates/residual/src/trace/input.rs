@@ -39,10 +39,18 @@ pub struct TraceOptions {
     /// A residual below this share of its torque (RMS) is no structure: filters and encoders leave as much of
     /// a right model.
     pub structured_share: f64,
-    /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which it
-    /// is structure whatever it follows: the noise of a robot's sensors is of one colour, and raises all
-    /// residuals over their floors alike.
+    /// Probability that a torque's residual of noise seems to follow any signal.
+    pub false_structure_probability: f64,
+    /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which on it
+    /// is structure if its samples hang together (`structured_correlation`): the noise of a robot's sensors is
+    /// of one colour, and raises all residuals over their floors alike.
     pub structured_ratio: f64,
+    /// Correlation of a residual's samples a quarter to half a second apart, less what the filter gives to
+    /// noise, from which on they hang together.
+    pub structured_correlation: f64,
+    /// Correlation of a residual's samples 2.5 s apart from which on it wanders, whatever it follows: noise of
+    /// up to 1 s of correlation has less than a tenth.
+    pub wander: f64,
     /// Torques whose residual is to be explained: what acts on none of them is no candidate. `None`: all.
     pub torques: Option<Vec<usize>>,
     /// Effects (kind and joints) that are no candidates, because they are known not to be there.
@@ -63,7 +71,10 @@ impl Default for TraceOptions {
             negligible_share: 0.005,
             floor_margin: 1.15,
             structured_share: 0.03,
+            false_structure_probability: 0.05,
             structured_ratio: 8.0,
+            structured_correlation: 0.3,
+            wander: 0.5,
             torques: None,
             excluded: Vec::new(),
         }

@@ -7,10 +7,12 @@
 
 mod constants;
 mod floor;
+mod general_forms;
 mod hypotheses;
 mod input;
 mod naming;
 mod probe;
+mod remaining;
 mod residuals;
 mod search;
 mod signal_shapes;
@@ -23,6 +25,6 @@ pub use floor::noise_floor;
 pub use input::{HeldModel, TraceInput, TraceOptions};
 pub use naming::LEAST_RIVAL;
 pub use probe::Dependence;
-pub use residuals::{ResidualShape, residual_shape};
+pub use residuals::{ResidualShape, ranges_of_residual, residual_shape};
 pub use search::trace;
-pub use tracing::{FoundEffect, Ranked, Remaining, RivalEffect, Tracing, Verdict};
+pub use tracing::{Disturbance, FoundEffect, Ranked, Remaining, RivalEffect, Tracing, Verdict};

@@ -187,7 +187,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    fn remove(&mut self, place: usize) -> Result<(), IdentificationError> {
+    pub(super) fn remove(&mut self, place: usize) -> Result<(), IdentificationError> {
         let design = self.design()?;
         self.parameters.drain(design.effect_parameters(place));
         self.specs.remove(place);
@@ -275,6 +275,18 @@ impl Search<'_> {
     /// Where the other parameters have taken up most of it, it is to be seen on any torque, and must be a
     /// share of its torque by itself.
     fn is_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
+        let (seen, absorbed) = self.is_seen_or_absorbed(trial, member, squares);
+        seen || absorbed
+    }
+
+    /// Whether what an effect takes is to be seen on a torque that it acts on; and whether the other
+    /// parameters have taken up most of what it is.
+    pub(super) fn is_seen_or_absorbed(
+        &self,
+        trial: &Trial,
+        member: Member,
+        squares: &Squares,
+    ) -> (bool, bool) {
         let options = self.options;
         let Squares { initial, without, with } = squares;
         let hypothesis = &trial.problem.hypotheses[member.hypothesis];
@@ -299,7 +311,7 @@ impl Search<'_> {
                 && (taken / whole).sqrt() >= options.least_size;
             size = size.max((held_out.size_of(&trial.values_of(member, torque)) / whole).sqrt());
         }
-        seen || largest_share >= options.least_share && size >= ABSORBED_SIZE * options.least_size
+        (seen, largest_share >= options.least_share && size >= ABSORBED_SIZE * options.least_size)
     }
 
     /// Puts the effects into the order in which they count, and says what each has explained.

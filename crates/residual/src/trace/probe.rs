@@ -3,6 +3,7 @@
 
 use super::signal_shapes::{SWINGS, Shape, neighbours, other_shapes, own_shapes};
 use super::stage::{Fixed, Stage};
+use crate::selection::students_tail;
 use phiw_effects::SignalRanges;
 use phiw_identification::{EffectSpec, IdentificationError};
 use phiw_regressor::RegressorError;
@@ -23,11 +24,9 @@ pub struct Dependence {
     pub share: f64,
 }
 
-/// A residual follows a signal that foretells this share of its variance on other folds, this many standard
-/// deviations (over the folds) from nothing. Shapes over noise foretell less than nothing: they were fitted
-/// on other noise.
+/// A residual follows a signal that foretells this share of its variance on other folds. Shapes over noise
+/// foretell less than nothing: they were fitted on other noise.
 const LEAST_SHARE: f64 = 0.05;
-const LEAST_SIGNIFICANCE: f64 = 2.2;
 /// The same share for swings over the time, whose frequencies are those at which the residual itself is
 /// largest.
 const LEAST_SHARE_OF_SWINGS: f64 = 0.25;
@@ -48,6 +47,8 @@ pub(super) struct Fit<'a> {
     pub ranges: &'a SignalRanges,
     /// For each torque the angular frequencies \[rad/s\] at which its residual swings over the time.
     pub lines: &'a [Vec<f64>],
+    /// Probability that a torque's residual of noise seems to follow any signal.
+    pub false_alarm: f64,
 }
 
 /// Which signals the residuals of the torques `rows` follow, strongest first.
@@ -110,6 +111,8 @@ fn probes(
     let free = if fixed.prior.is_some() { 0 } else { stage.model_size() };
     let mut parameters = parameters.to_vec();
     parameters.resize(stage.design.parameter_count(), 0.0);
+    let signals_of_torque = signals.len().max(1) as f64 / rows.len() as f64;
+    let limit = fit.false_alarm / signals_of_torque;
     let of_row = |&row: &usize| {
         let own = signals.iter().enumerate().filter(|(_, (of, _))| *of == row);
         let own: Vec<(usize, &String)> = own.map(|(candidate, (_, signal))| (candidate, signal)).collect();
@@ -124,8 +127,9 @@ fn probes(
                 squares.iter().map(|square| square.max(f64::MIN_POSITIVE).ln()).collect()
             };
             let t = paired_t(&logarithms(&alone), &logarithms(&after));
+            let tail = students_tail(t, (alone.len() as f64 - 1.0).max(1.0));
             let least = if signal == SWINGS { LEAST_SHARE_OF_SWINGS } else { LEAST_SHARE };
-            if share >= least && t >= LEAST_SIGNIFICANCE {
+            if share >= least && tail <= limit {
                 let signal = if signal == SWINGS { "t" } else { signal };
                 found.push(Probe { row, signal: signal.to_owned(), share });
             }

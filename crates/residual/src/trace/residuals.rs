@@ -1,15 +1,20 @@
 //! One pass over the logs with a fitted model: what it leaves, sample by sample, in constant memory.
 
-use phiw_identification::{BlockSource, Design, Fold, IdentificationError};
+use phiw_effects::SignalRanges;
+use phiw_identification::{BlockSource, Data, Design, Fold, IdentificationError};
 use phiw_telemetry::filter::FilterScratch;
 
 /// What the residual of each torque looks like on some folds.
 #[derive(Clone, Debug, Default)]
 pub struct ResidualShape {
+    /// RMS of each torque's residual \[N·m, N\].
+    pub rms: Vec<f64>,
     /// Autocorrelation of each torque's residual, less what the filter alone gives to noise: the largest of
     /// those 0.25 to 0.5 s apart. Near zero for noise, whatever its colour within the filter's band. At
     /// several distances, since that of a residual that swings once a second is zero at one of them.
     pub autocorrelation: Vec<f64>,
+    /// The same, signed, of samples 2.5 s apart: near one for what wanders slowly, near zero for noise.
+    pub wander: Vec<f64>,
     /// For each joint, spatial frequencies \[periods·2π over the unit of position\] at which its residual has
     /// peaks, strongest first.
     pub ripple_frequencies: Vec<Vec<f64>>,
@@ -22,20 +27,41 @@ pub struct ResidualShape {
 
 /// Distances of two samples whose correlation is structure and not the noise's colour \[s\].
 const STRUCTURE_LAGS: [f64; 3] = [0.25, 0.35, 0.5];
+/// All distances \[s\]: those, and that at which only what wanders is still correlated.
+const LAGS: [f64; 4] = [0.25, 0.35, 0.5, 2.5];
 /// Peaks of the residual over the position that are tried as ripple.
 const PEAKS: usize = 4;
 /// Highest spatial frequency that is tried \[1/rad\].
 const HIGHEST_FREQUENCY: f64 = 130.0;
 
+/// What the training motion covers, with the frequencies of what a model leaves of it.
+///
+/// # Errors
+/// A log cannot be read.
+pub fn ranges_of_residual(
+    design: &Design,
+    parameters: &[f64],
+    data: &Data<'_>,
+    mut ranges: SignalRanges,
+) -> Result<SignalRanges, IdentificationError> {
+    let positions: Vec<(f64, f64)> = ranges.joints.iter().map(|joint| joint.position).collect();
+    let shape = residual_shape(design, parameters, &data.train, &data.sources, &positions)?;
+    ranges.ripple_frequencies = shape.ripple_frequencies;
+    ranges.joints.iter_mut().zip(shape.rms).for_each(|(joint, rms)| joint.residual_rms = rms);
+    Ok(ranges)
+}
+
 struct Collector {
     /// Distances in outputs, ascending.
-    lags: [usize; STRUCTURE_LAGS.len()],
+    lags: [usize; LAGS.len()],
     /// What noise has there after the filter.
-    of_noise: [f64; STRUCTURE_LAGS.len()],
+    of_noise: [f64; LAGS.len()],
     ring: Vec<Vec<f64>>,
     filled: usize,
     /// For each torque and distance: sum of the products, sum of the squares.
-    products: Vec<[(f64, f64); STRUCTURE_LAGS.len()]>,
+    products: Vec<[(f64, f64); LAGS.len()]>,
+    /// For each torque: sum of the squares, rows that count.
+    squares: Vec<(f64, f64)>,
     grids: Vec<Grid>,
     /// The same over the time.
     times: Vec<Grid>,
@@ -107,6 +133,7 @@ pub fn residual_shape(
         ring: Vec::new(),
         filled: 0,
         products: vec![Default::default(); torques],
+        squares: vec![(0.0, 0.0); torques],
         grids: ranges.iter().map(|&range| Grid::new(range)).collect(),
         times: ranges.iter().map(|_| Grid::new((0.0, duration))).collect(),
     };
@@ -128,7 +155,7 @@ pub fn residual_shape(
             let outputs = block.outputs.clone();
             if let [first, second, ..] = outputs[..] {
                 let period = block.t[second] - block.t[first];
-                let lags = STRUCTURE_LAGS.map(|lag| (lag / period).round().max(1.0) as usize);
+                let lags = LAGS.map(|lag| (lag / period).round().max(1.0) as usize);
                 collector.begin(lags, continues);
                 let filter = block.parallel_filter();
                 collector.of_noise = lags.map(|lag| filter.noise_autocorrelation(lag * filter.decimation()));
@@ -177,19 +204,22 @@ fn residual_of_row(design: &Design, parameters: &[f64], row: &[f64], residual: &
 impl Collector {
     fn shape(&self, rows: u64) -> ResidualShape {
         let correlation = |&(product, square): &(f64, f64)| if square > 0.0 { product / square } else { 0.0 };
-        let largest = |sums: &[(f64, f64); STRUCTURE_LAGS.len()]| {
+        let largest = |sums: &[(f64, f64); LAGS.len()]| {
             let by_size = |a: &f64, b: &f64| a.abs().total_cmp(&b.abs());
-            sums.iter().map(correlation).max_by(by_size).unwrap_or_default()
+            sums[..STRUCTURE_LAGS.len()].iter().map(correlation).max_by(by_size).unwrap_or_default()
         };
+        let rms = |&(sum, rows): &(f64, f64)| (sum / rows.max(1.0)).sqrt();
         ResidualShape {
+            rms: self.squares.iter().map(rms).collect(),
             autocorrelation: self.products.iter().map(largest).collect(),
+            wander: self.products.iter().map(|sums| correlation(&sums[STRUCTURE_LAGS.len()])).collect(),
             ripple_frequencies: self.grids.iter().map(Grid::peaks).collect(),
             time_frequencies: self.times.iter().map(Grid::peaks).collect(),
             rows,
         }
     }
 
-    fn begin(&mut self, lags: [usize; STRUCTURE_LAGS.len()], continues: bool) {
+    fn begin(&mut self, lags: [usize; LAGS.len()], continues: bool) {
         if lags != self.lags {
             let longest = lags.into_iter().max().unwrap_or_default();
             self.ring = vec![vec![0.0; self.products.len()]; longest];
@@ -203,6 +233,8 @@ impl Collector {
     fn add(&mut self, residual: &[f64], positions: &[f64], time: f64) {
         for (joint, grid) in self.grids.iter_mut().enumerate() {
             if residual[joint] != 0.0 {
+                self.squares[joint].0 += residual[joint] * residual[joint];
+                self.squares[joint].1 += 1.0;
                 grid.add(positions[joint], residual[joint]);
                 self.times[joint].add(time, residual[joint]);
             }

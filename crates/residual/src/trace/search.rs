@@ -2,7 +2,7 @@
 
 use super::hypotheses::{Candidates, Present};
 use super::input::{TraceInput, TraceOptions};
-use super::residuals::residual_shape;
+use super::residuals::ranges_of_residual;
 use super::stage::{Fixed, Stage, specs_and_values};
 use super::tracing::Tracing;
 use crate::selection::{Member, Policy, Problem, select, value};
@@ -58,6 +58,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
             break;
         }
     }
+    search.prefer_simpler_forms()?;
     search.finish()
 }
 
@@ -126,7 +127,7 @@ impl Search<'_> {
     }
 
     /// Chooses among all hypotheses, from the present model on.
-    fn choose(&mut self) -> Result<(), IdentificationError> {
+    pub(super) fn choose(&mut self) -> Result<(), IdentificationError> {
         let present = Present { specs: &self.specs, declared: self.declared };
         let mut candidates = Candidates::all(self.fixed, present, &self.ranges()?, self.options)?;
         let effects = std::mem::take(&mut candidates.effects);
@@ -214,13 +215,8 @@ impl Search<'_> {
 
     /// What the training motion covers, with the frequencies of what the present model leaves.
     fn ranges(&self) -> Result<SignalRanges, IdentificationError> {
-        let mut ranges = self.input.ranges.clone();
-        let positions: Vec<(f64, f64)> = ranges.joints.iter().map(|joint| joint.position).collect();
-        let data = self.fixed.data;
-        let shape =
-            residual_shape(&self.design()?, &self.parameters, &data.train, &data.sources, &positions)?;
-        ranges.ripple_frequencies = shape.ripple_frequencies;
-        Ok(ranges)
+        let ranges = self.input.ranges.clone();
+        ranges_of_residual(&self.design()?, &self.parameters, self.fixed.data, ranges)
     }
 }
 

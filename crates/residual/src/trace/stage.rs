@@ -209,29 +209,22 @@ impl<'a> Fixed<'a> {
         })
     }
 
-    /// Candidates that a URDF has a place for, on the same joint and followed by the same signal: of these
-    /// another is a form. Nothing where the model is held: they are in what is held.
+    /// Candidates on the same joint of which another is a form. None where the model is held: they are in what
+    /// is held.
     fn required(
         &self,
         candidates: &Candidates,
         candidate: &super::hypotheses::Candidate,
     ) -> Result<Vec<usize>, IdentificationError> {
-        let spec = &candidate.specs[0];
-        let own = self.catalogue.kind(&spec.kind)?;
-        if self.prior.is_some() || own.joint_property().is_some() || !candidate.familiar {
+        if self.prior.is_some() {
             return Ok(Vec::new());
         }
-        let mut required = Vec::new();
-        for (place, other) in candidates.list.iter().enumerate() {
-            let kind = self.catalogue.kind(&other.specs[0].kind)?;
-            if other.specs[0].joints == spec.joints
-                && kind.joint_property().is_some()
-                && kind.seen_against() == own.seen_against()
-            {
-                required.push(place);
-            }
-        }
-        Ok(required)
+        let spec = &candidate.specs[0];
+        let simpler = self.catalogue.kind(&spec.kind)?.form_of();
+        let is_simpler =
+            |other: &EffectSpec| other.joints == spec.joints && simpler.contains(&other.kind.as_str());
+        let list = candidates.list.iter().enumerate();
+        Ok(list.filter(|(_, other)| is_simpler(&other.specs[0])).map(|(place, _)| place).collect())
     }
 
     fn leave_out_what_is_not_finite(&self, stage: &Stage, candidates: &mut Candidates) {

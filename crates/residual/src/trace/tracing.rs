@@ -61,6 +61,19 @@ pub struct FoundEffect {
     pub ranking: Vec<Ranked>,
 }
 
+/// A residual that is larger than its noise floor and follows nothing that was measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Disturbance {
+    /// The joint whose residual it is.
+    pub joint: String,
+    /// Its RMS on motion held out \[N·m, N\].
+    pub rmse: f64,
+    /// The joint's noise floor \[N·m, N\].
+    pub noise_floor: f64,
+    /// Correlation of samples a quarter to half a second apart.
+    pub autocorrelation: f64,
+}
+
 /// What the final model leaves.
 #[derive(Clone, Debug, Default)]
 pub struct Remaining {
@@ -68,6 +81,8 @@ pub struct Remaining {
     pub joints: Vec<String>,
     /// Signals that the residuals still follow, strongest first.
     pub depends_on: Vec<Dependence>,
+    /// Residuals larger than noise that follow nothing measured: no structure.
+    pub disturbances: Vec<Disturbance>,
     /// The best candidates that were not good enough.
     pub ranking: Vec<Ranked>,
     /// What these logs cannot tell: candidates of which the motion leaves nothing beside the model's own

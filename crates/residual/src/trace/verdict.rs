@@ -1,12 +1,10 @@
 //! The end of a search: the final fit, what each effect explained, what remains.
 
 use super::naming::Harm;
-use super::probe::{self, Fit};
-use super::residuals::residual_shape;
 use super::search::Search;
-use super::tracing::{Remaining, Tracing, Verdict};
+use super::tracing::{Tracing, Verdict};
 use phiw_identification::fitting::{TorqueError, accumulate, fit, torque_error};
-use phiw_identification::{IdentificationError, Identified};
+use phiw_identification::{Design, IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
 
 /// Error of all torques together on motion held out, over that of the declared model, up to which a model
@@ -43,7 +41,7 @@ impl Search<'_> {
         let data = self.fixed.data;
         let folds = [data.train.as_slice(), &data.held_out].concat();
         let mut train_folds = accumulate(&design, &folds, &data.sources)?;
-        let held_out_folds = train_folds.split_off(data.train.len());
+        let mut held_out_folds = train_folds.split_off(data.train.len());
         let mut final_fit = fit(&design, &train_folds)?;
         if self.fixed.prior.is_some() {
             final_fit.parameters = match effects.is_empty() && refinements.is_empty() {
@@ -51,16 +49,21 @@ impl Search<'_> {
                 false => self.parameters.clone(),
             };
         }
+        // Where columns are made of the model's torque, it is that of the fit: the model as it is used.
+        let design = design.with_own_reference(&final_fit.parameters)?;
+        if design.needs().of_reference() {
+            train_folds = accumulate(&design, &folds, &data.sources)?;
+            held_out_folds = train_folds.split_off(data.train.len());
+        }
         let after = errors(&train_folds, &held_out_folds, &final_fit.parameters)?;
         self.parameters.clone_from(&final_fit.parameters);
-        let remaining = self.remaining(&held_out_folds, &after.1)?;
+        let remaining = self.remaining(&held_out_folds, &after.1, &final_fit)?;
         let verdict = match (effects.is_empty(), remaining.joints.is_empty()) {
             (true, true) => Verdict::Sufficient,
             (true, false) => Verdict::Unexplained,
             (false, true) => Verdict::Explained,
             (false, false) => Verdict::PartlyExplained,
         };
-        let design = design.with_reference(self.fixed.reference(&self.specs, &final_fit.parameters)?);
         let model = Identified {
             design,
             fit: final_fit,
@@ -88,64 +91,13 @@ impl Search<'_> {
         let data = self.fixed.data;
         let (specs, parameters) = (&self.input.declared, &self.input.parameters);
         let folds = [data.train.as_slice(), &data.held_out].concat();
-        let reference = self.fixed.reference(specs, parameters)?;
-        let mut train = self.fixed.pass(specs, Vec::new(), reference, &folds)?.folds;
+        let effects = self.fixed.build(specs)?;
+        let design = Design::new(self.fixed.tree.clone(), self.fixed.base.clone(), effects)
+            .with_rest_speeds(data.rest_speeds.clone())
+            .with_own_reference(parameters)?;
+        let mut train = accumulate(&design, &folds, &data.sources)?;
         let held_out = train.split_off(data.train.len());
         errors(&train, &held_out, parameters)
-    }
-
-    /// Which residuals have structure, and what they follow: what motion foretells on data that were not
-    /// fitted.
-    fn remaining(
-        &self,
-        held_out: &[GroupedFactor],
-        error: &TorqueError,
-    ) -> Result<Remaining, IdentificationError> {
-        let torque_rms = |row: usize| {
-            let (squares, rows) = held_out.iter().fold((0.0, 0), |(squares, rows), fold| {
-                let factor = &fold.groups()[row].factor;
-                (squares + factor.right_hand_side_sum_of_squares(), rows + factor.rows())
-            });
-            (squares / rows.max(1) as f64).sqrt()
-        };
-        let large = |row: &usize| {
-            error.rmse[*row] > self.options.floor_margin * self.input.noise_floor[*row]
-                && error.rmse[*row] > self.options.structured_share * torque_rms(*row)
-                && !self.is_as_it_was(*row, error.rmse[*row])
-        };
-        let large: Vec<usize> = (0..error.rmse.len()).filter(large).collect();
-        if large.is_empty() {
-            return Ok(Remaining {
-                unidentifiable: self.chosen.unidentifiable.clone(),
-                ..Remaining::default()
-            });
-        }
-        let positions: Vec<(f64, f64)> =
-            self.input.ranges.joints.iter().map(|joint| joint.position).collect();
-        let data = self.fixed.data;
-        let folds = [data.train.as_slice(), &data.held_out].concat();
-        let shape = residual_shape(&self.design()?, &self.parameters, &folds, &data.sources, &positions)?;
-        let fit = Fit {
-            lines: &shape.time_frequencies,
-            fixed: self.fixed,
-            specs: &self.specs,
-            parameters: &self.parameters,
-            ranges: &self.input.ranges,
-        };
-        let following = probe::following(fit, &large)?;
-        let over = |row: usize| error.rmse[row] / self.input.noise_floor[row];
-        let nearest = (0..error.rmse.len()).map(over).fold(f64::INFINITY, f64::min).max(1.0);
-        let stands_out = |row: usize| over(row) > self.options.structured_ratio * nearest;
-        let structured: Vec<usize> =
-            large.into_iter().filter(|&row| following.contains(&row) || stands_out(row)).collect();
-        let depends_on = probe::probe(fit, &structured)?;
-        let names: Vec<String> = self.fixed.tree.joint_names().map(str::to_owned).collect();
-        Ok(Remaining {
-            joints: structured.iter().map(|&row| names[row].clone()).collect(),
-            depends_on,
-            ranking: Vec::new(),
-            unidentifiable: self.chosen.unidentifiable.clone(),
-        })
     }
 }
 

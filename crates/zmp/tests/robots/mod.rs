@@ -55,7 +55,7 @@ pub fn robot() -> impl Strategy<Value = Robot> {
 pub fn model(name: &str, floating_base: bool) -> Tree {
     let path = format!("{}/../../models/{name}.urdf", env!("CARGO_MANIFEST_DIR"));
     let xml = std::fs::read_to_string(&path).expect(&path);
-    read_urdf(&xml, &UrdfOptions { floating_base, held: Vec::new() }).expect(&path).tree
+    read_urdf(&xml, &UrdfOptions { floating_base, ..UrdfOptions::default() }).expect(&path).tree
 }
 
 /// The 18-joint upper body on a fixed base, and the parameters of all that stands.

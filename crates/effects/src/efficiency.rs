@@ -1,0 +1,84 @@
+//! Losses of a transmission that depend on the direction of power.
+
+use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
+use crate::fitted::FittedEffect;
+use crate::friction::{WIDTH, few_sign_widths};
+use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, product, values};
+use phiw_dynamics::Tree;
+use phiw_identification::Effect;
+use phiw_identification::effect::{Needs, Sample};
+
+/// What a transmission loses of the torque that it carries: one share where it drives its load, another where
+/// the load drives it (Hamon, Gautier, Garrec 2010).
+///
+/// With τ the torque of the rigid body, the motor delivers τ/η where τ·q̇ > 0: (1/η − 1)·|τ|·sign(q̇) more.
+/// Where τ·q̇ < 0 it delivers τ·η′: (1 − η′)·|τ|·sign(q̇) more. Of equal shares it is friction of the load.
+pub struct DriveEfficiency;
+
+/// Which of the two shares there are.
+const PART: &str = "part";
+const DRIVING: f64 = 0.0;
+const DRIVEN: f64 = 1.0;
+const BOTH: f64 = 2.0;
+
+/// Names of the shares.
+const LOSS_DRIVING: &str = "loss_driving";
+const LOSS_DRIVEN: &str = "loss_driven";
+
+impl EffectKind for DriveEfficiency {
+    fn name(&self) -> &str {
+        "drive_efficiency"
+    }
+    fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
+        let widths: Vec<Constants> = few_sign_widths(site[0], ranges).into_iter().step_by(2).collect();
+        product(&values(PART, [DRIVING, DRIVEN, BOTH]), &widths)
+    }
+    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+        around(found, WIDTH, step)
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        Some(Constants::from([(PART.to_owned(), BOTH)]))
+    }
+    fn telling_motion(&self) -> &'static str {
+        "lifting and lowering a known load at the same speeds"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let share = |(name, loss): (&str, f64)| match name {
+            LOSS_DRIVING => format!("{:.2} where it drives its load", 1.0 / (1.0 + loss)),
+            _ => format!("{:.2} where its load drives it", 1.0 - loss),
+        };
+        let shares: Vec<String> = found.named_values().map(share).collect();
+        format!("The transmission of {} has an efficiency of {}.", found.joints(), shares.join(" and "))
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Torque
+    }
+    fn dissipates(&self) -> bool {
+        true
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let (joint, width) = (site[0], constant(constants, WIDTH, 0.0));
+        let part = constant(constants, PART, BOTH);
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            let load = sample.reference_torque().get(joint).copied().unwrap_or_default();
+            let velocity = sample.qd()[joint];
+            let loss = load.abs() * smooth_sign(velocity, width);
+            let drives = load * velocity > 0.0;
+            if part == BOTH {
+                (out[0], out[1]) = if drives { (loss, 0.0) } else { (0.0, loss) };
+            } else {
+                out[0] = if drives == (part == DRIVING) { loss } else { 0.0 };
+            }
+        };
+        let shares = [(LOSS_DRIVING, ParameterKind::Ratio, 0.0), (LOSS_DRIVEN, ParameterKind::Ratio, 0.0)];
+        let parameters = if part == BOTH {
+            &shares[..]
+        } else if part == DRIVING {
+            &shares[..1]
+        } else {
+            &shares[1..]
+        };
+        let needs = Needs { torque: true, ..Needs::default() };
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, parameters, columns).needing(needs))
+    }
+}

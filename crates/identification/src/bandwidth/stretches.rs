@@ -1,0 +1,70 @@
+//! The training motion that cut-offs are compared on, in memory, to be filtered with any of them.
+
+use super::{BandwidthSettings, beginnings};
+use crate::log_set::LogFile;
+use crate::{BlockSource, Fold, IdentificationError, LogSet, Progress};
+use phiw_telemetry::filter::ParallelFilter;
+use phiw_telemetry::{Block, LogError};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// Blocks of the training logs that touch the folds.
+pub struct Stretches {
+    folds: Vec<Fold>,
+    /// For each log its sample period \[s\] and its blocks.
+    logs: Vec<(f64, Vec<Block>)>,
+}
+
+impl Stretches {
+    /// Reads the training logs once. `lowest_hz` is the lowest cut-off that the blocks will be filtered with.
+    pub fn read(
+        logs: &LogSet,
+        lowest_hz: f64,
+        settings: &BandwidthSettings,
+        progress: Progress<'_>,
+    ) -> Result<Self, IdentificationError> {
+        let rates: Vec<f64> = logs.training().iter().map(|survey| survey.rate_hz()).collect();
+        let folds = beginnings(&logs.training_folds(), &rates, settings);
+        let mut conditioning = logs.conditioning().clone();
+        conditioning.parallel_cutoff_hz = lowest_hz;
+        conditioning.options.parallel_cutoff_hz = Some(lowest_hz);
+        let read = |survey| {
+            let mut blocks = Vec::new();
+            LogFile::new(survey, &conditioning, progress).blocks(&mut |block| {
+                let (Some(&first), Some(&last)) = (block.t.first(), block.t.last()) else { return };
+                let touched = |fold: &Fold| fold.log == block.log && fold.start <= last && first < fold.end;
+                if folds.iter().any(touched) {
+                    blocks.push(block);
+                }
+            })?;
+            Ok((survey.period, blocks))
+        };
+        let logs = logs.training().iter().map(read).collect::<Result<_, IdentificationError>>()?;
+        Ok(Stretches { folds, logs })
+    }
+
+    /// The stretches of time.
+    pub fn folds(&self) -> &[Fold] {
+        &self.folds
+    }
+
+    /// The logs with the parallel filter at `cutoff_hz`.
+    pub fn at(&self, cutoff_hz: f64) -> Vec<Filtered<'_>> {
+        let filter = |period: f64| Arc::new(ParallelFilter::new(cutoff_hz, period, None));
+        self.logs.iter().map(|(period, blocks)| Filtered { blocks, filter: filter(*period) }).collect()
+    }
+}
+
+/// Blocks with another filter.
+pub struct Filtered<'a> {
+    blocks: &'a [Block],
+    filter: Arc<ParallelFilter>,
+}
+
+impl BlockSource for Filtered<'_> {
+    fn stream(&self, sink: &mut dyn FnMut(Block) -> ControlFlow<()>) -> Result<(), LogError> {
+        // A sink that stops early is not an error.
+        let _ = self.blocks.iter().map(|block| block.with_filter(&self.filter)).try_for_each(sink);
+        Ok(())
+    }
+}

@@ -1,0 +1,115 @@
+//! One model has one error: `identify`, `explain` and `predict` compute the same.
+
+mod synthetic;
+
+use phiw::arguments::{ExplainArguments, PredictArguments, SessionArguments};
+use phiw::console::Console;
+use phiw_report::ReportJson;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+struct Case {
+    urdf: PathBuf,
+    train: PathBuf,
+    validate: PathBuf,
+    folder: TempDir,
+}
+
+impl Case {
+    /// The three-joint robot with friction that grows with the load on `joint_2`.
+    fn synthetic() -> Self {
+        let folder = TempDir::new().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::write(path("robot.urdf"), synthetic::URDF).unwrap();
+        for (seed, name) in [(1, "train.csv"), (2, "validate.csv")] {
+            let mut log = synthetic::recording(seed, 30.0);
+            for row in 1..log.t.len() {
+                let forward = log.q[3 * row + 1] - log.q[3 * row - 2] >= 0.0;
+                let torque = &mut log.tau[3 * row + 1];
+                *torque += 0.2 * torque.abs() * if forward { 1.0 } else { -1.0 };
+            }
+            fs::write(path(name), synthetic::csv(&log)).unwrap();
+        }
+        let (urdf, train, validate) = (path("robot.urdf"), path("train.csv"), path("validate.csv"));
+        Case { urdf, train, validate, folder }
+    }
+
+    /// A robot of the shared data; `None` where they are absent.
+    fn tx40() -> Option<Self> {
+        let logs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/logs/tx40");
+        if !logs.exists() {
+            println!("skipped: ../shared/data/logs/tx40 is absent");
+            return None;
+        }
+        let (urdf, train, validate) =
+            (logs.join("tx40.urdf"), logs.join("train.csv"), logs.join("validate.csv"));
+        Some(Case { urdf, train, validate, folder: TempDir::new().unwrap() })
+    }
+
+    fn session(&self, declare: &[&str], out: &str) -> SessionArguments {
+        SessionArguments {
+            urdf: self.urdf.clone(),
+            train: vec![self.train.clone()],
+            validate: vec![self.validate.clone()],
+            declare: declare.iter().map(|&declared| declared.to_owned()).collect(),
+            out: self.folder.path().join(out),
+            quiet: true,
+            ..SessionArguments::default()
+        }
+    }
+
+    /// The model in a folder of results predicts the validation log with the errors of its report.
+    fn predicts_what_is_reported(&self, out: &str, report: &ReportJson) {
+        let arguments = PredictArguments {
+            model: self.folder.path().join(out).join("model.json"),
+            logs: vec![self.validate.clone()],
+            out: self.folder.path().join("predicted.csv"),
+            quiet: true,
+            ..PredictArguments::default()
+        };
+        let errors = phiw::predict::predict(&arguments, &Console::silent()).unwrap().errors;
+        let reported = &report.after.validate;
+        let pairs = reported.rmse.values().enumerate().map(|(joint, rmse)| (errors.rmse(joint), *rmse));
+        for (predicted, reported) in pairs.chain([(errors.relative(), reported.relative.unwrap())]) {
+            assert!((predicted / reported - 1.0).abs() < 1e-6, "{out}: {predicted}, reported {reported}");
+        }
+    }
+
+    /// What explain names.
+    fn check(&self, declare: &[&str]) -> Vec<String> {
+        let identified = phiw::identify::identify(&self.session(declare, "identified"), &Console::silent())
+            .unwrap()
+            .report;
+        let arguments = ExplainArguments {
+            session: self.session(declare, "explained"),
+            model: None,
+            draws: 0,
+            exclude: Vec::new(),
+        };
+        let explained = phiw::explain::explain(&arguments, &Console::silent()).unwrap().report;
+        assert_eq!(identified.before, explained.before, "{declare:?}");
+        self.predicts_what_is_reported("identified", &identified);
+        self.predicts_what_is_reported("explained", &explained);
+        explained.effects.into_iter().map(|effect| effect.kind).collect()
+    }
+}
+
+/// A model's columns were made with the torque of a fit before the last: what `predict` said of a log was up
+/// to 3 % off what `explain` had reported of it.
+#[test]
+fn a_model_predicts_with_the_error_that_was_reported_of_it() {
+    let case = Case::synthetic();
+    let named = case.check(&["viscous_friction"]);
+    assert!(named.iter().any(|kind| kind == "load_dependent_friction"), "{named:?}");
+    case.check(&["viscous_friction", "load_dependent_friction:joint_2"]);
+    case.check(&["viscous_friction", "torque_gain:joint_1", "time_delay:joint_3"]);
+}
+
+#[test]
+fn a_model_of_a_real_robot_predicts_with_the_error_that_was_reported_of_it() {
+    let Some(case) = Case::tx40() else { return };
+    let named = case.check(&[]);
+    assert!(named.iter().any(|kind| kind == "load_dependent_friction"), "{named:?}");
+    case.check(&["viscous_friction", "coulomb_friction", "load_dependent_friction"]);
+}

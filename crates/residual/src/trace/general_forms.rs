@@ -1,0 +1,63 @@
+//! A form that can imitate many others gives way to simpler ones that do its work.
+
+use super::search::Search;
+use super::trial::Squares;
+use phiw_identification::{EffectSpec, IdentificationError};
+
+impl Search<'_> {
+    /// Chooses again without each general form that was found, and takes what is found in its place where
+    /// that has no more numbers, and the general form is not worth a name beside it: a stop that is not
+    /// quite a spring is still a stop.
+    pub(super) fn prefer_simpler_forms(&mut self) -> Result<(), IdentificationError> {
+        let mut asked: Vec<EffectSpec> = Vec::new();
+        let mut options = self.options.clone();
+        while let Some(place) = self.general_form(&asked)? {
+            let spec = self.specs[place].clone();
+            asked.push(spec.clone());
+            options.excluded.push(spec);
+            let mut without = Search { options: &options, ..self.clone() };
+            without.remove(place)?;
+            without.choose()?;
+            without.refine()?;
+            if without.numbers()? <= self.numbers()? && self.is_done_by(place, &without)? {
+                let Search { specs, parameters, chosen, .. } = without;
+                (self.specs, self.parameters, self.chosen) = (specs, parameters, chosen);
+            } else {
+                options.excluded.pop();
+            }
+        }
+        Ok(())
+    }
+
+    /// The place of a general form that was found and is not among those asked of.
+    fn general_form(&self, asked: &[EffectSpec]) -> Result<Option<usize>, IdentificationError> {
+        let is = |a: &EffectSpec, b: &EffectSpec| a.kind == b.kind && a.joints == b.joints;
+        for (place, spec) in self.specs.iter().enumerate().skip(self.declared) {
+            let is_general = self.fixed.catalogue.kind(&spec.kind)?.is_general_form();
+            if is_general && !asked.iter().any(|other| is(other, spec)) {
+                return Ok(Some(place));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Parameters and constants of the effects.
+    fn numbers(&self) -> Result<usize, IdentificationError> {
+        let parameters: usize =
+            self.fixed.build(&self.specs)?.iter().map(|effect| effect.parameters().len()).sum();
+        Ok(parameters + self.specs.iter().map(|spec| spec.constants.len()).sum::<usize>())
+    }
+
+    /// Whether the effect at `place` is not worth a name beside what another model, without it, leaves of its
+    /// torques on motion held out.
+    fn is_done_by(&self, place: usize, other: &Search<'_>) -> Result<bool, IdentificationError> {
+        let (own, other) = (self.trial()?, other.trial()?);
+        let Some(member) = own.member(place) else { return Ok(false) };
+        let squares = Squares {
+            initial: own.held_out_squares(&own.fit_with(|other| other < self.declared)),
+            without: other.held_out_squares(&other.fit),
+            with: own.held_out_squares(&own.fit),
+        };
+        Ok(!self.is_seen_or_absorbed(&own, member, &squares).0)
+    }
+}

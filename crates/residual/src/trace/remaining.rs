@@ -1,0 +1,119 @@
+//! What the final model leaves: whether it has structure, and what it follows.
+
+use super::probe;
+use super::residuals::residual_shape;
+use super::search::Search;
+use super::tracing::{Disturbance, Remaining};
+use crate::selection::Products;
+use phiw_identification::IdentificationError;
+use phiw_identification::fitting::{Fit, TorqueError};
+use phiw_regressor::least_squares::GroupedFactor;
+
+/// Standard deviations of the parameters whose error on motion held out is expected.
+const EXPECTED_DEVIATIONS: f64 = 2.0;
+
+impl Search<'_> {
+    /// Which residuals have structure, and what they follow.
+    ///
+    /// Structure is what motion foretells on data that were not fitted; what wanders, with a correlation over
+    /// seconds that no sensor's noise has; and what hangs together on one joint and not on others. A residual that is larger than noise and neither is a slow
+    /// disturbance that follows nothing measured; it accuses nobody.
+    pub(super) fn remaining(
+        &self,
+        held_out: &[GroupedFactor],
+        error: &TorqueError,
+        fit: &Fit,
+    ) -> Result<Remaining, IdentificationError> {
+        let expected = self.expected_squares(held_out, fit)?;
+        let large: Vec<usize> =
+            (0..error.rmse.len()).filter(|&row| self.is_large(row, error.rmse[row], expected[row])).collect();
+        let mut remaining =
+            Remaining { unidentifiable: self.chosen.unidentifiable.clone(), ..Remaining::default() };
+        if large.is_empty() {
+            return Ok(remaining);
+        }
+        let positions: Vec<(f64, f64)> =
+            self.input.ranges.joints.iter().map(|joint| joint.position).collect();
+        let data = self.fixed.data;
+        let folds = [data.train.as_slice(), &data.held_out].concat();
+        let shape = residual_shape(&self.design()?, &self.parameters, &folds, &data.sources, &positions)?;
+        let fit = probe::Fit {
+            lines: &shape.time_frequencies,
+            fixed: self.fixed,
+            specs: &self.specs,
+            parameters: &self.parameters,
+            ranges: &self.input.ranges,
+            false_alarm: self.options.false_structure_probability,
+        };
+        let following = probe::following(fit, &large)?;
+        let over = |row: usize| error.rmse[row] / self.input.noise_floor[row];
+        let nearest = (0..error.rmse.len()).map(over).fold(f64::INFINITY, f64::min).max(1.0);
+        let stands_out = |row: usize| {
+            over(row) > self.options.structured_ratio * nearest
+                && shape.autocorrelation[row].abs() > self.options.structured_correlation
+        };
+        let wanders = |row: usize| shape.wander[row] > self.options.wander;
+        let is_structured = |row: &usize| following.contains(row) || wanders(*row) || stands_out(*row);
+        let (structured, colour): (Vec<usize>, Vec<usize>) = large.into_iter().partition(is_structured);
+        let name = |row: usize| self.fixed.tree.joint(row).joint.clone();
+        let disturbance = |&row: &usize| Disturbance {
+            joint: name(row),
+            rmse: error.rmse[row],
+            noise_floor: self.input.noise_floor[row],
+            autocorrelation: shape.autocorrelation[row],
+        };
+        remaining.disturbances = colour.iter().map(disturbance).collect();
+        remaining.depends_on = probe::probe(fit, &structured)?;
+        remaining.joints = structured.into_iter().map(name).collect();
+        Ok(remaining)
+    }
+
+    /// Whether a residual (RMS) is more than noise, and more than what the parameters' own uncertainty makes
+    /// of this motion.
+    fn is_large(&self, row: usize, rmse: f64, expected: Expected) -> bool {
+        let left = (rmse * rmse - expected.of_parameters).max(0.0).sqrt();
+        left > self.options.floor_margin * self.input.noise_floor[row]
+            && left > self.options.structured_share * expected.torque.sqrt()
+            && !self.is_as_it_was(row, rmse)
+    }
+
+    /// Of each torque on motion held out: its mean square, and that of the error that parameters make which
+    /// are a few standard deviations off: mean φᵀΣφ.
+    fn expected_squares(
+        &self,
+        held_out: &[GroupedFactor],
+        fit: &Fit,
+    ) -> Result<Vec<Expected>, IdentificationError> {
+        let deviations = match self.fixed.prior {
+            Some(_) => Vec::new(),
+            None => fit.covariance.deviations(fit.parameters.len())?,
+        };
+        let torques = held_out.first().map_or(0, |fold| fold.groups().len());
+        let of_torque = |torque: usize| {
+            let Some(first) = held_out.first() else { return Expected::default() };
+            let parameters = &first.groups()[torque].parameters;
+            let mut products = Products::zero(parameters.len() + 1);
+            held_out
+                .iter()
+                .for_each(|fold| products.add(&Products::of_factor(&fold.groups()[torque].factor)));
+            let squares = |deviation: &Vec<f64>| {
+                let values = parameters.iter().map(|&parameter| deviation[parameter]);
+                products.size_of(&values.enumerate().collect::<Vec<(usize, f64)>>())
+            };
+            let rows = products.rows().max(1.0);
+            let of_parameters: f64 = deviations.iter().map(squares).sum();
+            Expected {
+                torque: products.right_hand_side() / rows,
+                of_parameters: EXPECTED_DEVIATIONS.powi(2) * of_parameters / rows,
+            }
+        };
+        Ok((0..torques).map(of_torque).collect())
+    }
+}
+
+/// Mean squares on motion held out \[(N·m)², N²\].
+#[derive(Clone, Copy, Default)]
+struct Expected {
+    torque: f64,
+    of_parameters: f64,
+}
