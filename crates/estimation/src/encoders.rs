@@ -1,9 +1,10 @@
 //! The motion at each command, from encoders alone.
 //!
-//! A command is held until the next, and with it, nearly, the acceleration. So a joint's angle is a quadratic
-//! spline with a knot at each command: it is continuous, its speed is continuous, and its acceleration jumps
-//! where a command, or the noise in it, does. A filter would smear such a jump over the periods around it, and
-//! what the noise of a period has done to the motion would be in the periods before it.
+//! A command is held until the next, and with it, nearly, the acceleration: friction takes some of it within
+//! the period. So a joint's angle is a cubic between commands: it is continuous, its speed is continuous, and
+//! its acceleration jumps where a command, or the noise in it, does. A filter would smear such a jump over the
+//! periods around it, and what the noise of a period has done to the motion would be in the periods before it.
+//! (Were the acceleration constant in each period, frictions would come out a third too large.)
 //!
 //! Where encoders are read several times a period, their readings alone decide. Where they are read once a
 //! period, a speed that alternates from knot to knot is not seen by them: the accelerations are then held to
@@ -14,6 +15,9 @@ use phiw_telemetry::Recording;
 
 /// Periods on either side over which the mean acceleration is taken.
 const NEIGHBOURS: usize = 5;
+/// Standard deviation of what an acceleration changes by within a period, over that of the acceleration: a
+/// forearm behind a large gear loses a third to friction.
+const CHANGE: f64 = 0.3;
 /// Standard deviation of rounding to a step, over the step: 1/√12.
 const ROUNDING: f64 = 0.288_675_134_594_812_9;
 
@@ -39,11 +43,10 @@ impl MotionLog {
         (log.q, log.qd) = (vec![0.0; rows * joints], vec![0.0; rows * joints]);
         for joint in 0..joints {
             let angles: Vec<f64> = recording.q.iter().skip(joint).step_by(joints).copied().collect();
-            let coefficients = Spline { places: &places, angles: &angles, periods }.fit(step);
-            for row in 0..rows {
-                let [c0, c1] = [coefficients[row], coefficients[row + 1]];
-                log.q[row * joints + joint] = 0.5 * (c0 + c1);
-                log.qd[row * joints + joint] = (c1 - c0) / period_s;
+            let knots = Spline { places: &places, angles: &angles, periods }.fit(step);
+            for (row, knot) in knots.chunks_exact(2).enumerate() {
+                log.q[row * joints + joint] = knot[0];
+                log.qd[row * joints + joint] = knot[1] / period_s;
             }
         }
         let mut nearest = 0;
@@ -68,23 +71,24 @@ struct Spline<'a> {
 }
 
 impl Spline<'_> {
-    /// The coefficients of the quadratic B-splines: two more than periods. The angle at knot k is the mean of
-    /// coefficients k and k + 1, the speed their difference a period.
+    /// Angle, and speed times the period, at each knot.
     fn fit(&self, step: f64) -> Vec<f64> {
         let expected = self.expected();
         let spread = self.spread(&expected, step);
-        let noise = (ROUNDING * step).max(1e-9 * spread.max(f64::MIN_POSITIVE)).max(1e-12);
-        let mut system = Banded::new(self.periods + 2);
+        let noise = (ROUNDING * step).max(1e-9 * spread).max(1e-12);
+        let mut system = Banded::new(2 * (self.periods + 1));
         for (&place, &angle) in self.places.iter().zip(self.angles) {
             let first = (place.max(0.0) as usize).min(self.periods - 1);
             let x = place - first as f64;
-            let shares = [0.5 * (1.0 - x) * (1.0 - x), 0.5 + x - x * x, 0.5 * x * x];
-            system.add(first, shares, angle, 1.0);
+            let y = 1.0 - x;
+            let shares = [(1.0 + 2.0 * x) * y * y, x * y * y, x * x * (1.0 + 2.0 * y), -x * x * y];
+            system.add(2 * first, shares, angle, 1.0);
         }
-        // An acceleration times the period's square is the second difference of the coefficients.
-        let weight = if spread > 0.0 { (noise / spread).powi(2) } else { 1.0 };
+        let weight = |spread: f64| if spread > 0.0 { (noise / spread).powi(2) } else { 1.0 };
         for (period, &acceleration) in expected.iter().enumerate() {
-            system.add(period, [1.0, -2.0, 1.0], acceleration, weight);
+            // The mean acceleration, times the period's square, and how far it changes within the period.
+            system.add(2 * period, [0.0, -1.0, 0.0, 1.0], acceleration, weight(spread));
+            system.add(2 * period, [12.0, 6.0, -12.0, 6.0], 0.0, weight(CHANGE * spread));
         }
         system.solve()
     }
@@ -131,20 +135,23 @@ impl Spline<'_> {
     }
 }
 
-/// Normal equations of neighbouring triples of unknowns.
+/// Unknowns that one equation has: two of each of two knots.
+const WIDTH: usize = 4;
+
+/// Normal equations of neighbouring unknowns.
 struct Banded {
-    /// Diagonal and the two below, of each unknown.
-    rows: Vec<[f64; 3]>,
+    /// Diagonal and what is left of it, of each row.
+    rows: Vec<[f64; WIDTH]>,
     right: Vec<f64>,
 }
 
 impl Banded {
     fn new(size: usize) -> Self {
-        Banded { rows: vec![[0.0; 3]; size], right: vec![0.0; size] }
+        Banded { rows: vec![[0.0; WIDTH]; size], right: vec![0.0; size] }
     }
 
     /// weight·(Σ shares·unknowns − value)².
-    fn add(&mut self, first: usize, shares: [f64; 3], value: f64, weight: f64) {
+    fn add(&mut self, first: usize, shares: [f64; WIDTH], value: f64, weight: f64) {
         for (low, left) in shares.iter().enumerate() {
             for (high, right) in shares.iter().enumerate().skip(low) {
                 self.rows[first + high][high - low] += weight * left * right;
@@ -157,26 +164,27 @@ impl Banded {
     fn solve(self) -> Vec<f64> {
         let Banded { mut rows, right: mut x } = self;
         for row in 0..rows.len() {
-            let [mut own, mut one, two] = rows[row];
-            let two = if row > 1 { two / rows[row - 2][0] } else { 0.0 };
-            if row > 0 {
-                let known = if row > 1 { two * rows[row - 1][1] } else { 0.0 };
-                one = (one - known) / rows[row - 1][0];
+            let reach = row.min(WIDTH - 1);
+            for back in (0..=reach).rev() {
+                let column = row - back;
+                // Both rows have entries from `row − reach` on.
+                let known: f64 = (back + 1..=reach)
+                    .filter(|other| other - back < WIDTH)
+                    .map(|other| rows[row][other] * rows[column][other - back])
+                    .sum();
+                let rest = rows[row][back] - known;
+                rows[row][back] = match back {
+                    0 => rest.max(f64::MIN_POSITIVE).sqrt(),
+                    _ => rest / rows[column][0],
+                };
             }
-            own = (own - one * one - two * two).max(f64::MIN_POSITIVE).sqrt();
-            rows[row] = [own, one, two];
-            let known = if row > 0 { one * x[row - 1] } else { 0.0 };
-            let before = if row > 1 { two * x[row - 2] } else { 0.0 };
-            x[row] = (x[row] - known - before) / own;
+            let known: f64 = (1..=reach).map(|back| rows[row][back] * x[row - back]).sum();
+            x[row] = (x[row] - known) / rows[row][0];
         }
         for row in (0..rows.len()).rev() {
             x[row] /= rows[row][0];
-            let [_, one, two] = rows[row];
-            if row > 0 {
-                x[row - 1] -= one * x[row];
-            }
-            if row > 1 {
-                x[row - 2] -= two * x[row];
+            for back in 1..=row.min(WIDTH - 1) {
+                x[row - back] -= rows[row][back] * x[row];
             }
         }
         x
