@@ -6,7 +6,13 @@ mod test;
 mod torture;
 
 use clap::{Parser, Subcommand};
+<<<<<<< HEAD
 use phiw_experiments::{consistent, noise, oracle, paper, plant, retarget, run, synthetic_log, undeclared};
+=======
+use phiw_experiments::{
+    consistent, coverage, oracle, paper, plant, retarget, run, synthetic_log, undeclared,
+};
+>>>>>>> main
 use std::process::ExitCode;
 
 #[derive(Parser)]
@@ -31,10 +37,12 @@ enum Task {
     Torture(torture::Arguments),
     /// Fetch MuJoCo's library into the user's cache folder, with Python's pip.
     Mujoco(mujoco::Arguments),
-    /// Compare with Pinocchio, ezc3d, CVXPY and Clarabel, installed from PyPI into a private environment.
+    /// Compare with Pinocchio, MuJoCo, ezc3d, CVXPY and Clarabel, installed from PyPI into an environment.
     Oracle(oracle::Arguments),
     /// What it costs that identified bodies can exist, on real logs.
     Consistent(consistent::Arguments),
+    /// How often 95 % intervals of parameters and bands of torques hold the truth, on synthetic logs.
+    Coverage(coverage::Arguments),
     /// Robot logs with effects that nobody declared: generate, trace with `phiw explain`, score.
     Undeclared(undeclared::Arguments),
     /// The experiments of the paper's section 5, resumable, on one machine or many.
@@ -48,10 +56,9 @@ enum Task {
 fn main() -> anyhow::Result<ExitCode> {
     let task = Arguments::parse().task;
     mujoco::fetch_if(match &task {
-        Task::Run(_) => true,
         Task::Paper(arguments) => arguments.needs_mujoco(),
         Task::Noise(arguments) => arguments.needs_mujoco(),
-        _ => false,
+        task => matches!(task, Task::Run(_)),
     });
     match task {
         Task::Run(arguments) => run::command(&arguments).map(|()| ExitCode::SUCCESS),
@@ -65,6 +72,7 @@ fn main() -> anyhow::Result<ExitCode> {
         Task::Noise(arguments) => noise::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Plant(arguments) => plant::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Consistent(arguments) => consistent::command(&arguments).map(|()| ExitCode::SUCCESS),
+        Task::Coverage(arguments) => coverage::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Undeclared(arguments) => undeclared::command(&arguments).map(|()| ExitCode::SUCCESS),
     }
 }

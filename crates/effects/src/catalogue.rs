@@ -4,6 +4,7 @@ use crate::declaration::{cannot_act, joint_indices, nearest};
 use crate::{EffectKind, FittedEffect, Mechanisms};
 use crate::{coupling, drift, drive, efficiency, elasticity, external, friction, hysteresis};
 use crate::{position, position_map, sensing};
+use phiw_codegen::JointTorque;
 use phiw_dynamics::Tree;
 use phiw_identification::effect::{EffectError, EffectParameter, JointProperty};
 use phiw_identification::{Effect, EffectCatalogue, EffectSpec};
@@ -82,6 +83,18 @@ impl Catalogue {
     ) -> Mechanisms {
         let found = FittedEffect::new(spec, parameters, fitted);
         self.kind(&spec.kind).map(|kind| kind.mechanisms(&found)).unwrap_or_default()
+    }
+
+    /// The torques that an effect adds as formulas of the present motion, with its fitted values; none for
+    /// one that needs more, and for a kind that is unknown here.
+    pub fn formulas(
+        &self,
+        spec: &EffectSpec,
+        parameters: &[EffectParameter],
+        fitted: &[f64],
+    ) -> Vec<JointTorque> {
+        let found = FittedEffect::new(spec, parameters, fitted);
+        self.kind(&spec.kind).map(|kind| kind.formulas(&found)).unwrap_or_default()
     }
 
     /// What an effect means, with its fitted values; a kind that is unknown here gets its name and numbers.

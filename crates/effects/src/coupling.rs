@@ -6,6 +6,7 @@ use crate::fitted::FittedEffect;
 use crate::friction::WIDTH;
 use crate::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
 use crate::mechanism::{Mechanism, Mechanisms};
+use phiw_codegen::{Expression, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::effect::{
     EffectParameter, Entry, Evaluator, JointProperty, QuadraticForm, QuadraticTerm, Sample,
@@ -180,6 +181,28 @@ impl EffectKind for TransmissionCoupling {
             });
         }
         mechanisms
+    }
+    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
+        let [first, second] = found.joint_names() else { return Vec::new() };
+        let (v, a) = (Expression::velocity, Expression::acceleration);
+        let sign = |factor: f64| (v(first) + factor * v(second)).sign(found.constant(WIDTH));
+        let of_term = |name: &str| match name {
+            "fv_cross" => [Some(v(second)), Some(v(first))],
+            "Ia_cross" => [Some(a(second)), Some(a(first))],
+            "fc_sum" => [Some(sign(1.0)), Some(sign(1.0))],
+            "fc_difference" => [Some(sign(-1.0)), Some(-sign(-1.0))],
+            "fv_of_second_on_first" => [Some(v(second)), None],
+            "fv_of_first_on_second" => [None, Some(v(first))],
+            "fc_of_second_on_first" => [Some(found.sign_of_velocity(second)), None],
+            "fc_of_first_on_second" => [None, Some(found.sign_of_velocity(first))],
+            _ => [None, None],
+        };
+        let torques = |(name, value): (&str, f64)| {
+            let rows = [first, second].into_iter().zip(of_term(name));
+            rows.filter_map(move |(joint, torque)| Some(JointTorque::new(joint, value * torque?)))
+                .collect::<Vec<_>>()
+        };
+        found.named_values().flat_map(torques).collect()
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let chosen = constant(constants, TERMS_CONSTANT, 7.0) as u32;

@@ -4,6 +4,7 @@ use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal};
 use crate::mechanism::{Mechanism, Mechanisms};
+use phiw_codegen::{Expression, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
 use phiw_identification::effect::{JointProperty, Needs, QuadraticForm, Sample};
@@ -60,6 +61,9 @@ impl EffectKind for TorqueOffset {
     fn mechanisms(&self, found: &FittedEffect<'_>) -> Mechanisms {
         motor(found, 1.0, -found.value(0))
     }
+    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
+        found.own_torque(|_| Expression::Constant(found.value(0)))
+    }
     fn seen_against(&self) -> Signal {
         Signal::Position
     }
@@ -90,6 +94,9 @@ impl EffectKind for TorqueGain {
     }
     fn mechanisms(&self, found: &FittedEffect<'_>) -> Mechanisms {
         motor(found, 1.0 / (1.0 + found.value(0)), 0.0)
+    }
+    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
+        found.own_torque(|joint| found.value(0) * Expression::MotionTorque(joint.to_owned()))
     }
     fn seen_against(&self) -> Signal {
         Signal::Torque

@@ -4,6 +4,7 @@ use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
 use crate::fitted::FittedEffect;
 use crate::friction::{WIDTH, few_sign_widths};
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, product, values};
+use phiw_codegen::{Expression, Function, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
 use phiw_identification::effect::{Needs, Sample};
@@ -55,6 +56,16 @@ impl EffectKind for DriveEfficiency {
     }
     fn dissipates(&self) -> bool {
         true
+    }
+    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
+        // |τ|·sign(q̇) where τ·q̇ has this sign, and zero elsewhere.
+        let loss = |joint: &str, side: f64| {
+            let power = Expression::BodyTorque(joint.to_owned()) * found.sign_of_velocity(joint);
+            Expression::velocity(joint).sign(0.0) * (side * power).of(Function::PositivePart)
+        };
+        let side = |name: &str| if name == LOSS_DRIVING { 1.0 } else { -1.0 };
+        let named = found.named_values();
+        named.flat_map(|(name, value)| found.own_torque(|joint| value * loss(joint, side(name)))).collect()
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], constant(constants, WIDTH, 0.0));

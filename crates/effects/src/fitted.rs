@@ -1,5 +1,7 @@
 //! An effect with its fitted values, and its description for a user.
 
+use crate::friction::WIDTH;
+use phiw_codegen::{Expression, JointTorque};
 use phiw_identification::EffectSpec;
 use phiw_identification::effect::EffectParameter;
 
@@ -33,6 +35,11 @@ impl<'a> FittedEffect<'a> {
         self.parameters.iter().zip(self.values).map(|(info, value)| (info.name.as_str(), *value))
     }
 
+    /// Its constants by name, SI units.
+    pub fn constants(&self) -> &'a crate::Constants {
+        &self.spec.constants
+    }
+
     /// One of its constants (SI units), zero if it has none of that name.
     pub fn constant(&self, name: &str) -> f64 {
         self.spec.constants.get(name).copied().unwrap_or_default()
@@ -64,6 +71,19 @@ impl<'a> FittedEffect<'a> {
         let named =
             |(info, value): (&'a EffectParameter, &f64)| (info.name.as_str(), quantity(*value, &info.unit));
         self.parameters.iter().zip(self.values).map(named)
+    }
+
+    /// The sign of a joint's velocity, as smooth as the effect's own constant says.
+    pub(crate) fn sign_of_velocity(&self, joint: &str) -> Expression {
+        Expression::velocity(joint).sign(self.constant(WIDTH))
+    }
+
+    /// Its torque at its only joint, of the joint's name; none where it has not one joint.
+    pub(crate) fn own_torque(&self, torque: impl Fn(&str) -> Expression) -> Vec<JointTorque> {
+        match self.spec.joints.as_slice() {
+            [joint] => vec![JointTorque::new(joint, torque(joint))],
+            _ => Vec::new(),
+        }
     }
 
     /// The amplitude of two parameters that are a sine and a cosine, with their unit.

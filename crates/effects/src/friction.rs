@@ -3,6 +3,7 @@
 use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, product, values};
+use phiw_codegen::{Expression, Function, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
 use phiw_identification::effect::{JointProperty, Needs, QuadraticForm, Sample};
@@ -132,6 +133,14 @@ impl EffectKind for Asymmetric {
         let (joint, halves) = (found.joints(), halves.join(" and "));
         format!("{joint} rubs differently in its two directions: half the difference is {halves}.")
     }
+    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
+        let part = |joint: &str, name: &str, value: f64| match name {
+            "fv_difference" => value * Expression::velocity(joint).magnitude(),
+            _ => value * found.sign_of_velocity(joint).magnitude(),
+        };
+        let named = found.named_values();
+        named.flat_map(|(name, value)| found.own_torque(|joint| part(joint, name, value))).collect()
+    }
     fn form_of(&self) -> &'static [&'static str] {
         &["viscous_friction", "coulomb_friction"]
     }
@@ -173,6 +182,10 @@ impl EffectKind for Quadratic {
         let (joint, coefficient) = (found.joints(), found.quantity(0));
         format!("The friction of {joint} bends with the square of the speed: {coefficient}.")
     }
+    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
+        let velocity = Expression::velocity;
+        found.own_torque(|joint| found.value(0) * (velocity(joint) * velocity(joint).magnitude()))
+    }
     fn form_of(&self) -> &'static [&'static str] {
         &["viscous_friction", "coulomb_friction"]
     }
@@ -192,6 +205,8 @@ pub struct Stribeck;
 
 const STRIBECK_VELOCITY: &str = "stribeck_velocity";
 const EXPONENT: &str = "exponent";
+/// Speed \[rad/s, m/s\] and exponent where a model says nothing of them.
+const STRIBECK_DEFAULTS: (f64, f64) = (0.1, 2.0);
 
 impl EffectKind for Stribeck {
     fn name(&self) -> &str {
@@ -220,6 +235,15 @@ impl EffectKind for Stribeck {
             found.constant(STRIBECK_VELOCITY)
         )
     }
+    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
+        let speed = constant(found.constants(), STRIBECK_VELOCITY, STRIBECK_DEFAULTS.0);
+        let exponent = constant(found.constants(), EXPONENT, STRIBECK_DEFAULTS.1);
+        let of = |joint: &str| {
+            let power = (speed.recip() * Expression::velocity(joint)).of(Function::Power(exponent));
+            found.value(0) * ((-power).of(Function::Exponential) * found.sign_of_velocity(joint))
+        };
+        found.own_torque(of)
+    }
     fn dissipates(&self) -> bool {
         true
     }
@@ -228,8 +252,8 @@ impl EffectKind for Stribeck {
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, width) = (site[0], width_of(constants));
-        let speed = constant(constants, STRIBECK_VELOCITY, 0.1);
-        let exponent = constant(constants, EXPONENT, 2.0);
+        let speed = constant(constants, STRIBECK_VELOCITY, STRIBECK_DEFAULTS.0);
+        let exponent = constant(constants, EXPONENT, STRIBECK_DEFAULTS.1);
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
             let velocity = sample.qd()[joint];
             let relative = (velocity / speed).abs();
@@ -267,6 +291,10 @@ impl EffectKind for LoadDependent {
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         let (joint, share) = (found.joints(), found.value(0));
         format!("The friction of {joint} grows with its load: {share:.3} of the torque that it carries.")
+    }
+    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
+        let load = |joint: &str| Expression::BodyTorque(joint.to_owned()).magnitude();
+        found.own_torque(|joint| found.value(0) * (load(joint) * found.sign_of_velocity(joint)))
     }
     fn seen_against(&self) -> Signal {
         Signal::Torque

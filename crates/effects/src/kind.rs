@@ -2,6 +2,7 @@
 
 use crate::FittedEffect;
 use crate::mechanism::{Mechanism, Mechanisms};
+use phiw_codegen::{Expression, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
 use phiw_identification::effect::JointProperty;
@@ -126,6 +127,21 @@ pub trait EffectKind: Send + Sync {
         };
         let parts = self.joint_property().into_iter().zip(found.joint_names()).map(of_joint);
         Mechanisms { parts: parts.collect(), left_out: Vec::new() }
+    }
+
+    /// The torques that it adds as formulas of the present motion, with its fitted values, for code that is
+    /// generated of a model; by default those of its [`joint_property`](Self::joint_property), and none where
+    /// it has no such property: it is then named as left out.
+    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
+        let (Some(property), [joint]) = (self.joint_property(), found.joint_names()) else {
+            return Vec::new();
+        };
+        let signal = match property {
+            JointProperty::Armature => Expression::acceleration(joint),
+            JointProperty::Damping => Expression::velocity(joint),
+            JointProperty::Friction => found.sign_of_velocity(joint),
+        };
+        vec![JointTorque::new(joint, found.value(0) * signal)]
     }
 
     /// Whether it always takes energy from the motion: its power is that of a brake at every moment, whatever

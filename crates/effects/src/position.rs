@@ -4,6 +4,7 @@ use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant, product, values};
 use crate::mechanism::{Mechanism, Mechanisms};
+use phiw_codegen::{Expression, Function, JointTorque};
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::Effect;
 use phiw_identification::effect::Sample;
@@ -32,6 +33,10 @@ impl EffectKind for JointSpring {
         } else {
             Mechanisms::default()
         }
+    }
+    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
+        let slack = Expression::Constant(-found.value(1));
+        found.own_torque(|joint| found.value(0) * Expression::position(joint) + slack.clone())
     }
     fn seen_against(&self) -> Signal {
         Signal::Position
@@ -70,6 +75,9 @@ impl EffectKind for GravityBalancer {
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         let (joint, amplitude) = (found.joints(), found.amplitude());
         format!("{joint} is counterbalanced: up to {amplitude} as a sine of its angle.")
+    }
+    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
+        found.own_torque(|joint| wave(found, 0, Expression::position(joint)))
     }
     fn seen_against(&self) -> Signal {
         Signal::Position
@@ -123,6 +131,15 @@ impl EffectKind for TorqueRipple {
             periods / std::f64::consts::TAU
         )
     }
+    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
+        let frequency = constant(found.constants(), FREQUENCY, 1.0);
+        let harmonics = found.named_values().count() / 2;
+        let angle =
+            |harmonic: usize, joint: &str| ((harmonic + 1) as f64 * frequency) * Expression::position(joint);
+        let harmonic =
+            |harmonic: usize| found.own_torque(|joint| wave(found, 2 * harmonic, angle(harmonic, joint)));
+        (0..harmonics).flat_map(harmonic).collect()
+    }
     fn seen_against(&self) -> Signal {
         Signal::Position
     }
@@ -140,6 +157,12 @@ impl EffectKind for TorqueRipple {
         let parameters = [free("a1"), free("b1"), free("a2"), free("b2"), free("a3"), free("b3")];
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters[..2 * harmonics], columns))
     }
+}
+
+/// A sine and a cosine, with the values at `place` and behind it as amplitudes.
+fn wave(found: &FittedEffect<'_>, place: usize, angle: Expression) -> Expression {
+    let sine = found.value(place) * angle.clone().of(Function::Sine);
+    sine + found.value(place + 1) * angle.of(Function::Cosine)
 }
 
 /// A stiff torque that sets in near a limit: k·(q − q_stop) beyond `stop`, on the `side` +1 or −1.
@@ -178,6 +201,11 @@ impl EffectKind for EndStop {
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         let (joint, stiffness) = (found.joints(), found.quantity(0));
         format!("{joint} runs into something stiff at {:.3}: {stiffness}.", found.constant(STOP))
+    }
+    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
+        let (stop, side) = (found.constant(STOP), constant(found.constants(), SIDE, 1.0));
+        let beyond = |joint: &str| side * (Expression::position(joint) + Expression::Constant(-stop));
+        found.own_torque(|joint| (found.value(0) * side) * beyond(joint).of(Function::PositivePart))
     }
     fn seen_against(&self) -> Signal {
         Signal::Position

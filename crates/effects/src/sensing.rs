@@ -224,7 +224,7 @@ const REACHED: f64 = 0.9;
 /// reach four times their own RMS.
 const NOISE_PEAK: f64 = 4.0;
 /// What the share of the part beyond the limit that is missing may be.
-const CLIPPED_SHARE: (f64, f64) = (0.5, 1.5);
+const CLIPPED_SHARE: (f64, f64) = (0.8, 1.2);
 
 impl EffectKind for ActuatorSaturation {
     fn name(&self) -> &str {

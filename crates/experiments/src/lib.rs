@@ -13,13 +13,15 @@
 //! | [`undeclared`] | which undeclared effects does `phiw explain` find in logs, and what does it invent? |
 //! | [`plant`] | does it find them in the closed loop of a physics engine, tracked poorly? |
 //! | [`retarget`] | how fast and how close is retargeting, over whole databases and against others? |
-//! | [`oracle`] | do dynamics and C3D reader agree with Pinocchio and ezc3d? |
+//! | [`oracle`] | do dynamics, C3D reader and exported files agree with Pinocchio, ezc3d and MuJoCo? |
 //! | [`consistent`] | what does it cost that identified bodies can exist? |
+//! | [`coverage`] | how often do 95 % intervals and bands hold the truth? |
 //! | [`synthetic_log`] | does memory grow with the length of a log? It makes the log. |
 //!
 //! Unlike the library crates, experiments print, and write where they are told.
 
 pub mod consistent;
+pub mod coverage;
 pub mod environment;
 pub mod noise;
 pub mod oracle;

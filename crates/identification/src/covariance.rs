@@ -1,5 +1,6 @@
 //! The covariance of a fit's parameters.
 
+use crate::prediction_errors::BAND_95;
 use phiw_dynamics::DimensionError;
 use phiw_dynamics::check::check_size;
 use serde::{Deserialize, Serialize};
@@ -23,6 +24,10 @@ pub struct Covariance {
     pub source: CovarianceSource,
     /// The parameters that its rows stand for, ascending: base parameters first, then those of the effects.
     pub parameters: Vec<usize>,
+    /// Folds that were left out one after the other; none in a covariance of another source, or of an earlier
+    /// phiw.
+    #[serde(default)]
+    pub folds: usize,
     /// Its lower triangle, row by row, diagonal included; in the parameters' units.
     pub entries: Vec<f64>,
 }
@@ -32,14 +37,33 @@ const LEFT: f64 = 1e-12;
 
 impl Covariance {
     /// (n−1)/n·Σ d·dᵀ, where the n `deviations` are those of the solutions that leave out a fold each from
-    /// their mean, with a number for every one of `parameters`.
-    pub(crate) fn of_left_out_folds(parameters: &[usize], deviations: &[Vec<f64>]) -> Self {
+    /// their mean, with a number for every one of `parameters`; and s·sᵀ of a shift of them all.
+    pub(crate) fn of_left_out_folds(
+        parameters: &[usize],
+        deviations: &[Vec<f64>],
+        shift: Option<&[f64]>,
+    ) -> Self {
         let count = deviations.len() as f64;
         let entry = |row: usize, column: usize| {
             let sum: f64 = deviations.iter().map(|deviation| deviation[row] * deviation[column]).sum();
-            sum * (count - 1.0) / count.max(1.0)
+            sum * (count - 1.0) / count.max(1.0) + shift.map_or(0.0, |shift| shift[row] * shift[column])
         };
-        Self::of_entries(CovarianceSource::LeftOutFolds, parameters, entry)
+        let covariance = Self::of_entries(CovarianceSource::LeftOutFolds, parameters, entry);
+        Covariance { folds: deviations.len(), ..covariance }
+    }
+
+    /// Standard deviation of the parameter of a row.
+    pub(crate) fn standard_deviation(&self, row: usize) -> f64 {
+        self.entry(row, row).max(0.0).sqrt()
+    }
+
+    /// Standard deviations to each side that a 95 % interval has: Student's quantile for the folds that the
+    /// covariance is of.
+    pub fn quantile_95(&self) -> f64 {
+        match self.folds {
+            0..2 => BAND_95,
+            folds => student_quantile_95((folds - 1) as f64),
+        }
     }
 
     /// From its entries by row and column.
@@ -50,7 +74,7 @@ impl Covariance {
     ) -> Self {
         let triangle = (0..parameters.len()).flat_map(|row| (0..=row).map(move |column| (row, column)));
         let entries = triangle.map(|(row, column)| entry(row, column)).collect();
-        Covariance { source, parameters: parameters.to_vec(), entries }
+        Covariance { source, parameters: parameters.to_vec(), folds: 0, entries }
     }
 
     /// The entry of two of its rows.
@@ -107,9 +131,29 @@ impl Covariance {
     }
 }
 
+/// The 97.5 % quantile of Student's distribution, to 4e-3 from three degrees of freedom on (Abramowitz &
+/// Stegun 26.7.5).
+fn student_quantile_95(freedom: f64) -> f64 {
+    let z = BAND_95;
+    let [z3, z5, z7, z9] = [3, 5, 7, 9].map(|power| z.powi(power));
+    z + (z3 + z) / (4.0 * freedom)
+        + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * freedom.powi(2))
+        + (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * freedom.powi(3))
+        + (79.0 * z9 + 776.0 * z7 + 1482.0 * z5 - 1920.0 * z3 - 945.0 * z) / (92_160.0 * freedom.powi(4))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Tables of Student's distribution.
+    #[test]
+    fn few_folds_have_students_quantile() {
+        for (freedom, expected) in [(3.0, 3.182), (4.0, 2.776), (9.0, 2.262), (30.0, 2.042), (1e6, 1.960)] {
+            let found = student_quantile_95(freedom);
+            assert!((found - expected).abs() < 4e-3, "{freedom}: {found}");
+        }
+    }
 
     fn of_rank(parameters: &[usize], deviations: &[Vec<f64>]) -> Covariance {
         let entry = |row: usize, column: usize| deviations.iter().map(|d| d[row] * d[column]).sum();

@@ -198,8 +198,8 @@ impl Design {
         self
     }
 
-    /// The same with its own model as the reference: `parameters` are those of all its columns. So the columns
-    /// of a fitted model are made wherever it is used.
+    /// The same with its own model as the reference: `parameters` are those of all its columns. So the
+    /// columns of a fitted model are made wherever it is used.
     ///
     /// # Errors
     /// The parameters are not this design's.

@@ -2,6 +2,7 @@
 
 use crate::checks::InputError;
 use crate::covariance::{Covariance, CovarianceSource};
+use crate::jackknife::Jackknife;
 use crate::{Design, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::Factor;
@@ -15,10 +16,17 @@ pub struct Fit {
     /// Standard deviation of each parameter, from leaving out one fold after the other (correlated samples
     /// count as what they are); not a number where there are too few folds.
     pub standard_deviations: Vec<f64>,
+    /// The 95 % interval of each parameter: Student's for the number of folds, about the value that it has
+    /// with the effects' constants free; not numbers where there are too few folds.
+    pub intervals_95: Vec<[f64; 2]>,
     /// Parameters that the logs do not determine: their columns depend on others.
     pub undetermined: Vec<usize>,
     /// Standard deviation of the residual of each torque on the training folds \[N·m, N\].
     pub residual_std: Vec<f64>,
+    /// The same on folds that are left out, less what the parameters' uncertainty has in it \[N·m, N\]: what
+    /// a prediction lacks on motion that the model was not fitted to. Where there are too few folds it is
+    /// `residual_std`.
+    pub left_out_std: Vec<f64>,
     /// The weighted factor of \[Φ f\] that gave the parameters, over `determined()` parameters.
     pub factor: Factor,
     /// Covariance of the `determined()` parameters; its diagonal holds the squares of
@@ -30,6 +38,25 @@ impl Fit {
     /// Parameters that the logs determine, ascending.
     pub fn determined(&self) -> Vec<usize> {
         (0..self.parameters.len()).filter(|parameter| !self.undetermined.contains(parameter)).collect()
+    }
+
+    /// Takes covariance, standard deviations and intervals from the deviations of the solutions that leave
+    /// out a fold each. `shift` is by how much these solutions are about other values than the fit's: the
+    /// standard deviations count it, the intervals are about those values.
+    pub(crate) fn take_deviations(
+        &mut self,
+        determined: &[usize],
+        deviations: &[Vec<f64>],
+        shift: Option<&[f64]>,
+    ) {
+        let about = Covariance::of_left_out_folds(determined, deviations, None);
+        self.covariance = Covariance::of_left_out_folds(determined, deviations, shift);
+        for (place, &parameter) in determined.iter().enumerate() {
+            self.standard_deviations[parameter] = self.covariance.standard_deviation(place);
+            let middle = self.parameters[parameter] + shift.map_or(0.0, |shift| shift[place]);
+            let half = about.quantile_95() * about.standard_deviation(place);
+            self.intervals_95[parameter] = [middle - half, middle + half];
+        }
     }
 }
 
@@ -62,33 +89,33 @@ pub fn fit(design: &Design, folds: &[GroupedFactor]) -> Result<Fit, Identificati
     let solution = weighted_least_squares(&kept)?;
     let weights: Vec<f64> = solution.group_std.iter().map(|std| 1.0 / std).collect();
     let factor = kept.combine(&weights)?;
-    let deviations = jackknife(folds, &determined, &weights)?;
-    let standard_deviations = match &deviations {
-        Some(deviations) => (0..determined.len()).map(|parameter| spread_of(deviations, parameter)).collect(),
-        None => vec![f64::NAN; determined.len()],
-    };
-    let covariance = match &deviations {
-        Some(deviations) => Covariance::of_left_out_folds(&determined, deviations),
-        None => {
-            let unit = factor.unit_covariance()?;
-            Covariance::of_entries(CovarianceSource::LeastSquares, &determined, |row, column| {
-                unit[(row, column)]
-            })
-        }
-    };
-    let spread = |values: &[f64], absent: f64| {
-        let mut all = vec![absent; design.parameter_count()];
-        determined.iter().zip(values).for_each(|(&parameter, value)| all[parameter] = *value);
-        all
-    };
-    Ok(Fit {
-        parameters: spread(&solution.parameters, 0.0),
-        standard_deviations: spread(&standard_deviations, f64::NAN),
+    let selected: Vec<GroupedFactor> =
+        folds.iter().map(|fold| fold.select(&determined)).collect::<Result<_, _>>()?;
+    let jackknife = Jackknife::of(&selected, &weights)?;
+    let unit = factor.unit_covariance()?;
+    let least_squares = |row: usize, column: usize| unit[(row, column)];
+    let mut parameters = vec![0.0; design.parameter_count()];
+    determined
+        .iter()
+        .zip(&solution.parameters)
+        .for_each(|(&parameter, value)| parameters[parameter] = *value);
+    let mut fit = Fit {
+        standard_deviations: vec![f64::NAN; parameters.len()],
+        intervals_95: vec![[f64::NAN; 2]; parameters.len()],
+        parameters,
         undetermined,
+        left_out_std: match &jackknife {
+            Some(jackknife) => jackknife.left_out_std(&selected)?,
+            None => solution.group_std.clone(),
+        },
         residual_std: solution.group_std,
         factor,
-        covariance,
-    })
+        covariance: Covariance::of_entries(CovarianceSource::LeastSquares, &determined, least_squares),
+    };
+    if let Some(jackknife) = jackknife {
+        fit.take_deviations(&determined, &jackknife.deviations(), None);
+    }
+    Ok(fit)
 }
 
 /// The rows of all folds.
@@ -156,52 +183,13 @@ pub(crate) fn undetermined(all: &GroupedFactor) -> Result<Vec<usize>, RegressorE
     Ok(all.combine(&weights)?.undetermined_columns())
 }
 
-/// By how much the solutions that leave out one fold each deviate from their mean, for the delete-one-fold
-/// jackknife (Efron & Stein 1981): folds are long against the residual's correlation, so correlated samples
-/// are not counted as independent ones. `None` where there are too few folds.
-fn jackknife(
-    folds: &[GroupedFactor],
-    determined: &[usize],
-    weights: &[f64],
-) -> Result<Option<Vec<Vec<f64>>>, RegressorError> {
-    let Some(mut solutions) = left_out(folds, determined, weights)? else { return Ok(None) };
-    let count = solutions.len() as f64;
-    let means: Vec<f64> = (0..determined.len())
-        .map(|parameter| solutions.iter().map(|solution| solution[parameter]).sum::<f64>() / count)
-        .collect();
-    for solution in &mut solutions {
-        solution.iter_mut().zip(&means).for_each(|(value, mean)| *value -= mean);
-    }
-    Ok(Some(solutions))
-}
-
 /// The solutions that leave out one fold each; `None` where there are too few folds.
 pub(crate) fn left_out(
     folds: &[GroupedFactor],
     determined: &[usize],
     weights: &[f64],
 ) -> Result<Option<Vec<Vec<f64>>>, RegressorError> {
-    if folds.len() < 4 {
-        return Ok(None);
-    }
-    let weighted: Result<Vec<Factor>, RegressorError> =
-        folds.iter().map(|fold| fold.select(determined)?.combine(weights)).collect();
-    let mut solutions = Vec::with_capacity(folds.len());
-    for factor in phiw_regressor::factor::leave_one_out(&weighted?)? {
-        match factor.solve() {
-            Ok(solution) => solutions.push(solution.parameters),
-            // Without this fold some parameter is not determined, so the folds say nothing about its standard
-            // deviation.
-            Err(RegressorError::RankDeficient { .. }) => return Ok(None),
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(Some(solutions))
-}
-
-/// One parameter's standard deviation, from the deviations of the solutions that leave out a fold each.
-fn spread_of(deviations: &[Vec<f64>], parameter: usize) -> f64 {
-    let square: f64 = deviations.iter().map(|deviation| deviation[parameter].powi(2)).sum();
-    let count = deviations.len() as f64;
-    (square * (count - 1.0) / count).sqrt()
+    let selected: Vec<GroupedFactor> =
+        folds.iter().map(|fold| fold.select(determined)).collect::<Result<_, _>>()?;
+    Ok(Jackknife::of(&selected, weights)?.map(Jackknife::into_solutions))
 }

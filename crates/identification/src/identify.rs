@@ -82,14 +82,18 @@ pub fn identify(
         }
     }
     let needs_reference = design.needs().of_reference();
-    let chosen = choose(&design, &slots, &merge(&folds[..train.len()])?)?;
+    let Choice { chosen, rivals } = choose(&design, &slots, &merge(&folds[..train.len()])?)?;
+    let with_rivals = Rivals::of(&design, &chosen, &rivals, &folds[..train.len()])?;
     let kept: Vec<usize> =
         (0..base.count()).chain(chosen.iter().flat_map(|&effect| design.effect_parameters(effect))).collect();
     for fold in &mut folds {
         *fold = fold.select(&kept)?;
     }
     let design = design.keep(&chosen);
-    let fitted = fit(&design, &folds[..train.len()])?;
+    let mut fitted = fit(&design, &folds[..train.len()])?;
+    if let Some(Rivals { folds, stands_for }) = &with_rivals {
+        crate::rivals::widen(&mut fitted, folds, stands_for)?;
+    }
     let design = design.with_own_reference(&fitted.parameters)?;
     if needs_reference {
         // The error is that of the model as it is used: with its own torque in the columns that need one.
@@ -117,7 +121,7 @@ fn fitted_reference(
     train: &[GroupedFactor],
 ) -> Result<ReferenceModel, IdentificationError> {
     let factors = merge(train)?;
-    let chosen = choose(design, slots, &factors)?;
+    let Choice { chosen, .. } = choose(design, slots, &factors)?;
     let undetermined = undetermined_with(design, &chosen, &factors)?;
     let base = design.base();
     let determined: Vec<usize> = (0..base.count())
@@ -142,10 +146,11 @@ fn choose(
     design: &Design,
     slots: &[Range<usize>],
     factors: &GroupedFactor,
-) -> Result<Vec<usize>, RegressorError> {
+) -> Result<Choice, RegressorError> {
     let mut chosen: Vec<usize> = slots.iter().map(|slot| slot.start).collect();
+    let mut rivals = vec![None; slots.len()];
     if slots.iter().all(|slot| slot.len() <= 1) {
-        return Ok(chosen);
+        return Ok(Choice { chosen, rivals });
     }
     let undetermined = undetermined_with(design, &chosen, factors)?;
     // The columns of the slot that is being chosen are kept even where undetermined, so that all its variants
@@ -179,12 +184,65 @@ fn choose(
             let margin = 0.5 * rest.own_rows(factors) * WORTH_A_VARIANT;
             let simplest = merits.iter().position(|merit| *merit <= best + margin).unwrap_or_default();
             chosen[slot] = variants.start + simplest;
+            rivals[slot] = rival(&merits, simplest).map(|rival| variants.start + rival);
         }
         if chosen == before {
             break;
         }
     }
-    Ok(chosen)
+    Ok(Choice { chosen, rivals })
+}
+
+/// The variant of each slot that was chosen, and the one beside it.
+struct Choice {
+    chosen: Vec<usize>,
+    rivals: Vec<Option<usize>>,
+}
+
+/// The variant that stands for what the choice leaves open: the best, and where that is chosen the better of
+/// its neighbours in the list.
+fn rival(merits: &[f64], chosen: usize) -> Option<usize> {
+    let best = (0..merits.len()).min_by(|&a, &b| merits[a].total_cmp(&merits[b]))?;
+    if best != chosen {
+        return Some(best);
+    }
+    let neighbours = [chosen.checked_sub(1), Some(chosen + 1).filter(|&next| next < merits.len())];
+    neighbours.into_iter().flatten().min_by(|&a, &b| merits[a].total_cmp(&merits[b]))
+}
+
+/// The training folds with the columns of the chosen effects, and those of their rivals behind them.
+struct Rivals {
+    folds: Vec<GroupedFactor>,
+    /// For each rival's column the parameter, of the design of the chosen effects, that it is another form
+    /// of.
+    stands_for: Vec<usize>,
+}
+
+impl Rivals {
+    /// `None` where no effect has a rival.
+    fn of(
+        design: &Design,
+        chosen: &[usize],
+        rivals: &[Option<usize>],
+        train: &[GroupedFactor],
+    ) -> Result<Option<Self>, RegressorError> {
+        let mut columns: Vec<usize> = (0..design.base().count()).collect();
+        let (mut behind, mut stands_for) = (Vec::new(), Vec::new());
+        for (&effect, rival) in chosen.iter().zip(rivals) {
+            let own = design.effect_parameters(effect);
+            if let Some(rival) = rival {
+                behind.extend(design.effect_parameters(*rival));
+                stands_for.extend(columns.len()..columns.len() + own.len());
+            }
+            columns.extend(own);
+        }
+        if behind.is_empty() {
+            return Ok(None);
+        }
+        columns.extend(behind);
+        let folds = train.iter().map(|fold| fold.select(&columns)).collect::<Result<_, _>>()?;
+        Ok(Some(Rivals { folds, stands_for }))
+    }
 }
 
 /// Parameters that the rows do not determine with the `chosen` effects.

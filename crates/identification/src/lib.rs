@@ -17,6 +17,7 @@ mod factor_rows;
 mod fit;
 pub mod held_joints;
 mod identify;
+mod jackknife;
 mod kept_blocks;
 mod log_set;
 mod model_sources;
@@ -25,6 +26,7 @@ mod prediction_errors;
 mod rates;
 mod reference;
 pub mod reproduction;
+mod rivals;
 mod robot_findings;
 mod sample;
 

@@ -95,6 +95,13 @@ impl LogSet {
         Ok(LogSet { train: train.len(), conditioning, surveys })
     }
 
+    /// The same logs, each row of which goes out.
+    pub fn with_every_row(&self) -> Self {
+        let mut conditioning = self.conditioning.clone();
+        conditioning.options.decimation = Some(1);
+        LogSet { surveys: self.surveys.clone(), train: self.train, conditioning }
+    }
+
     /// All surveys: training logs, then those for validation.
     pub fn surveys(&self) -> &[Survey] {
         &self.surveys
@@ -107,8 +114,8 @@ impl LogSet {
     pub fn conditioning(&self) -> &Conditioning {
         &self.conditioning
     }
-    /// Conditions all logs with another cut-off of the parallel filter \[Hz\], one that the training logs told
-    /// (see [`bandwidth`](crate::bandwidth)).
+    /// Conditions all logs with another cut-off of the parallel filter \[Hz\], one that the training logs
+    /// told (see [`bandwidth`](crate::bandwidth)).
     pub fn set_parallel_cutoff(&mut self, cutoff_hz: f64) {
         self.conditioning.parallel_cutoff_hz = cutoff_hz;
     }

@@ -45,6 +45,10 @@ pub struct Model {
     pub effects: Vec<EffectParameters>,
     /// Standard deviation of each torque's residual on the training logs \[N·m, N\].
     pub residual_std: Vec<f64>,
+    /// The same on training motion that is left out of the fit \[N·m, N\] ([`Fit::left_out_std`]); absent
+    /// from a model that an earlier phiw wrote.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left_out_std: Option<Vec<f64>>,
     /// What the fit knew, error included: the weighted factor R of \[Φ f\] over the parameters that were
     /// determined.
     pub factor: FactorRows,
@@ -94,6 +98,10 @@ pub struct NamedParameter {
     pub value: f64,
     /// Its standard deviation; `null` where the logs were too short to tell.
     pub std: Option<f64>,
+    /// Its 95 % interval ([`Fit::intervals_95`]); `null` where the logs were too short to tell, or an earlier
+    /// phiw wrote the file.
+    #[serde(default)]
+    pub interval_95: Option<[f64; 2]>,
     /// Its unit.
     pub unit: String,
 }
@@ -125,8 +133,8 @@ fn finite(value: f64) -> Option<f64> {
 }
 
 impl Model {
-    /// The model of a fit. `declared` is what the user declared, in the form of [`EffectSelector`]; `held` are
-    /// the joints that were held.
+    /// The model of a fit. `declared` is what the user declared, in the form of [`EffectSelector`]; `held`
+    /// are the joints that were held.
     ///
     /// # Errors
     /// The fit is not of this design.
@@ -147,6 +155,8 @@ impl Model {
             name,
             value: fit.parameters[parameter],
             std: finite(fit.standard_deviations[parameter]),
+            interval_95: Some(fit.intervals_95[parameter])
+                .filter(|ends| ends.iter().all(|end| end.is_finite())),
             unit,
         };
         let base_parameter = |index: usize| {
@@ -183,6 +193,7 @@ impl Model {
                 .collect(),
             effects: (0..design.effects().len()).map(effect).collect(),
             residual_std: fit.residual_std.clone(),
+            left_out_std: Some(fit.left_out_std.clone()),
             factor: FactorRows::of(&fit.factor, fit.determined()),
             cutoff_hz,
             rest_speeds: design.rest_speeds().to_vec(),
@@ -274,6 +285,12 @@ impl Model {
         }
         if let Some(std) = self.residual_std.iter().find(|std| !(**std > LARGEST.recip() && usable(std))) {
             return wrong(format!("residual_std holds {std:e}, which is no standard deviation"));
+        }
+        let usable_std = |std: &f64| *std >= 0.0 && usable(std);
+        if let Some(stds) = &self.left_out_std
+            && (stds.len() != self.joints.len() || !stds.iter().all(usable_std))
+        {
+            return wrong(format!("left_out_std is not a list of {} deviations", self.joints.len()));
         }
         let parameters = self.base_parameters.len()
             + self.effects.iter().map(|effect| effect.parameters.len()).sum::<usize>();
@@ -373,6 +390,12 @@ impl Model {
             })
             .collect();
         Ok(ReferenceModel::new(self.identified_tree(tree)?).with_effects(effects?))
+    }
+
+    /// Standard deviation of what a prediction lacks at a torque, the parameters' uncertainty left out
+    /// \[N·m, N\].
+    pub fn noise_std(&self, torque: usize) -> f64 {
+        self.left_out_std.as_ref().unwrap_or(&self.residual_std)[torque]
     }
 
     /// The tree with bodies that can exist; with the least-squares ones where the model has no others.

@@ -3,6 +3,7 @@
 use crate::block_source::try_for_each_batch;
 use crate::covariance::Covariance;
 use crate::design::DesignScratch;
+use crate::prediction_errors::BAND_95;
 use crate::{BlockSource, Design, IdentificationError};
 use phiw_dynamics::DimensionError;
 use phiw_dynamics::check::check_size;
@@ -81,12 +82,16 @@ impl PredictionParts {
         PredictionParts { shares, deviations: Vec::new() }
     }
 
-    /// The same with the deviations of a covariance.
+    /// The same with the deviations of a covariance, scaled so that [`BAND_95`] of the torques' standard
+    /// deviations are their 95 % band, however few folds the covariance is of.
     ///
     /// # Errors
     /// The covariance is not of this design.
     pub fn with_covariance(self, covariance: &Covariance, design: &Design) -> Result<Self, DimensionError> {
-        Ok(PredictionParts { deviations: covariance.deviations(design.parameter_count())?, ..self })
+        let mut deviations = covariance.deviations(design.parameter_count())?;
+        let scale = covariance.quantile_95() / BAND_95;
+        deviations.iter_mut().flatten().for_each(|value| *value *= scale);
+        Ok(PredictionParts { deviations, ..self })
     }
 }
 

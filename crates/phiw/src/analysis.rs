@@ -4,7 +4,7 @@ use crate::session::Session;
 use crate::traces::Traces;
 use crate::{Error, fingerprint, possible_bodies, warnings};
 use phiw_identification::bandwidth::Bandwidth;
-use phiw_identification::consistent::{Consistent, ConsistentSettings, consistent};
+use phiw_identification::consistent::{Consistent, ConsistentSettings, Known, consistent};
 use phiw_identification::effect::JointProperty;
 use phiw_identification::fitting::merge;
 use phiw_identification::{Data, EffectCatalogue, EffectSpec, Identified, Model};
@@ -45,7 +45,7 @@ impl<'a> Analysis<'a> {
         let cutoffs = (conditioning.cutoff_hz, conditioning.parallel_cutoff_hz);
         let model = Model::of_fit(design, fit, &session.declared, &session.held, cutoffs)?
             .with_sources(&session.xml, fingerprint::of_session(session)?);
-        let settings = ConsistentSettings::default();
+        let settings = ConsistentSettings { known: known(session)?, ..ConsistentSettings::default() };
         let consistent =
             consistent(design, fit, &identified.train_folds, &identified.held_out_folds, &settings)?;
         let model = model.with_consistent(design, &consistent)?;
@@ -113,6 +113,27 @@ impl<'a> Analysis<'a> {
         shares.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
         Ok(shares)
     }
+}
+
+/// What the user knows of the bodies.
+fn known(session: &Session) -> Result<Vec<Known>, Error> {
+    let bodies = session.tree.bodies();
+    let mut known = Vec::new();
+    for (link, mass) in &session.arguments.mass {
+        let Some(body) = bodies.iter().position(|body| body.link == *link) else {
+            let links: Vec<&str> = bodies.iter().map(|body| body.link.as_str()).collect();
+            return Err(Error::UnknownLink { link: link.clone(), links: links.join(", ") });
+        };
+        known.push(Known::Mass(body, *mass));
+    }
+    let of_links: f64 = session.arguments.mass.iter().map(|(_, mass)| mass).sum();
+    if let Some(total) = session.arguments.total_mass {
+        if session.arguments.mass.len() >= bodies.len() || of_links >= total {
+            return Err(Error::TotalMass { total, of_links });
+        }
+        known.push(Known::TotalMass(total));
+    }
+    Ok(known)
 }
 
 /// What the sensors' noise alone would leave under the model's inertia \[N·m, N\].

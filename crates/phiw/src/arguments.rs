@@ -1,5 +1,7 @@
 //! The command line.
 
+pub use crate::export::ExportArguments;
+pub use crate::simulate::Backend;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -27,6 +29,9 @@ pub enum Command {
     /// Reproduce logs with an identified model and with its URDF, driven by the measured torque: how fast
     /// they go another way than the robot.
     Simulate(SimulateArguments),
+    /// Write an identified model as other programs take it: C99 and Rust without allocation, a URDF without
+    /// geometry, MJCF, a table of the joints' drives.
+    Export(ExportArguments),
     /// Say what is in logs before anything is fitted: late velocities, torques that are missing or clipped,
     /// units, clocks, and what to do about it.
     Check(CheckArguments),
@@ -46,6 +51,7 @@ impl Command {
             Command::Explain(explain) => explain.session.quiet,
             Command::Predict(predict) => predict.quiet,
             Command::Simulate(simulate) => simulate.quiet,
+            Command::Export(export) => export.quiet,
             Command::Check(check) => check.quiet,
             Command::Retarget(retarget) => retarget.quiet,
             Command::Next(next) => next.quiet,
@@ -120,6 +126,9 @@ pub struct SimulateArguments {
     /// any letters and ? for one: --hold 'left_*'.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
     pub hold: Vec<(String, f64)>,
+    /// What computes the motion; the engines only where phiw was built with the feature `simulators`.
+    #[arg(long, value_enum, default_value_t = Backend::Analytic)]
+    pub backend: Backend,
     /// Folder for simulation.json, simulation.csv and the picture simulation.svg; it is made if it is absent.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -297,6 +306,13 @@ pub struct SessionArguments {
     /// name, * stands for any letters and ? for one: --hold 'left_*'.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
     pub hold: Vec<(String, f64)>,
+    /// Masses that are known, as weighed (kg), of the links that joints carry; what is fixed to a link counts
+    /// with it. They hold for the bodies that are written, not for least squares.
+    #[arg(long, value_name = "LINK=KG,…", value_delimiter = ',', value_parser = known_mass)]
+    pub mass: Vec<(String, f64)>,
+    /// Mass of all links that move, as weighed (kg).
+    #[arg(long, value_name = "KG", value_parser = positive)]
+    pub total_mass: Option<f64>,
     /// Cut-off of the low-pass over positions (Hz); by default chosen from the logs' spectra.
     #[arg(long, value_name = "HZ")]
     pub cutoff_hz: Option<f64>,
@@ -340,6 +356,8 @@ impl SessionArguments {
         option("--validate", paths(&self.validate));
         option("--declare", list(self.declare.clone()));
         option("--hold", list(self.hold.iter().map(held).collect()));
+        option("--mass", list(self.mass.iter().map(|(link, mass)| format!("{link}={mass}")).collect()));
+        option("--total-mass", number(self.total_mass));
         option("--cutoff-hz", number(self.cutoff_hz));
         option("--parallel-cutoff-hz", number(self.parallel_cutoff_hz));
         option("--out", paths(std::slice::from_ref(&self.out)));
@@ -358,6 +376,14 @@ fn held_joint(text: &str) -> Result<(String, f64), String> {
         Ok(number) if number.is_finite() => Ok((joint.to_owned(), number)),
         _ => Err(format!("`{value}` is not a position; write {joint} or {joint}=0.5 (rad or m)")),
     }
+}
+
+/// `LINK=KG`.
+fn known_mass(text: &str) -> Result<(String, f64), String> {
+    let Some((link, mass)) = text.split_once('=') else {
+        return Err(format!("write LINK=KG, for example {text}=2.5"));
+    };
+    Ok((link.trim().to_owned(), positive(mass.trim())?))
 }
 
 /// A number from 0 to 1.

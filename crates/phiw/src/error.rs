@@ -125,6 +125,33 @@ pub enum Error {
         /// Which bodies cannot exist, in words.
         bodies: String,
     },
+    /// A physics engine that this program was built without.
+    #[error(
+        "--backend {backend}: this phiw is built without physics engines; build it with `cargo install phiw --features simulators`, or leave the option \
+         out"
+    )]
+    BackendAbsent {
+        /// The engine.
+        backend: &'static str,
+    },
+    /// A mass is known of a link that no joint carries.
+    #[error("--mass names the link `{link}`, which no joint that moves carries; those are {links}")]
+    UnknownLink {
+        /// What was named.
+        link: String,
+        /// The links that joints carry.
+        links: String,
+    },
+    /// The total mass leaves nothing to the links without a known mass.
+    #[error(
+        "--total-mass {total} kg leaves nothing beside the links of --mass, {of_links} kg together: leave one of the two out"
+    )]
+    TotalMass {
+        /// The total \[kg\].
+        total: f64,
+        /// The sum of the links' \[kg\].
+        of_links: f64,
+    },
     /// Logs without a stretch to reproduce.
     #[error(
         "{logs}: no stretch of {needed} s without a gap, which a reproduction needs; record longer motion"
@@ -282,6 +309,9 @@ pub enum Error {
     /// The identified parameters cannot be written as MJCF.
     #[error("identified.xml: {0}")]
     IdentifiedMjcf(phiw_mjcf::MjcfError),
+    /// No code can be generated of the model.
+    #[error("generated code: {0}")]
+    Generated(phiw_codegen::CodegenError),
     /// All logs of the training together.
     #[error("{logs}: {source}")]
     TrainingLogs {
@@ -321,6 +351,9 @@ impl Error {
             | Error::HeldElsewhere { .. }
             | Error::HeldInSimulation { .. }
             | Error::NotPositiveDefinite { .. }
+            | Error::BackendAbsent { .. }
+            | Error::UnknownLink { .. }
+            | Error::TotalMass { .. }
             | Error::NothingToReproduce { .. }
             | Error::Map { .. }
             | Error::Robot { .. }
@@ -347,6 +380,7 @@ impl Error {
             | Error::Output(_)
             | Error::IdentifiedUrdf(_)
             | Error::IdentifiedMjcf(_)
+            | Error::Generated(_)
             | Error::Json { .. } => 1,
         }
     }

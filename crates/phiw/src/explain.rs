@@ -5,6 +5,7 @@ use crate::arguments::{ExplainArguments, quoted};
 use crate::console::Console;
 use crate::draws::Draws;
 use crate::explain_page;
+use crate::held_out_reproduction::HeldOutReproduction;
 use crate::identify::{Outcome, outputs};
 use crate::model_file::ModelFile;
 use crate::output::take_folder;
@@ -69,15 +70,21 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
     analysis.warnings.extend(tracing.not_judged.iter().map(|(kind, joints)| {
         format!("{kind} of {} could not be judged on these logs (its columns are not finite): not all of it was sought", joints.join(", "))
     }));
+    let reproduction = HeldOutReproduction::of(&analysis)?;
+    analysis.warnings.extend(reproduction.warnings());
     let declared_design = start.design(&session.tree, &session.catalogue)?;
     let mut page = explain_page::page(&analysis, &tracing, declared_design, &data)?;
     page.command_line = command_line(arguments);
+    page.reproduction = reproduction.pictures();
     let in_draws = draws.json().as_ref().map(draws_in_words);
     page.headline.extend(in_draws.clone());
     console.finish();
 
     let mut report = report(&analysis, &tracing);
-    report.phiw.iter_mut().for_each(|program| program.draws = draws.json());
+    report.phiw.iter_mut().for_each(|program| {
+        program.draws = draws.json();
+        program.reproduction = reproduction.json();
+    });
     let files = outputs(&analysis, &report, page.render())?;
     replace_folder(&Disk, &place, &files)?;
     let mut summary = story(&analysis, &tracing, in_draws);

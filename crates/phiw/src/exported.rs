@@ -1,13 +1,52 @@
 //! What of an identified model goes into the files that other programs read, and what does not.
 
 use crate::analysis::Analysis;
-use phiw_effects::Mechanism;
-use phiw_identification::EffectCatalogue;
-use phiw_identification::effect::JointProperty;
+use phiw_dynamics::Tree;
+use phiw_effects::{Catalogue, Mechanism};
+use phiw_identification::effect::{EffectParameter, JointProperty};
+use phiw_identification::model::EffectParameters;
+use phiw_identification::{EffectCatalogue, Model};
 use phiw_mjcf::{FixedTendon, JointModel};
 
 /// How far below zero what is left of a property may be by rounding.
 const ROUNDING: f64 = 1e-9;
+
+/// An identified model and the robot that it is of.
+#[derive(Clone, Copy)]
+pub struct Carried<'a> {
+    /// The robot, with the URDF's inertial parameters.
+    pub tree: &'a Tree,
+    /// The URDF's text.
+    pub xml: &'a str,
+    /// The model.
+    pub model: &'a Model,
+    /// What its effects are.
+    pub catalogue: &'a Catalogue,
+}
+
+impl<'a> Carried<'a> {
+    /// Of an analysis.
+    pub fn of(analysis: &'a Analysis<'_>) -> Self {
+        let session = analysis.session;
+        Carried {
+            tree: &session.tree,
+            xml: &session.xml,
+            model: &analysis.model,
+            catalogue: &session.catalogue,
+        }
+    }
+
+    /// Each effect with what its parameters are and their values over possible bodies.
+    pub fn effects(self) -> impl Iterator<Item = (&'a EffectParameters, Vec<EffectParameter>, Vec<f64>)> {
+        self.model.effects.iter().enumerate().map(move |(index, effect)| {
+            let built = self.catalogue.build(&effect.spec, self.tree);
+            let parameters = built.map(|built| built.parameters()).unwrap_or_default();
+            let value =
+                |at: usize| self.model.consistent_effect(index, at).unwrap_or(effect.parameters[at].value);
+            (effect, parameters, (0..effect.parameters.len()).map(value).collect())
+        })
+    }
+}
 
 /// The model beside its bodies, as MJCF has it.
 pub struct Exported {
@@ -21,11 +60,11 @@ pub struct Exported {
 
 impl Exported {
     /// Of a model's effects; friction that was not identified stays as the URDF declares it.
-    pub fn of(analysis: &Analysis<'_>) -> Self {
-        let tree = &analysis.session.tree;
+    pub fn of(carried: Carried<'_>) -> Self {
+        let tree = carried.tree;
         let of_urdf = |joint: usize| {
             let body = tree.joint(joint);
-            let identified = |property| fitted(analysis, property, &body.joint).is_some();
+            let identified = |property| fitted(carried, property, &body.joint).is_some();
             let declared = |property, value: f64| if identified(property) { 0.0 } else { value.max(0.0) };
             JointModel {
                 damping: declared(JointProperty::Damping, body.damping),
@@ -37,12 +76,8 @@ impl Exported {
         let mut exported = Exported { joints, tendons: Vec::new(), left_out: Vec::new() };
         let mut left_out = LeftOut::default();
         let mut shared = Vec::new();
-        for (index, effect) in analysis.model.effects.iter().enumerate() {
-            let parameters = analysis.identified.design.effects()[index].parameters();
-            let values: Vec<f64> = (0..effect.parameters.len())
-                .map(|at| analysis.model.consistent_effect(index, at).unwrap_or(effect.parameters[at].value))
-                .collect();
-            let mechanisms = analysis.session.catalogue.mechanisms(&effect.spec, &parameters, &values);
+        for (effect, parameters, values) in carried.effects() {
+            let mechanisms = carried.catalogue.mechanisms(&effect.spec, &parameters, &values);
             let (kind, joints) = (&effect.spec.kind, &effect.spec.joints);
             if mechanisms.parts.is_empty() && mechanisms.left_out.is_empty() {
                 left_out.add(kind.clone(), joints);
@@ -52,7 +87,7 @@ impl Exported {
                 match part {
                     Mechanism::Transmission { .. } => shared.push((kind, part)),
                     part => {
-                        if !exported.of_joint(analysis, &part) {
+                        if !exported.of_joint(carried, &part) {
                             left_out.add(format!("{kind} (negative)"), joints);
                         }
                     }
@@ -61,7 +96,7 @@ impl Exported {
         }
         // What crosses over takes a part of the joints' own, so it comes after all of that.
         for (kind, part) in shared {
-            if let Err((why, joints)) = exported.of_transmission(analysis, &part) {
+            if let Err((why, joints)) = exported.of_transmission(carried, &part) {
                 left_out.add(format!("{kind} ({why})"), &joints);
             }
         }
@@ -70,8 +105,8 @@ impl Exported {
     }
 
     /// Takes a part of one joint; `false` if MJCF has no such value.
-    fn of_joint(&mut self, analysis: &Analysis<'_>, part: &Mechanism) -> bool {
-        let tree = &analysis.session.tree;
+    fn of_joint(&mut self, carried: Carried<'_>, part: &Mechanism) -> bool {
+        let tree = carried.tree;
         let (Mechanism::Joint { joint, .. }
         | Mechanism::Spring { joint, .. }
         | Mechanism::Motor { joint, .. }) = part
@@ -101,10 +136,10 @@ impl Exported {
     /// Takes a transmission; else says why not, and of which joints.
     fn of_transmission(
         &mut self,
-        analysis: &Analysis<'_>,
+        carried: Carried<'_>,
         part: &Mechanism,
     ) -> Result<(), (&'static str, Vec<String>)> {
-        let tree = &analysis.session.tree;
+        let tree = carried.tree;
         let Mechanism::Transmission { joints, factors, property, value, crossing_only } = part else {
             return Ok(());
         };
@@ -115,7 +150,7 @@ impl Exported {
         if *value < 0.0 {
             return refused("negative");
         }
-        if *property == JointProperty::Armature && !carries(analysis, first, second) {
+        if *property == JointProperty::Armature && !carries(carried, first, second) {
             return refused("inertia between two branches");
         }
         if *crossing_only {
@@ -158,10 +193,10 @@ fn property_of(model: &mut JointModel, property: JointProperty) -> &mut f64 {
 }
 
 /// Whether one of two joints carries the other.
-fn carries(analysis: &Analysis<'_>, first: usize, second: usize) -> bool {
-    let bodies = analysis.session.tree.bodies();
+fn carries(carried: Carried<'_>, first: usize, second: usize) -> bool {
+    let bodies = carried.tree.bodies();
     let body = |joint: usize| {
-        let name = &analysis.session.tree.joint(joint).joint;
+        let name = &carried.tree.joint(joint).joint;
         bodies.iter().position(|body| body.joint == *name)
     };
     let above = |joint: usize, other: usize| {
@@ -172,13 +207,13 @@ fn carries(analysis: &Analysis<'_>, first: usize, second: usize) -> bool {
 }
 
 /// The parameter of the effect on one joint that is this property of it.
-pub fn fitted(analysis: &Analysis<'_>, property: JointProperty, joint: &str) -> Option<f64> {
-    let catalogue = &analysis.session.catalogue;
+pub fn fitted(carried: Carried<'_>, property: JointProperty, joint: &str) -> Option<f64> {
+    let catalogue = carried.catalogue;
     let is_it = |spec: &phiw_identification::EffectSpec| {
         spec.joints == [joint] && catalogue.joint_property(spec) == Some(property)
     };
-    let effect = analysis.model.effects.iter().position(|effect| is_it(&effect.spec))?;
-    analysis.model.consistent_effect(effect, 0)
+    let effect = carried.model.effects.iter().position(|effect| is_it(&effect.spec))?;
+    carried.model.consistent_effect(effect, 0)
 }
 
 /// What is left out, each with its joints.
@@ -202,8 +237,8 @@ impl LeftOut {
 }
 
 /// The first lines of the comment at the head of a file: whose it is, and what it lacks.
-pub fn header(analysis: &Analysis<'_>, file: &str, left_out: &[String]) -> Vec<String> {
-    let logs: Vec<&str> = analysis
+pub fn header(carried: Carried<'_>, file: &str, left_out: &[String]) -> Vec<String> {
+    let logs: Vec<&str> = carried
         .model
         .data
         .iter()

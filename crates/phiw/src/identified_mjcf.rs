@@ -1,8 +1,7 @@
 //! The identified robot as MJCF.
 
 use crate::Error;
-use crate::analysis::Analysis;
-use crate::exported::{Exported, header};
+use crate::exported::{Carried, Exported, header};
 use phiw_mjcf::{RobotModel, impossible_bodies, write_mjcf};
 
 /// Name of the file.
@@ -13,27 +12,27 @@ pub const FILE: &str = "identified.xml";
 ///
 /// # Errors
 /// A parameter is not finite.
-pub fn identified_mjcf(analysis: &Analysis<'_>) -> Result<String, Error> {
-    let tree = analysis.model.consistent_tree(&analysis.session.tree)?;
-    let exported = Exported::of(analysis);
-    let mut lines = header(analysis, FILE, &exported.left_out);
+pub fn identified_mjcf(carried: Carried<'_>) -> Result<String, Error> {
+    let tree = carried.model.consistent_tree(carried.tree)?;
+    let exported = Exported::of(carried);
+    let mut lines = header(carried, FILE, &exported.left_out);
     lines.push("Friction loss turns at rest at once; geometry is in identified.urdf.".to_owned());
-    lines.extend(refusal(analysis)?);
+    lines.extend(refusal(carried)?);
     let robot = RobotModel { tree: &tree, joints: exported.joints, tendons: exported.tendons, header: lines };
     write_mjcf(&robot).map_err(Error::IdentifiedMjcf)
 }
 
 /// What of the model MJCF lacks, in words.
-pub fn not_expressed(analysis: &Analysis<'_>) -> Vec<String> {
-    Exported::of(analysis).left_out
+pub fn not_expressed(carried: Carried<'_>) -> Vec<String> {
+    Exported::of(carried).left_out
 }
 
 /// Why MuJoCo will not read the file, if it will not.
 ///
 /// # Errors
 /// The model is of another robot.
-pub fn refusal(analysis: &Analysis<'_>) -> Result<Option<String>, Error> {
-    let links = impossible_bodies(&analysis.model.consistent_tree(&analysis.session.tree)?);
+pub fn refusal(carried: Carried<'_>) -> Result<Option<String>, Error> {
+    let links = impossible_bodies(&carried.model.consistent_tree(carried.tree)?);
     Ok((!links.is_empty()).then(|| {
         format!(
             "MuJoCo will refuse {FILE}: no real body has the inertial parameters of {} (its pseudo-inertia is not positive definite).",

@@ -1,8 +1,7 @@
 //! The URDF with the identified parameters in it: those of bodies that can exist.
 
 use crate::Error;
-use crate::analysis::Analysis;
-use crate::exported::{LeftOut, MARK, fitted, header};
+use crate::exported::{Carried, LeftOut, MARK, fitted, header};
 use phiw_dynamics::urdf::{JointFriction, write_identified_urdf};
 use phiw_identification::EffectCatalogue;
 use phiw_identification::effect::JointProperty;
@@ -15,11 +14,11 @@ const EXPRESSED: [JointProperty; 2] = [JointProperty::Damping, JointProperty::Fr
 ///
 /// # Errors
 /// The parameters cannot be expressed.
-pub fn identified_urdf(analysis: &Analysis<'_>) -> Result<String, Error> {
-    let tree = analysis.model.consistent_tree(&analysis.session.tree)?;
+pub fn identified_urdf(carried: Carried<'_>) -> Result<String, Error> {
+    let tree = carried.model.consistent_tree(carried.tree)?;
     let friction = |joint: usize| {
-        let body = analysis.session.tree.joint(joint);
-        let [damping, friction] = EXPRESSED.map(|property| fitted(analysis, property, &body.joint));
+        let body = carried.tree.joint(joint);
+        let [damping, friction] = EXPRESSED.map(|property| fitted(carried, property, &body.joint));
         // What was not identified stays as the URDF declares it.
         (damping.is_some() || friction.is_some()).then(|| JointFriction {
             joint: body.joint.clone(),
@@ -28,19 +27,19 @@ pub fn identified_urdf(analysis: &Analysis<'_>) -> Result<String, Error> {
         })
     };
     let declared: Vec<JointFriction> = (0..tree.joint_count()).filter_map(friction).collect();
-    let text = write_identified_urdf(&analysis.session.xml, &tree, &declared)
+    let text = write_identified_urdf(carried.xml, &tree, &declared)
         .map_err(|source| Error::IdentifiedUrdf(Box::new(source)))?;
-    Ok(with_header(&text, &header(analysis, FILE, &not_expressed(analysis))))
+    Ok(with_header(&text, &header(carried, FILE, &not_expressed(carried))))
 }
 
 /// Name of the file.
 const FILE: &str = "identified.urdf";
 
 /// What of the model the URDF lacks, in words.
-pub fn not_expressed(analysis: &Analysis<'_>) -> Vec<String> {
+pub fn not_expressed(carried: Carried<'_>) -> Vec<String> {
     let mut left_out = LeftOut::default();
-    for effect in &analysis.model.effects {
-        let property = analysis.session.catalogue.joint_property(&effect.spec);
+    for effect in &carried.model.effects {
+        let property = carried.catalogue.joint_property(&effect.spec);
         if !property.is_some_and(|property| EXPRESSED.contains(&property)) {
             left_out.add(effect.spec.kind.clone(), &effect.spec.joints);
         }

@@ -3,6 +3,7 @@
 use crate::analysis::Analysis;
 use crate::arguments::SessionArguments;
 use crate::console::Console;
+use crate::exported::Carried;
 use crate::identified_mjcf::{self, identified_mjcf};
 use crate::identified_urdf::identified_urdf;
 use crate::output::take_folder;
@@ -67,7 +68,7 @@ pub fn outputs(analysis: &Analysis<'_>, report: &ReportJson, page: String) -> Re
         ResultFile::new("model.json", model + "\n"),
         ResultFile::new("report.json", report.to_json().map_err(json("report.json"))?),
         ResultFile::new("report.html", page),
-        ResultFile::new("identified.urdf", identified_urdf(analysis)?),
-        ResultFile::new(identified_mjcf::FILE, identified_mjcf(analysis)?),
+        ResultFile::new("identified.urdf", identified_urdf(Carried::of(analysis))?),
+        ResultFile::new(identified_mjcf::FILE, identified_mjcf(Carried::of(analysis))?),
     ])
 }

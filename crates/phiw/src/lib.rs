@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod actuator_table;
 pub mod analysis;
 pub mod arguments;
 pub mod bandwidth;
@@ -10,10 +11,13 @@ mod draws;
 mod error;
 pub mod explain;
 mod explain_page;
+pub mod export;
 mod exported;
 mod fingerprint;
-pub mod identified_mjcf;
-pub mod identified_urdf;
+mod generated_code;
+mod held_out_reproduction;
+mod identified_mjcf;
+mod identified_urdf;
 pub mod identify;
 mod input;
 mod model_file;

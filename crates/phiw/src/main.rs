@@ -72,6 +72,10 @@ fn told(command: &Command, console: &Console) -> Result<Told, Error> {
             let outcome = phiw::simulate::simulate(arguments, console)?;
             Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
         }
+        Command::Export(arguments) => {
+            let outcome = phiw::export::export(arguments)?;
+            Told { summary: outcome.summary, warnings: Vec::new(), failures: no_failures }
+        }
         Command::Check(arguments) => {
             let outcome = phiw::check::check(arguments, console)?;
             Told { summary: outcome.summary, warnings: Vec::new(), failures: no_failures }

@@ -127,7 +127,10 @@ fn extra_holds(model: &Model, path: &Path, hold: &[(String, f64)]) -> Result<Vec
 }
 
 /// The robot of a model, `also` held.
-fn robot(model: &Model, path: &Path, also: &[(String, f64)]) -> Result<Tree, Error> {
+///
+/// # Errors
+/// The model holds no robot, or one that cannot be read.
+pub(crate) fn robot(model: &Model, path: &Path, also: &[(String, f64)]) -> Result<Tree, Error> {
     let Some(xml) = &model.urdf else { return Err(Error::ModelWithoutRobot { path: path.to_owned() }) };
     let held = model.held.iter().chain(also).cloned().collect();
     let reading = read_urdf(xml, &UrdfOptions { held, snap: true, ..UrdfOptions::default() })

@@ -124,7 +124,7 @@ impl<'a> Table<'a> {
 
     fn take(&mut self, prediction: &Prediction<'_>) -> Result<(), Error> {
         for (row, std) in self.std.iter_mut().enumerate() {
-            *std = prediction.parameter_std[row].hypot(self.used.model.residual_std[row]);
+            *std = prediction.parameter_std[row].hypot(self.used.model.noise_std(row));
         }
         let place = match self.last {
             Some((log, segment, place)) if (log, segment) == (prediction.log, prediction.segment) => {

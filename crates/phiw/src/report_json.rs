@@ -59,6 +59,7 @@ pub fn program(analysis: &Analysis<'_>) -> ProgramJson {
         evidence: Vec::new(),
         unidentifiable: Vec::new(),
         draws: None,
+        reproduction: None,
         consistency: Some(possible_bodies::json(analysis)),
     }
 }

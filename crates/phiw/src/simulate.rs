@@ -1,6 +1,10 @@
 //! `phiw simulate`: logs reproduced by the model and by its URDF, and how fast they go another way.
 
+mod backends;
 mod files;
+
+pub use backends::Backend;
+pub(crate) use files::{picture, worse};
 
 use crate::Error;
 use crate::arguments::SimulateArguments;
@@ -8,13 +12,14 @@ use crate::console::Console;
 use crate::model_use::{ModelUse, Reading};
 use crate::output::check_folder;
 use crate::warnings::of_log;
-use phiw_dynamics::{AnalyticBackend, Tree};
-use phiw_identification::BlockSource;
+use phiw_dynamics::Tree;
 use phiw_identification::reproduction::{
     ErrorGrowth, Plant, ReproductionSettings, Window, collect_windows, reproduce,
 };
+use phiw_identification::{BlockSource, Design, Model};
 use phiw_mjcf::impossible_bodies;
 use phiw_result_folder::{Disk, Lock, check_inputs, replace_folder};
+use phiw_telemetry::Survey;
 use std::path::PathBuf;
 
 /// Names of the files.
@@ -101,6 +106,7 @@ impl Reproduction {
 /// [`Error::exit_status`] tells them apart.
 pub fn simulate(arguments: &SimulateArguments, console: &Console) -> Result<SimulateOutcome, Error> {
     check_folder(&arguments.out)?;
+    backends::check(arguments.backend)?;
     let inputs: Vec<PathBuf> = std::iter::once(&arguments.model).chain(&arguments.logs).cloned().collect();
     check_inputs(&inputs, &FILES.map(|name| arguments.out.join(name)))?;
     let place = Lock::acquire(&arguments.out, "phiw simulate")?;
@@ -115,7 +121,13 @@ pub fn simulate(arguments: &SimulateArguments, console: &Console) -> Result<Simu
     let used = ModelUse::open(&arguments.model, &reading, &progress)?;
     let sources = used.logs.sources(&progress);
     let sources: Vec<&dyn BlockSource> = sources.iter().map(|source| source as &dyn BlockSource).collect();
-    let (settings, windows) = windows(&used, &sources, arguments)?;
+    let total: f64 = used.logs.surveys().iter().map(|survey| survey.duration()).sum();
+    let most = ReproductionSettings::default().most_windows;
+    let Some((settings, windows)) = longest_windows(&sources, total, most)? else {
+        let logs: Vec<String> = arguments.logs.iter().map(|log| log.display().to_string()).collect();
+        let needed = WINDOWS_S[WINDOWS_S.len() - 1];
+        return Err(Error::NothingToReproduce { logs: logs.join(", "), needed });
+    };
     let reproduction = reproduced(&used, &windows, &settings, arguments)?;
     console.finish();
     let mut warnings: Vec<String> = used.logs.surveys().iter().flat_map(of_log).collect();
@@ -126,22 +138,20 @@ pub fn simulate(arguments: &SimulateArguments, console: &Console) -> Result<Simu
     Ok(SimulateOutcome { summary, warnings, reproduction })
 }
 
-/// The longest windows of which the logs have one.
-fn windows(
-    used: &ModelUse,
+/// The longest windows of which the logs have one; at most `most` of them, over `total` seconds of logs.
+pub(crate) fn longest_windows(
     sources: &[&dyn BlockSource],
-    arguments: &SimulateArguments,
-) -> Result<(ReproductionSettings, Vec<Window>), Error> {
-    let total: f64 = used.logs.surveys().iter().map(|survey| survey.duration()).sum();
+    total: f64,
+    most: usize,
+) -> Result<Option<(ReproductionSettings, Vec<Window>)>, Error> {
     for window_s in WINDOWS_S {
         let settings = ReproductionSettings { window_s, ..ReproductionSettings::default() };
-        let windows = collect_windows(sources, window_s, total, settings.most_windows)?;
+        let windows = collect_windows(sources, window_s, total, most)?;
         if !windows.is_empty() {
-            return Ok((settings, windows));
+            return Ok(Some((settings, windows)));
         }
     }
-    let logs: Vec<String> = arguments.logs.iter().map(|log| log.display().to_string()).collect();
-    Err(Error::NothingToReproduce { logs: logs.join(", "), needed: WINDOWS_S[WINDOWS_S.len() - 1] })
+    Ok(None)
 }
 
 fn reproduced(
@@ -150,57 +160,98 @@ fn reproduced(
     settings: &ReproductionSettings,
     arguments: &SimulateArguments,
 ) -> Result<Reproduction, Error> {
-    // Bodies that can exist, and friction that dissipates: what least squares alone finds often cannot move.
-    let identified_tree = used.model.consistent_tree(&used.tree)?;
-    let mut parameters = used.parameters.clone();
-    for effect in 0..used.design.effects().len() {
-        for (at, parameter) in used.design.effect_parameters(effect).enumerate() {
-            parameters[parameter] = used.model.consistent_effect(effect, at).unwrap_or(parameters[parameter]);
-        }
-    }
-    let widths: Vec<f64> = (0..used.tree.joint_count())
-        .map(|joint| used.model.rest_speeds.get(joint).copied().unwrap_or(SIGN_WIDTH))
-        .collect();
-    let identified = || {
-        let backend = Box::new(AnalyticBackend::new(identified_tree.clone()));
-        Ok(Plant::new(backend).with_effects(&used.design, &parameters)?)
+    let subject = Subject {
+        tree: &used.tree,
+        model: &used.model,
+        design: &used.design,
+        parameters: &used.parameters,
+        travel: (0..used.tree.joint_count()).map(|joint| travel(used.logs.surveys(), joint)).collect(),
+        logs: arguments.logs.clone(),
+        backend: arguments.backend,
     };
-    let nominal = || {
-        let backend = Box::new(AnalyticBackend::new(used.tree.clone()));
-        Ok(Plant::new(backend).with_declared_friction(&used.tree, &widths))
-    };
-    let inertia = match inertia(identified().map_err(Error::Simulation)?, windows)? {
-        Ok(inertia) => inertia,
-        Err((log, t)) => {
-            return Err(Error::NotPositiveDefinite {
-                path: arguments.model.clone(),
-                log: arguments.logs[log].clone(),
-                t,
-                bodies: bodies_in_words(&identified_tree),
-            });
-        }
-    };
-    let nominal_refused =
-        inertia_refused(&used.tree, nominal().map_err(Error::Simulation)?, windows, arguments)?;
-    let travel: Vec<f64> = (0..used.tree.joint_count()).map(|joint| travel(used, joint)).collect();
-    let mut cases = Vec::new();
-    for closed in [false, true] {
-        let loop_inertia = closed.then_some(inertia.as_slice());
-        if nominal_refused.is_none() {
-            let growth = reproduce(&nominal, windows, &travel, loop_inertia, settings);
-            cases.push(Case { identified: false, closed, growth: growth.map_err(Error::Simulation)? });
-        }
-        let growth = reproduce(&identified, windows, &travel, loop_inertia, settings);
-        cases.push(Case { identified: true, closed, growth: growth.map_err(Error::Simulation)? });
-    }
-    Ok(Reproduction {
-        windows: windows.len(),
-        window_s: settings.window_s,
-        travel,
-        left_out: Plant::left_out(&used.design),
-        nominal_refused,
-        cases,
+    subject.reproduced(windows, settings, &[false, true])?.map_err(|(log, t)| Error::NotPositiveDefinite {
+        path: arguments.model.clone(),
+        log: arguments.logs[log].clone(),
+        t,
+        bodies: subject
+            .model
+            .consistent_tree(subject.tree)
+            .map_or(String::new(), |tree| bodies_in_words(&tree)),
     })
+}
+
+/// A model that reproduces logs, and its URDF.
+pub(crate) struct Subject<'a> {
+    /// The robot, with the URDF's inertial parameters.
+    pub tree: &'a Tree,
+    /// The model.
+    pub model: &'a Model,
+    /// Its columns.
+    pub design: &'a Design,
+    /// Their parameters by least squares.
+    pub parameters: &'a [f64],
+    /// Travel of each joint in the logs \[rad, m\].
+    pub travel: Vec<f64>,
+    /// The logs.
+    pub logs: Vec<PathBuf>,
+    /// What computes the motion.
+    pub backend: Backend,
+}
+
+impl Subject<'_> {
+    /// Reproduces windows in the loops that are asked for (open: `false`), or gives the log and the time of
+    /// the first pose in which the model's M(q) is not positive definite.
+    pub fn reproduced(
+        &self,
+        windows: &[Window],
+        settings: &ReproductionSettings,
+        loops: &[bool],
+    ) -> Result<Result<Reproduction, (usize, f64)>, Error> {
+        // Bodies that can exist, and friction that dissipates: what least squares alone finds often cannot
+        // move.
+        let identified_tree = self.model.consistent_tree(self.tree)?;
+        let mut parameters = self.parameters.to_vec();
+        for effect in 0..self.design.effects().len() {
+            for (at, parameter) in self.design.effect_parameters(effect).enumerate() {
+                parameters[parameter] =
+                    self.model.consistent_effect(effect, at).unwrap_or(parameters[parameter]);
+            }
+        }
+        let widths: Vec<f64> = (0..self.tree.joint_count())
+            .map(|joint| self.model.rest_speeds.get(joint).copied().unwrap_or(SIGN_WIDTH))
+            .collect();
+        let identified = || {
+            Ok(Plant::new(backends::of(self.backend, &identified_tree)?)
+                .with_effects(self.design, &parameters)?)
+        };
+        let nominal = || {
+            Ok(Plant::new(backends::of(self.backend, self.tree)?).with_declared_friction(self.tree, &widths))
+        };
+        let inertia = match inertia(identified().map_err(Error::Simulation)?, windows)? {
+            Ok(inertia) => inertia,
+            Err(place) => return Ok(Err(place)),
+        };
+        let nominal_refused =
+            inertia_refused(self.tree, nominal().map_err(Error::Simulation)?, windows, &self.logs)?;
+        let mut cases = Vec::new();
+        for &closed in loops {
+            let loop_inertia = closed.then_some(inertia.as_slice());
+            if nominal_refused.is_none() {
+                let growth = reproduce(&nominal, windows, &self.travel, loop_inertia, settings);
+                cases.push(Case { identified: false, closed, growth: growth.map_err(Error::Simulation)? });
+            }
+            let growth = reproduce(&identified, windows, &self.travel, loop_inertia, settings);
+            cases.push(Case { identified: true, closed, growth: growth.map_err(Error::Simulation)? });
+        }
+        Ok(Ok(Reproduction {
+            windows: windows.len(),
+            window_s: settings.window_s,
+            travel: self.travel.clone(),
+            left_out: Plant::left_out(self.design),
+            nominal_refused,
+            cases,
+        }))
+    }
 }
 
 /// Mean of M(q)'s diagonal over the poses of the windows, or the log and time of the first pose in which it
@@ -227,12 +278,12 @@ fn inertia_refused(
     tree: &Tree,
     plant: Plant<'_>,
     windows: &[Window],
-    arguments: &SimulateArguments,
+    logs: &[PathBuf],
 ) -> Result<Option<String>, Error> {
     let said = |(log, t): (usize, f64)| {
         format!(
             "the URDF by itself cannot be simulated: its M(q) is not positive definite at {t:.3} s of {}{}",
-            arguments.logs[log].display(),
+            logs[log].display(),
             bodies_in_words(tree)
         )
     };
@@ -248,7 +299,6 @@ fn bodies_in_words(tree: &Tree) -> String {
 }
 
 /// The longest way of a joint in the logs.
-fn travel(used: &ModelUse, joint: usize) -> f64 {
-    let ways = used.logs.surveys().iter().map(|survey| survey.joints[joint].travel());
-    ways.fold(f64::MIN_POSITIVE, f64::max)
+pub(crate) fn travel(surveys: &[Survey], joint: usize) -> f64 {
+    surveys.iter().map(|survey| survey.joints[joint].travel()).fold(f64::MIN_POSITIVE, f64::max)
 }

@@ -1,6 +1,8 @@
 //! The result in a terminal.
 
 use crate::analysis::Analysis;
+use crate::exported::Carried;
+use crate::generated_code;
 use crate::page::{counted, declared_in_words};
 use crate::possible_bodies;
 use crate::traces::Role;
@@ -108,15 +110,17 @@ fn closing(
 
 /// What the files for other programs lack, and who will refuse them.
 pub fn file_notes(analysis: &Analysis<'_>) -> Vec<String> {
+    let carried = Carried::of(analysis);
     let lacking = [
-        ("identified.urdf", identified_urdf::not_expressed(analysis)),
-        (identified_mjcf::FILE, identified_mjcf::not_expressed(analysis)),
+        ("identified.urdf", identified_urdf::not_expressed(carried)),
+        (identified_mjcf::FILE, identified_mjcf::not_expressed(carried)),
+        ("code of phiw export", generated_code::not_expressed(carried)),
     ];
     let lacking = lacking.iter().filter(|(_, left_out)| !left_out.is_empty());
     let mut notes: Vec<String> = lacking
         .map(|(file, left_out)| format!("{file} cannot express {}: model.json has all", left_out.join("; ")))
         .collect();
-    notes.extend(identified_mjcf::refusal(analysis).ok().flatten());
+    notes.extend(identified_mjcf::refusal(carried).ok().flatten());
     notes
 }
 

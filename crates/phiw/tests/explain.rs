@@ -95,7 +95,16 @@ fn a_missing_friction_is_named_and_the_model_with_it_is_the_next_declared_model(
     assert!(report.after.validate.relative < report.before.validate.relative);
     assert!(printed.contains("joint_2 has Coulomb friction"), "{printed}");
     let page = fs::read_to_string(scene.path("out/report.html")).unwrap();
-    assert!(page.contains("coulomb_friction"));
+    assert!(page.contains("coulomb_friction") && page.contains("id=\"reproduction\""));
+
+    // Moved by the torques held out, the model goes with the robot further than the URDF, which has no
+    // friction.
+    let reproduction = report.phiw.unwrap().reproduction.unwrap();
+    let (identified, nominal) = (reproduction.identified.unwrap(), reproduction.nominal.unwrap());
+    assert!(reproduction.windows > 0 && !identified.share_of_travel.is_empty());
+    for (identified, nominal) in identified.share_of_travel.iter().zip(&nominal.share_of_travel) {
+        assert!(identified < nominal, "{identified} {nominal}");
+    }
 
     // Held, the grown model has nothing left to explain on the same robot.
     let model = scene.path("out/model.json");

@@ -101,3 +101,33 @@ fn a_robot_without_masses_gets_bodies_that_can_exist() {
     assert_eq!(impossible_bodies(&possible.inertial_parameters()), [0; 0]);
     assert_ne!(model.identified_tree(&tree).unwrap().inertial_parameters(), possible.inertial_parameters());
 }
+
+/// A torque never tells all masses: those that were weighed are in the file.
+#[test]
+fn known_masses_are_those_of_the_bodies() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("robot.urdf"), synthetic::URDF).unwrap();
+    synthetic::recording(1, 20.0).write_csv(&path("train.csv")).unwrap();
+    let arguments = |mass: &[(&str, f64)], total_mass| SessionArguments {
+        urdf: path("robot.urdf"),
+        train: vec![path("train.csv")],
+        declare: vec!["viscous_friction".to_owned()],
+        mass: mass.iter().map(|&(link, mass)| (link.to_owned(), mass)).collect(),
+        total_mass,
+        out: path("out"),
+        ..SessionArguments::default()
+    };
+    let outcome = identify(&arguments(&[("link_2", 3.3)], Some(11.0)), &Console::silent()).unwrap();
+    let tree = read_urdf_file(path("out/identified.urdf"), &UrdfOptions::default()).unwrap().tree;
+    let masses: Vec<f64> = tree.bodies().iter().map(|body| body.inertial[0]).collect();
+    assert!((masses[1] - 3.3).abs() < 1e-9 && (masses.iter().sum::<f64>() - 11.0).abs() < 1e-9, "{masses:?}");
+    assert!(outcome.report.phiw.unwrap().consistency.unwrap().certified);
+    let refused = |mass: &[(&str, f64)], total_mass| {
+        let error = identify(&arguments(mass, total_mass), &Console::silent()).err().unwrap();
+        assert_eq!(error.exit_status(), 2);
+        error.to_string()
+    };
+    assert!(refused(&[("tool", 1.0)], None).contains("those are link_1, link_2, link_3"));
+    assert!(refused(&[("link_2", 3.0)], Some(2.0)).contains("leaves nothing"));
+}

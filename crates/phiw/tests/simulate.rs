@@ -165,3 +165,23 @@ fn a_urdf_without_inertia_cannot_be_compared_with() {
     );
     assert!(!stdout.contains("nominal") && stdout.contains("identified, open loop"), "{stdout}");
 }
+
+/// An engine moves the same robot: its errors are those of our own algorithms.
+#[test]
+fn engines_reproduce_alike_where_they_are_built_in() {
+    let scene = Scene::new();
+    if !cfg!(feature = "simulators") {
+        println!("skipped: built without the feature simulators; what it refuses is looked at");
+        return scene.refused(
+            &format!("{SIMULATE} --backend rapier"),
+            &["--backend rapier", "--features simulators"],
+        );
+    }
+    scene.done(SIMULATE);
+    let share = |report: &Value| report["cases"][1]["share_of_travel"][9].as_f64().unwrap();
+    let ours = share(&scene.report());
+    scene.done(&format!("{SIMULATE} --backend rapier"));
+    let report = scene.report();
+    assert_eq!(report["backend"], "rapier");
+    assert!((share(&report) - ours).abs() < 1e-6 * ours, "{} {ours}", share(&report));
+}

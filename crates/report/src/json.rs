@@ -163,9 +163,44 @@ pub struct ProgramJson {
     /// What bootstrap draws of the training motion named, if they were asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub draws: Option<DrawsJson>,
+    /// How far the model goes with the motion held out, moved by its torques; of `phiw explain`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reproduction: Option<ReproductionJson>,
     /// What it costs that the bodies can exist.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub consistency: Option<ConsistencyJson>,
+}
+
+/// Motion held out, reproduced in open loop by the model and by the URDF.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReproductionJson {
+    /// Stretches that were reproduced.
+    pub windows: usize,
+    /// Their length (s).
+    pub window_s: f64,
+    /// Times since the stretch's beginning that errors are told of (s).
+    pub horizon_s: Vec<f64>,
+    /// The model's errors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identified: Option<GrowthJson>,
+    /// The URDF's, where it can be simulated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nominal: Option<GrowthJson>,
+    /// Kinds of effects that have no place in a simulation.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub not_simulated: Vec<String>,
+    /// Why the URDF by itself cannot be simulated, if it cannot.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nominal_refused: Option<String>,
+}
+
+/// Errors of one model, one for each horizon.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct GrowthJson {
+    /// RMS of the position's error over each joint's travel.
+    pub share_of_travel: Vec<f64>,
+    /// Stretches in which some joint was further off than its travel.
+    pub lost: Vec<usize>,
 }
 
 /// Fits at several cut-offs of the filter over columns and torque, compared in one band.

@@ -46,6 +46,8 @@ pub struct IdentificationPage {
     pub remaining: Option<Remaining>,
     /// Measured against predicted torque, joint by joint.
     pub joints: Vec<JointSection>,
+    /// How far the model goes with the motion held out.
+    pub reproduction: Vec<Picture>,
     /// What was done to the logs before the fit.
     pub conditioning: ConditioningSection,
     /// The identified parameters.
@@ -81,6 +83,7 @@ impl IdentificationPage {
             ("effects", "Effects added", effects::markup(&self.effects)),
             ("remaining", "What remains", self.remaining.as_ref().map_or(html! {}, Remaining::markup)),
             ("torques", "Measured and predicted torque", joints::markup(&self.joints)),
+            ("reproduction", "Motion reproduced", pictures(&self.reproduction)),
             ("conditioning", "Conditioning of the logs", self.conditioning.markup()),
             ("parameters", "Parameters", self.parameters.markup()),
             ("base-parameters", "Base parameters", parameters::base_markup(&self.base_parameters)),
@@ -122,6 +125,10 @@ impl IdentificationPage {
             }
         }
     }
+}
+
+fn pictures(pictures: &[Picture]) -> Markup {
+    html! { @for picture in pictures { (picture.markup()) } }
 }
 
 /// A page around its header and its sections, each with its anchor and title.

@@ -105,6 +105,7 @@ fn page(number: f64, joints: usize, samples: usize) -> IdentificationPage {
             }],
         }),
         joints: vec![joint; joints],
+        reproduction: vec![picture()],
         conditioning: ConditioningSection { entries: vec![(word(), word())], pictures: vec![picture()] },
         parameters: ParametersSection {
             rows: vec![ParameterRow { name: word(), value: number, std: number, unit: word() }; 14 * joints],
@@ -217,6 +218,7 @@ fn what_is_absent_does_not_appear() {
         "effects",
         "remaining",
         "torques",
+        "reproduction",
         "conditioning",
         "parameters",
         "base-parameters",

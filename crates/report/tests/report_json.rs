@@ -113,6 +113,7 @@ fn additions_of_the_program_come_last() {
             joints: vec![vec!["joint_1".into(), "joint_2".into()]],
             telling_motion: "one joint alone".into(),
         }],
+        reproduction: None,
         draws: Some(DrawsJson {
             count: 10,
             named: vec![NamedInDrawsJson {

@@ -9,8 +9,8 @@ pub struct CheckSettings {
     /// Share of the velocity's power that a lag costs; 0.0025 is an error of 5 % of its root mean square,
     /// which is that of good frictions.
     pub lag_cost: f64,
-    /// Share of what is unexplained that is left at the lag, below which a lag is one however little it costs:
-    /// a slow joint's velocity is as late as that of a quick one.
+    /// Share of what is unexplained that is left at the lag, below which a lag is one however little it
+    /// costs: a slow joint's velocity is as late as that of a quick one.
     pub lag_left: f64,
     /// Distance of a velocity's scale from 1; gear ratios and radii are known better than this.
     pub scale_error: f64,

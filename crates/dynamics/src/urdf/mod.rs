@@ -5,6 +5,7 @@
 //! [`write_identified_urdf`] writes the tree's parameters into the URDF that it came from.
 
 mod assemble;
+mod bodies_only;
 mod error;
 mod finding;
 mod guard;
@@ -22,6 +23,7 @@ mod splice;
 mod topology;
 mod write;
 
+pub use bodies_only::without_geometry;
 pub use error::UrdfError;
 pub use finding::Finding;
 pub use write::{JointFriction, write_identified_urdf};

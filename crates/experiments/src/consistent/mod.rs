@@ -18,7 +18,7 @@
 //!
 //! Nowhere but to standard output.
 
-mod robots;
+pub(crate) mod robots;
 
 use crate::environment;
 use anyhow::Context;

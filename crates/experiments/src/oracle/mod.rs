@@ -1,19 +1,21 @@
 //! `cargo xtask oracle`: this workspace's dynamics against Pinocchio's, robot by robot, its C3D reader
-//! against ezc3d's, and its fit of possible bodies against CVXPY's.
+//! against ezc3d's, its fit of possible bodies against CVXPY's, and the files of identified robots in other
+//! programs.
 //!
 //! # What it asks
 //!
 //! Whether independent programs compute the same. Regressor, inverse dynamics, mass matrix, forward dynamics
 //! and centre of mass are compared at random states of every robot at hand and of random ones, on fixed and
 //! floating bases; C3D files coordinate by coordinate; the optimum over possible bodies on random problems of
-//! real robots.
+//! real robots; the torques and mass matrices of identified.urdf and identified.xml in MuJoCo (pinned, and
+//! the newest), Pinocchio and Rapier.
 //!
 //! # How it is run
 //!
 //! `cargo xtask oracle`, or one part of it: `cargo xtask oracle dynamics`, `cargo xtask oracle c3d`,
-//! `cargo xtask oracle consistency`. It needs
-//! Python 3.10 or later, and a network the first time: Pinocchio, ezc3d, CVXPY and Clarabel are
-//! installed from PyPI, pinned.
+//! `cargo xtask oracle consistency`, `cargo xtask oracle export`. It needs
+//! Python 3.10 or later, and a network the first time: Pinocchio, ezc3d, CVXPY, Clarabel and MuJoCo are
+//! installed from PyPI, pinned. Robots whose logs are absent are skipped.
 //! For this reason it is not part of `cargo xtask test`.
 //!
 //! # What it prints
@@ -31,6 +33,8 @@ mod c3d;
 mod case;
 mod comparison;
 mod consistency;
+mod export;
+mod generated;
 mod pinocchio;
 pub(crate) mod python;
 
@@ -77,6 +81,8 @@ enum Part {
     C3d,
     /// Possible bodies that fit best, against CVXPY and Clarabel.
     Consistency,
+    /// Files of identified robots, in MuJoCo, Pinocchio and Rapier.
+    Export,
 }
 
 /// Prints tables of differences; fails if one is too large.
@@ -84,14 +90,23 @@ enum Part {
 /// # Errors
 /// The packages cannot be installed, a robot or recording cannot be read, or a package fails on it.
 pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let python = Python::install(&arguments.python, "oracle-python", REQUIREMENTS)?;
     let asked = |part| arguments.part.is_none_or(|only| only == part);
+    let files_agree = !asked(Part::Export)
+        || export::compare(&arguments.python, &environment::workspace_root()?, arguments.seed)?;
+    if arguments.part == Some(Part::Export) {
+        return Ok(if files_agree { ExitCode::SUCCESS } else { ExitCode::FAILURE });
+    }
+    let python = Python::install(&arguments.python, "oracle-python", REQUIREMENTS)?;
     let recordings_agree = !asked(Part::C3d) || c3d::compare(&python)?;
     let workspace = environment::workspace_root()?;
     let optima_agree = !asked(Part::Consistency)
         || consistency::compare(&python, &workspace, arguments.problems, arguments.seed)?;
     let dynamics_agree = !asked(Part::Dynamics) || dynamics(python, arguments)?;
-    Ok(if recordings_agree && optima_agree && dynamics_agree { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if files_agree && recordings_agree && optima_agree && dynamics_agree {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
 }
 
 /// Prints the table of differences to Pinocchio; whether all are small.

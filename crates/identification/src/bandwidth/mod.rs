@@ -1,13 +1,13 @@
-//! What the cut-off of the parallel filter does to the parameters: fits at several cut-offs, compared by their
-//! leave-fold-out errors in one band.
+//! What the cut-off of the parallel filter does to the parameters: fits at several cut-offs, compared by
+//! their leave-fold-out errors in one band.
 //!
 //! In its own band a low cut-off always looks good, since it leaves out of the error what the model cannot
 //! follow. So every fit is judged by the rows of one cut-off, the reference: the one that the logs are
 //! conditioned with, in whose band the report's errors are.
 //!
 //! The comparison says what to expect of another cut-off; it does not set one. Least squares are best in the
-//! band that they are fitted in, so another cut-off can only win there by its smaller scatter, which it does on
-//! none of six real robots (docs/results/bandwidth.md).
+//! band that they are fitted in, so another cut-off can only win there by its smaller scatter, which it does
+//! on none of six real robots (docs/results/bandwidth.md).
 
 mod choice;
 mod stretches;
@@ -36,11 +36,11 @@ pub struct BandwidthSettings {
     pub seconds: f64,
     /// Samples that are used; they are held in memory.
     pub samples: usize,
-    /// Parameters of a fit; a larger one is not compared, since a comparison takes the cube of their number. A
-    /// robot of 18 joints with friction has 168, one of 30 about 300.
+    /// Parameters of a fit; a larger one is not compared, since a comparison takes the cube of their number.
+    /// A robot of 18 joints with friction has 168, one of 30 about 300.
     pub parameters: usize,
-    /// Standard errors, over the folds, by which another cut-off must be better than the reference. None is by
-    /// two on any of the six real robots of docs/results/bandwidth.md, nor by 2.5 on 90 right models of
+    /// Standard errors, over the folds, by which another cut-off must be better than the reference. None is
+    /// by two on any of the six real robots of docs/results/bandwidth.md, nor by 2.5 on 90 right models of
     /// `cargo xtask undeclared --suite control,wide_right --seeds dev`.
     pub standard_errors: f64,
     /// Share of the reference's error variance that another cut-off must save.

@@ -7,7 +7,7 @@ use crate::model_use::ModelUse;
 use crate::page::counted;
 use crate::summary::write_table;
 use phiw_report::number::percent;
-use phiw_report::plot::{self, GrowthLine, Line};
+use phiw_report::plot::{self, GrowthLine, Line, Svg};
 use phiw_result_folder::ResultFile;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -28,7 +28,7 @@ pub fn files(
     Ok(vec![
         ResultFile::new(json_name, text + "\n"),
         ResultFile::new(csv_name, table(used, reproduction)),
-        ResultFile::new(svg_name, picture(reproduction)),
+        ResultFile::new(svg_name, picture(reproduction).as_str()),
     ])
 }
 
@@ -59,7 +59,7 @@ fn report(
         "schema": 1,
         "robot": used.tree.name(),
         "model": arguments.model.display().to_string(),
-        "backend": "analytic",
+        "backend": arguments.backend.name(),
         "logs": arguments.logs.iter().map(|log| log.display().to_string()).collect::<Vec<_>>(),
         "windows": reproduction.windows,
         "window_s": reproduction.window_s,
@@ -91,7 +91,8 @@ fn table(used: &ModelUse, reproduction: &Reproduction) -> String {
     text
 }
 
-fn picture(reproduction: &Reproduction) -> String {
+/// Errors against the horizon.
+pub(crate) fn picture(reproduction: &Reproduction) -> Svg {
     let shown: Vec<(String, Vec<f64>)> = reproduction
         .cases
         .iter()
@@ -103,7 +104,7 @@ fn picture(reproduction: &Reproduction) -> String {
         .map(|((name, shares), case)| GrowthLine { name, line: Line { x: &case.growth.horizons, y: shares } })
         .collect();
     let growth = plot::ErrorGrowth { lines: &lines, y_label: "position error [% of travel]" };
-    plot::error_growth(&growth).as_str().to_owned()
+    plot::error_growth(&growth)
 }
 
 /// Where the URDF does better, what is not simulated, and whether the URDF could be.
@@ -115,13 +116,20 @@ pub fn warnings(reproduction: &Reproduction) -> Vec<String> {
             "{kinds} has no place in a simulation and is left out of it: the errors are larger for that"
         ));
     }
+    warnings.extend(worse(reproduction));
+    warnings
+}
+
+/// Where the URDF does better, in words.
+pub(crate) fn worse(reproduction: &Reproduction) -> Vec<String> {
+    let mut worse = Vec::new();
     for closed in [false, true] {
         let both = (reproduction.growth(false, closed), reproduction.growth(true, closed));
         let (Some(nominal), Some(identified)) = both else { continue };
         for (horizon, place) in reproduction.told() {
             let (of_urdf, of_model) = (nominal.share_of_travel[place], identified.share_of_travel[place]);
             if of_model > of_urdf {
-                warnings.push(format!(
+                worse.push(format!(
                     "the identified model reproduces the logs worse than the URDF over {horizon} s in {} loop: {} % of the travel against {} %",
                     if closed { "closed" } else { "open" },
                     percent(of_model),
@@ -130,7 +138,7 @@ pub fn warnings(reproduction: &Reproduction) -> Vec<String> {
             }
         }
     }
-    warnings
+    worse
 }
 
 /// Errors at the horizons that are told.

@@ -8,9 +8,9 @@ use super::search::{LEAST_STEP, Search};
 const BEGINNINGS: usize = 3;
 
 impl Search<'_> {
-    /// For each torque to which two or more members were added beside what the textbook has: whether others in
-    /// the place of all of them make the criterion smaller. Each of the best hypotheses begins once; what else
-    /// acts on this torque then follows as in a forward step, and what is not needed is left out.
+    /// For each torque to which two or more members were added beside what the textbook has: whether others
+    /// in the place of all of them make the criterion smaller. Each of the best hypotheses begins once; what
+    /// else acts on this torque then follows as in a forward step, and what is not needed is left out.
     pub(super) fn choose_anew(&mut self) -> bool {
         let mut better = false;
         for torque in 0..self.problem.torques.len() {

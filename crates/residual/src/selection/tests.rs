@@ -163,8 +163,8 @@ fn a_form_comes_with_what_it_is_a_form_of() {
     assert_eq!(chosen(&problem, Vec::new()), [(0, 1), (0, 4)]);
 }
 
-/// A torque of little noise was fitted worse, up to the share that is as good as none, for the sake of another
-/// joint: the error of all joints together then spoke against the true effect.
+/// A torque of little noise was fitted worse, up to the share that is as good as none, for the sake of
+/// another joint: the error of all joints together then spoke against the true effect.
 #[test]
 fn a_residual_below_what_is_as_good_as_none_still_counts() {
     let mut random = RandomNumbers::new(7);

@@ -41,15 +41,15 @@ pub struct TraceOptions {
     pub structured_share: f64,
     /// Probability that a torque's residual of noise seems to follow any signal.
     pub false_structure_probability: f64,
-    /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which on it
-    /// is structure if its samples hang together (`structured_correlation`): the noise of a robot's sensors is
-    /// of one colour, and raises all residuals over their floors alike.
+    /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which on
+    /// it is structure if its samples hang together (`structured_correlation`): the noise of a robot's
+    /// sensors is of one colour, and raises all residuals over their floors alike.
     pub structured_ratio: f64,
     /// Correlation of a residual's samples a quarter to half a second apart, less what the filter gives to
     /// noise, from which on they hang together.
     pub structured_correlation: f64,
-    /// Correlation of a residual's samples 2.5 s apart from which on it wanders, whatever it follows: noise of
-    /// up to 1 s of correlation has less than a tenth.
+    /// Correlation of a residual's samples 2.5 s apart from which on it wanders, whatever it follows: noise
+    /// of up to 1 s of correlation has less than a tenth.
     pub wander: f64,
     /// Torques whose residual is to be explained: what acts on none of them is no candidate. `None`: all.
     pub torques: Option<Vec<usize>>,

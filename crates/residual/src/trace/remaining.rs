@@ -16,8 +16,9 @@ impl Search<'_> {
     /// Which residuals have structure, and what they follow.
     ///
     /// Structure is what motion foretells on data that were not fitted; what wanders, with a correlation over
-    /// seconds that no sensor's noise has; and what hangs together on one joint and not on others. A residual that is larger than noise and neither is a slow
-    /// disturbance that follows nothing measured; it accuses nobody.
+    /// seconds that no sensor's noise has; and what hangs together on one joint and not on others. A residual
+    /// that is larger than noise and neither is a slow disturbance that follows nothing measured; it accuses
+    /// nobody.
     pub(super) fn remaining(
         &self,
         held_out: &[GroupedFactor],

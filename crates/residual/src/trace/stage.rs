@@ -209,8 +209,8 @@ impl<'a> Fixed<'a> {
         })
     }
 
-    /// Candidates on the same joint of which another is a form. None where the model is held: they are in what
-    /// is held.
+    /// Candidates on the same joint of which another is a form. None where the model is held: they are in
+    /// what is held.
     fn required(
         &self,
         candidates: &Candidates,
