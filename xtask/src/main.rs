@@ -6,13 +6,7 @@ mod test;
 mod torture;
 
 use clap::{Parser, Subcommand};
-<<<<<<< HEAD
-use phiw_experiments::{consistent, noise, oracle, paper, plant, retarget, run, synthetic_log, undeclared};
-=======
-use phiw_experiments::{
-    consistent, coverage, oracle, paper, plant, retarget, run, synthetic_log, undeclared,
-};
->>>>>>> main
+use phiw_experiments::*;
 use std::process::ExitCode;
 
 #[derive(Parser)]
@@ -28,8 +22,7 @@ enum Task {
     Run(run::Arguments),
     /// A log as long as wanted, to see that memory does not grow with it.
     SyntheticLog(synthetic_log::Arguments),
-    /// Retargeting on one page: whole databases, a film of person and robot, mink on the same markers, figure
-    /// 9 of the paper.
+    /// Retargeting on one page: databases, a film of person and robot, mink on the same markers, figure 9.
     Retarget(retarget::Arguments),
     /// All checks of the workspace, and the count of tests.
     Test(test::Arguments),
