@@ -48,11 +48,8 @@ enum Task {
 
 fn main() -> anyhow::Result<ExitCode> {
     let task = Arguments::parse().task;
-    mujoco::fetch_if(match &task {
-        Task::Paper(arguments) => arguments.needs_mujoco(),
-        Task::Noise(arguments) => arguments.needs_mujoco(),
-        task => matches!(task, Task::Run(_)),
-    });
+    let wanted = matches!(&task, Task::Paper(paper) if paper.needs_mujoco());
+    mujoco::fetch_if(wanted || matches!(task, Task::Run(_) | Task::Noise(_)));
     match task {
         Task::Run(arguments) => run::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::SyntheticLog(arguments) => synthetic_log::command(&arguments).map(|()| ExitCode::SUCCESS),

@@ -60,13 +60,6 @@ pub struct Arguments {
     controller: ControllerName,
 }
 
-impl Arguments {
-    /// Whether the runs need MuJoCo's library, which the caller may want to fetch first.
-    pub fn needs_mujoco(&self) -> bool {
-        self.run.backend == crate::plant::engine::Engine::Mujoco
-    }
-}
-
 /// Runs the task.
 ///
 /// # Errors
