@@ -12,12 +12,14 @@ const NEAR_LIMIT: f64 = 0.9;
 const EXACT: f64 = 1e-7;
 
 impl MotionLog {
-    /// The commands, `[row × joint]`: those that were written down, or what the reference tells of them, or
+    /// The commands, `[row × joint]`: those that were written down, or what the reference tells of
+    /// them, or
     /// else the log's own torques.
     ///
     /// From a reference: of all torques that a controller of the form (13) could have given, a
     /// share of its model's torque and a PD on the reference, those nearest to the log's. What the log's
-    /// torques have beside is not of the controller. `limits` are those of the torques \[N·m, N\], at which commands are clipped.
+    /// torques have beside is not of the controller. `limits` are those of the torques \[N·m, N\], at
+    /// which commands are clipped.
     ///
     /// The three coefficients of each joint are fitted to the log, since gains are seldom known.
     pub fn commands(&self, limits: &[f64]) -> Vec<f64> {

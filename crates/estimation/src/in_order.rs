@@ -1,8 +1,10 @@
 //! Rows beside those of the period before: what noise that is correlated in time asks for.
 //!
 //! Where the noise of a period is ρ times that of the period before and something new, the rows
-//! Φ_t − ρ·Φ_{t−1} have the new alone. ρ is not known when a log is read, but R of \[Φ_{t−1} Φ_t\] gives R of
-//! these rows for any ρ. What the log's torque has beside the command ([`MotionLog::commands`]) is a column of
+//! Φ_t − ρ·Φ_{t−1} have the new alone. ρ is not known when a log is read, but R of \[Φ_{t−1} Φ_t\]
+//! gives R of
+//! these rows for any ρ. What the log's torque has beside the command ([`MotionLog::commands`]) is a
+//! column of
 //! its own, so that how much of it the motion felt can be asked later, too.
 
 use crate::{EstimationError, Evidence, MotionLog, foresight};
@@ -14,7 +16,8 @@ use phiw_regressor::least_squares::{Group, GroupedFactor};
 
 /// R of the rows of all torques with those before them.
 ///
-/// The columns of a torque are `[Φ d u]` of the period before, then of the period: u the command, d what the
+/// The columns of a torque are `[Φ d u]` of the period before, then of the period: u the command, d
+/// what the
 /// log's torque has beside it.
 #[derive(Clone, Debug)]
 pub(super) struct InOrder {
@@ -150,8 +153,10 @@ impl InOrder {
         GroupedFactor::new(self.parameters, groups?)
     }
 
-    /// The colour of each torque's noise under parameters `w`: the felt share and the correlation that leave
-    /// least, found one after the other until they stay. `least` is the variance of each torque's noise that
+    /// The colour of each torque's noise under parameters `w`: the felt share and the correlation that
+    /// leave
+    /// least, found one after the other until they stay. `least` is the variance of each torque's noise
+    /// that
     /// nothing is believed to fall short of, and that is white: a residual below it has no colour.
     pub fn colours(&self, w: &[f64], least: &[f64], largest: f64) -> Vec<Colour> {
         let colour = |(group, least): (&Group, &f64)| {
@@ -201,7 +206,8 @@ impl InOrder {
     }
 }
 
-/// Times that the felt share and the correlation are found one after the other: each hardly changes the other.
+/// Times that the felt share and the correlation are found one after the other: each hardly changes the
+/// other.
 const ROUNDS: usize = 5;
 /// Share of a command's square below which what a log has beside it is rounding.
 const DIFFERS: f64 = 1e-12;

@@ -1,7 +1,8 @@
 //! The likelihood of a motion with the noise's size replaced by its most likely value.
 //!
 //! −log L = Σ_t ½‖Φ_t w − f_t‖²_σ + N·Σ log σ_j − Σ_t log det J_t(w) has its least value over σ_j at
-//! σ_j² = S_j/N, S_j = Σ_t (Φ_t w − f_t)_j²; what is left is Σ_j (N/2)·log S_j − Σ_t log det J_t, to which the
+//! σ_j² = S_j/N, S_j = Σ_t (Φ_t w − f_t)_j²; what is left is Σ_j (N/2)·log S_j − Σ_t log det J_t, to
+//! which the
 //! prior is added. (Concentrated likelihood: Barndorff-Nielsen & Cox 1994, section 3.4.)
 
 use super::body_prior::BodyPrior;
@@ -57,7 +58,8 @@ impl Profile<'_> {
         self.squares(w).iter().map(|(rows, square, _)| (square / rows.max(1.0)).sqrt()).collect()
     }
 
-    /// Weight of the instants: they stand for all rows, of which those that follow no other are not counted.
+    /// Weight of the instants: they stand for all rows, of which those that follow no other are not
+    /// counted.
     fn instants_weight(&self) -> f64 {
         let rows = self.factor.groups().iter().map(|group| group.factor.rows()).max().unwrap_or(0) as f64;
         let all: f64 = self.sensitivities.iter().map(|sensitivity| sensitivity.weight).sum();
@@ -141,7 +143,8 @@ impl Profile<'_> {
         Minimum { x, covariance, settled }
     }
 
-    /// Adds the squares' part of gradient and curvature, and returns what is to be taken off the latter as a
+    /// Adds the squares' part of gradient and curvature, and returns what is to be taken off the latter
+    /// as a
     /// matrix times its transpose: σ follows w.
     fn add_squares(&self, w: &Mat<f64>, gradient: &mut Mat<f64>, hessian: &mut Mat<f64>) -> Mat<f64> {
         let groups = self.factor.groups();
@@ -167,7 +170,8 @@ impl Profile<'_> {
         downdates
     }
 
-    /// Moves `x` along −direction as far as the objective falls enough (Armijo); false if it does not fall.
+    /// Moves `x` along −direction as far as the objective falls enough (Armijo); false if it does not
+    /// fall.
     fn line_search(&self, x: &mut Mat<f64>, cost: &mut f64, direction: &Mat<f64>, decrement: f64) -> bool {
         let mut length = 1.0;
         while length > self.newton.shortest_step {

@@ -1,4 +1,5 @@
-//! A robot whose noise nobody knows: sensors that are not exact, and the estimator that finds the noise out.
+//! A robot whose noise nobody knows: sensors that are not exact, and the estimator that finds the noise
+//! out.
 
 mod arm;
 
@@ -62,7 +63,8 @@ fn found(measuring: Measuring) -> (Arm, Found) {
     (arm, Found { error, least_squares, initial, deviations, noise })
 }
 
-/// σ, ρ and where the noise is come with the parameters, from encoders and a torque sensor that is as bad as
+/// σ, ρ and where the noise is come with the parameters, from encoders and a torque sensor that is as
+/// bad as
 /// the actuators.
 #[test]
 fn the_noise_is_found_with_the_parameters() {
@@ -76,7 +78,8 @@ fn the_noise_is_found_with_the_parameters() {
     assert!(found.error < found.initial, "{} from {}", found.error, found.initial);
     assert!(found.deviations < 2.5, "{} standard deviations", found.deviations);
     assert!(found.error < 0.5 * found.least_squares, "{}, (4): {}", found.error, found.least_squares);
-    // The last joint's friction stops it within a period: no cubic follows that, and its noise comes out small.
+    // The last joint's friction stops it within a period: no cubic follows that, and its noise comes
+    // out small.
     for (joint, (noise, truth)) in found.noise.iter().zip(arm.torque_noise()).enumerate().take(6) {
         assert!((noise.std / truth - 1.0).abs() < 0.25, "{joint}: {noise:?}, {truth} N·m");
         assert!((noise.correlation - CORRELATION).abs() < 0.15, "{joint}: {noise:?}");
@@ -84,7 +87,8 @@ fn the_noise_is_found_with_the_parameters() {
     }
 }
 
-/// What was delivered beside the command is in the log, and moved the robot: little is left that is not known.
+/// What was delivered beside the command is in the log, and moved the robot: little is left that is not
+/// known.
 #[test]
 fn a_log_of_what_was_delivered_has_little_noise_left() {
     let measuring = Measuring { logged: LoggedTorque::Delivered, ..Measuring::default() };
