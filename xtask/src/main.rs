@@ -26,8 +26,7 @@ enum Task {
     Retarget(retarget::Arguments),
     /// All checks of the workspace, and the count of tests.
     Test(test::Arguments),
-    /// Hostile inputs, kills and concurrent runs on the release binary: a table of what came of each
-    /// class.
+    /// Hostile inputs, kills and concurrent runs on the release binary: a table of what came of each class.
     Torture(torture::Arguments),
     /// Fetch MuJoCo's library into the user's cache folder, with Python's pip.
     Mujoco(mujoco::Arguments),
@@ -43,8 +42,7 @@ enum Task {
     Paper(paper::Arguments),
     /// The curriculum on a robot whose noise nobody knows: estimators, sensors and noises compared.
     Noise(noise::Arguments),
-    /// Robots in physics engines with one secret each, tracked poorly: log, trace with `phiw explain`,
-    /// score.
+    /// Robots in physics engines with one secret each, tracked poorly: log, trace with `phiw explain`, score.
     Plant(plant::Arguments),
 }
 
@@ -74,8 +72,7 @@ mod tests {
     use super::Arguments;
     use clap::CommandFactory;
 
-    /// Units in doc comments are escaped for rustdoc. `cargo xtask plant --help` showed the escapes:
-    /// `\[s\]`.
+    /// Units in doc comments are escaped for rustdoc. `cargo xtask plant --help` showed the escapes: `\[s\]`.
     #[test]
     fn help_has_no_escapes_of_rustdoc() {
         let mut command = Arguments::command();

@@ -58,8 +58,7 @@ const WHEELS: [Wheel; 4] = [
 /// Fetches the library unless it is there, and says where it is.
 ///
 /// # Errors
-/// There is no wheel for this platform, pip can not fetch it, it is not the pinned one, or the library
-/// in it
+/// There is no wheel for this platform, pip can not fetch it, it is not the pinned one, or the library in it
 /// does not load.
 pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let path = fetch(&arguments.python)?;
@@ -67,8 +66,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Fetches the library where it is `wanted` and absent, for a task that can go on without; says so if
-/// it has to.
+/// Fetches the library where it is `wanted` and absent, for a task that can go on without it.
 pub fn fetch_if(wanted: bool) {
     if let Some(Err(error)) = wanted.then(|| fetch(PYTHON)) {
         println!("going on without MuJoCo, its tests skip themselves: {error:#}");

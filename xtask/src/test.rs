@@ -24,8 +24,7 @@ const CHECKS: [&[&str]; 3] = [
     &["doc", "--workspace", "--no-deps"],
 ];
 
-/// Licences, duplicates and sources of what is linked, by `deny.toml`. Advisories are left out: they
-/// need a
+/// Licences, duplicates and sources of what is linked, by `deny.toml`. Advisories are left out: they need a
 /// network.
 const DEPENDENCIES: &[&str] = &["deny", "check", "licenses", "bans", "sources"];
 

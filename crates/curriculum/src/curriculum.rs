@@ -52,14 +52,11 @@ pub struct Curriculum<'a> {
 pub struct CurriculumSettings {
     /// What happens where the constraint allows no motion. Default: [`NoneAllowed::Refuse`].
     pub none_allowed: NoneAllowed,
-    /// Time between the samples by which rival beliefs are compared \[s\]. Shorter costs time; longer
-    /// misses
+    /// Time between the samples by which rival beliefs are compared \[s\]. Shorter costs time; longer misses
     /// what is quick. Default: 0.02, since people move slowly against it.
     pub rivalry_period_s: f64,
-    /// How often after one log [`Growth`] is asked again once the likelihood has refuted one of its
-    /// answers,
-    /// which is then excluded. Each time costs a search and some fits. Default: 3, a limit on the time
-    /// and no
+    /// How often after one log [`Growth`] is asked again once the likelihood has refuted one of its answers,
+    /// which is then excluded. Each time costs a search and some fits. Default: 3, a limit on the time and no
     /// finding.
     pub most_answers: usize,
 }
@@ -107,8 +104,7 @@ impl<'a> Curriculum<'a> {
         }
     }
 
-    /// Goes on with a run until it ends. `saved` is called after each iteration, with the run as it is
-    /// then.
+    /// Goes on with a run until it ends. `saved` is called after each iteration, with the run as it is then.
     ///
     /// # Errors
     /// As [`Self::step`], or what `saved` returns.
@@ -299,8 +295,7 @@ impl<'a> Curriculum<'a> {
         Ok(Learning { evidence, model, estimate })
     }
 
-    /// The factors of the motions under all columns of a belief: those made once, unless the model has
-    /// grown.
+    /// The factors of the motions under all columns of a belief: those made once, unless the model has grown.
     ///
     /// # Errors
     /// The belief is of another robot.
@@ -311,15 +306,12 @@ impl<'a> Curriculum<'a> {
         MotionCandidates::of_model(self.robot, model, self.dataset, self.candidates.weights()).map(Cow::Owned)
     }
 
-    /// R of all that was measured over the declared parameters, whose cond decides: the next motion
-    /// (11), and
+    /// R of all that was measured over the declared parameters, whose cond decides: the next motion (11), and
     /// how far the constraint is relaxed (20).
     ///
     /// The columns of effects that were found are left out. With them cond is that of other parameters, in
-    /// other units, than before they were found; the offset of a spring is so nearly a weight that cond
-    /// grows
-    /// five-fold, the constraint is never relaxed again, and the same safe motion is asked for until
-    /// the end.
+    /// other units, than before they were found; the offset of a spring is so nearly a weight that cond grows
+    /// five-fold, the constraint is never relaxed again, and the same safe motion is asked for until the end.
     /// Motions that distinguish effects are chosen by [`Rivalry`].
     ///
     /// # Errors
@@ -331,8 +323,7 @@ impl<'a> Curriculum<'a> {
         Ok(Some(self.candidates.measured(evidence)?))
     }
 
-    /// What the next iteration would do; none once the run has ended. For a real robot this is all
-    /// there is
+    /// What the next iteration would do; none once the run has ended. For a real robot this is all there is
     /// to do before it moves.
     ///
     /// # Errors
@@ -392,8 +383,7 @@ pub fn unreliable_model(truth: &RobotModel, seed: u64) -> RobotModel {
 }
 
 impl MotionCandidates {
-    /// RMS over all motions of how far the torques move from one parameter vector to another, over
-    /// their RMS;
+    /// RMS over all motions of how far the torques move from one parameter vector to another, over their RMS;
     /// none if they are of different models.
     pub fn torque_change(&self, before: &[f64], after: &[f64]) -> Option<f64> {
         let everything: &Triangle = self.everything();

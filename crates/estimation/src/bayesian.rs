@@ -23,8 +23,7 @@ pub struct LogNoise {
 }
 
 impl LogNoise {
-    /// Independent rows of unit variance in `groups` groups: of rows that have been weighted, or where
-    /// there
+    /// Independent rows of unit variance in `groups` groups: of rows that have been weighted, or where there
     /// are none.
     pub fn unit(groups: usize) -> Self {
         LogNoise { std: vec![1.0; groups], correlation: 1.0 }
@@ -44,8 +43,7 @@ impl LogNoise {
     }
 }
 
-/// The median over the parameters of their standard deviation over that of independent rows; 1 where
-/// none is
+/// The median over the parameters of their standard deviation over that of independent rows; 1 where none is
 /// known.
 fn correlation(factor: &Factor, parameters: &[usize], deviations: &[f64]) -> f64 {
     let Ok(independent) = factor.standard_deviations(1.0) else { return 1.0 };
@@ -62,8 +60,7 @@ fn correlation(factor: &Factor, parameters: &[usize], deviations: &[f64]) -> f64
 ///
 /// With the URDF as the prior, each standard parameter within a share of its body's magnitude: without it,
 /// one short log would leave the parameters of an arm that rests to the noise. For logs of a real robot,
-/// whose noise is in the logged torques; where noise moves the robot, [`super::MotionLikelihood`] is
-/// right.
+/// whose noise is in the logged torques; where noise moves the robot, [`super::MotionLikelihood`] is right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BayesianLeastSquares {
     /// How uncertain the measured rows are.
@@ -77,8 +74,7 @@ impl Estimator for BayesianLeastSquares {
         "bayesian_least_squares"
     }
 
-    /// Parameters of which neither the logs nor the prior say anything stay as they are in `present`;
-    /// their
+    /// Parameters of which neither the logs nor the prior say anything stay as they are in `present`; their
     /// deviations and covariances are NaN.
     fn estimate(
         &self,
@@ -119,16 +115,14 @@ impl Estimator for BayesianLeastSquares {
 }
 
 impl Evidence {
-    /// What somebody else has reduced: rows of \[Φ f\] of logs that were conditioned, as `phiw
-    /// identify` has
+    /// What somebody else has reduced: rows of \[Φ f\] of logs that were conditioned, as `phiw identify` has
     /// them, `rate_hz` of each torque a second \[Hz\].
     pub fn of_factor(factor: GroupedFactor, rate_hz: Option<f64>) -> Self {
         let settings = super::RowsAt::Stamps.into();
         Evidence { settings, factor, instants: Vec::new(), foreseen: Vec::new(), rate_hz, in_order: None }
     }
 
-    /// The same of rows that have been weighted and taken together, over these `parameters` of `count`:
-    /// what
+    /// The same of rows that have been weighted and taken together, over these `parameters` of `count`: what
     /// a `model.json` keeps.
     ///
     /// # Errors

@@ -1,10 +1,8 @@
 //! What was believed of the bodies, as a divergence that only possible bodies have.
 //!
-//! Each body is as far from its prior as the log-det divergence of their pseudo-inertias says, which is
-//! the
+//! Each body is as far from its prior as the log-det divergence of their pseudo-inertias says, which is the
 //! same in any frame and any units (Lee, Wensing & Park, T-RO 2020); a parameter that is not negative (a
-//! friction) likewise, as a pseudo-inertia of one row. Beside the likelihood's −log det of the mass
-//! matrix it
+//! friction) likewise, as a pseudo-inertia of one row. Beside the likelihood's −log det of the mass matrix it
 //! keeps every body possible.
 
 use crate::{EstimationError, RobotModel};
@@ -159,13 +157,10 @@ impl BodyPrior {
     }
 }
 
-/// A body with the described mass, centre of mass and size, lifted where it is flatter than
-/// `roundness`, or
-/// impossible: second moments about the centre of mass along all axes are then at least that share of
-/// their
+/// A body with the described mass, centre of mass and size, lifted where it is flatter than `roundness`, or
+/// impossible: second moments about the centre of mass along all axes are then at least that share of their
 /// mean. The mean is at least a quarter of that about the joint, and a sphere's of `least_radius`: what is
-/// left of an inertia without its mass's own share may be less than nothing where each of them is
-/// uncertain.
+/// left of an inertia without its mass's own share may be less than nothing where each of them is uncertain.
 fn round(
     body: &[f64; PARAMETERS_PER_BODY],
     roundness: f64,

@@ -22,8 +22,7 @@ pub trait Estimator: Send + Sync {
 
     /// The parameters of `design`.
     ///
-    /// `present` is what was believed before, with the parameters of the design: what the evidence does
-    /// not
+    /// `present` is what was believed before, with the parameters of the design: what the evidence does not
     /// determine stays as it is there.
     ///
     /// # Errors
@@ -47,10 +46,8 @@ pub trait Estimator: Send + Sync {
         None
     }
 
-    /// −log L of parameters, but for a constant that is the same for all models of the same logs; none
-    /// from
-    /// an estimator that knows no likelihood. The smaller, the better the model: effects that were
-    /// found are
+    /// −log L of parameters, but for a constant that is the same for all models of the same logs; none from
+    /// an estimator that knows no likelihood. The smaller, the better the model: effects that were found are
     /// confirmed by it.
     ///
     /// # Errors

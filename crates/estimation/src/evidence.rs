@@ -18,10 +18,8 @@ pub enum RowsAt {
     /// The stamps: position, velocity and acceleration as they were measured there, as the paper has it.
     Stamps,
     /// The middle of each period: what the motion was on average while one command was held. Position by
-    /// Hermite's cubic, velocity Δq/T, acceleration Δq̇/T, so that inertia and viscous friction balance
-    /// the
-    /// command exactly, however fast the motion changes within a period. Effects that are not linear in
-    /// the
+    /// Hermite's cubic, velocity Δq/T, acceleration Δq̇/T, so that inertia and viscous friction balance the
+    /// command exactly, however fast the motion changes within a period. Effects that are not linear in the
     /// motion are taken as they were when the period began, so that its noise is not in them.
     #[default]
     Periods,
@@ -33,13 +31,10 @@ pub enum RowsAt {
 pub struct EvidenceSettings {
     /// Which instants become rows.
     pub rows_at: RowsAt,
-    /// Time between two instants at which the motion's sensitivity to noise is looked at \[s\]. Shorter
-    /// costs
-    /// time in each estimate. Default: 0.4, in which the inertia of a robot moved by a person changes
-    /// little.
+    /// Time between two instants at which the motion's sensitivity to noise is looked at \[s\]. Shorter costs
+    /// time in each estimate. Default: 0.4, in which the inertia of a robot moved by a person changes little.
     pub instant_every_s: f64,
-    /// Whether each row is taken together with the one before it, for estimators that find out how
-    /// noise is
+    /// Whether each row is taken together with the one before it, for estimators that find out how noise is
     /// correlated in time ([`super::Estimator::in_order`]). It costs four times the columns' square. Rows
     /// over periods only. Default: no.
     pub in_order: bool,
@@ -68,8 +63,7 @@ pub struct Instant {
     pub state: [Vec<f64>; 3],
 }
 
-/// What was measured, reduced to what estimators and selections need; it depends on the length of the
-/// logs by
+/// What was measured, reduced to what estimators and selections need; it depends on the length of the logs by
 /// some instants only.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(into = "StoredEvidence", try_from = "StoredEvidence")]
@@ -175,8 +169,7 @@ impl Evidence {
         &self.factor
     }
 
-    /// Rows a second of each torque \[Hz\]; none where they are as dense in time as those of the
-    /// motions to
+    /// Rows a second of each torque \[Hz\]; none where they are as dense in time as those of the motions to
     /// choose from.
     pub fn rate_hz(&self) -> Option<f64> {
         self.rate_hz

@@ -16,30 +16,24 @@ use phiw_regressor::least_squares::GroupedFactor;
 /// The parameters under which the *motion* that was measured is most likely, given the commands.
 ///
 /// The paper's plant adds noise δ to the commanded torque f on its way to the robot, and logs the command:
-/// Φ(q, q̇, q̈)·w = f + δ, and δ is in q̈. What is random is the motion, not the right-hand side. Its
-/// density
+/// Φ(q, q̇, q̈)·w = f + δ, and δ is in q̈. What is random is the motion, not the right-hand side. Its density
 /// is that of δ times the Jacobian |∂δ/∂q̈| = det J(q; w), J the mass matrix (and what friction does within a
 /// period, in closed form), so with σ_j the noise of torque j
 ///
 /// −log L(w) = Σ_t ½‖Φ_t w − f_t‖²_σ − Σ_t log det J_t(w).
 ///
 /// Least squares is the first sum alone. It makes every inertia too small, since that explains the
-/// accelerations that the noise itself has caused; the second sum counters this. J is linear in w but
-/// for the
+/// accelerations that the noise itself has caused; the second sum counters this. J is linear in w but for the
 /// square of how much friction slows a joint within one period, and log det is concave, so the problem is
-/// convex: damped Newton steps find its only minimum from anywhere inside. Bodies that make some J
-/// indefinite
-/// can not exist, and lie outside. A closed loop does no harm: a command may depend on the past as it
-/// likes.
+/// convex: damped Newton steps find its only minimum from anywhere inside. Bodies that make some J indefinite
+/// can not exist, and lie outside. A closed loop does no harm: a command may depend on the past as it likes.
 /// (Compare the prediction-error view of closed-loop identification, Forssell & Ljung 1999.)
 ///
 /// σ must be known: the noise of the actuators, as a data sheet gives it. With σ free, a robot with more
 /// inertia and more noise is nearly as likely, and little is gained over least squares.
 ///
-/// Right for rows over periods ([`super::RowsAt::Periods`]) and exact encoders. Columns that are not
-/// linear
-/// in the motion are those of a period's beginning and have no share in J. Noise in the logged torque,
-/// which
+/// Right for rows over periods ([`super::RowsAt::Periods`]) and exact encoders. Columns that are not linear
+/// in the motion are those of a period's beginning and have no share in J. Noise in the logged torque, which
 /// moves nothing, is taken for noise that does; where that dominates, [`super::WeightedLeastSquares`] is
 /// right.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,8 +41,7 @@ pub struct MotionLikelihood {
     /// σ: standard deviation of each torque's noise \[N·m, N\].
     pub torque_noise: Vec<f64>,
     /// Bodies that do not move, such as the feet of a robot that stands: the noise moves it only as they
-    /// allow, and the log-determinant is that of J over the directions that are left, Nᵀ·J·N. (What the
-    /// floor
+    /// allow, and the log-determinant is that of J over the directions that are left, Nᵀ·J·N. (What the floor
     /// gives is measured and on the right-hand side; its share of |∂δ/∂(q̈, f)| does not depend on w.)
     pub standing_on: Vec<usize>,
     /// What was believed before anything was measured; −log L then has its square too. None in the paper:
@@ -267,8 +260,7 @@ impl Problem {
         squares - log_determinants
     }
 
-    /// The gradient, and what it was made of at each instant; none where an inertia is not positive
-    /// definite.
+    /// The gradient, and what it was made of at each instant; none where an inertia is not positive definite.
     pub(super) fn gradient(&self, w: &Mat<f64>) -> (Mat<f64>, Vec<Option<Response>>) {
         let mut gradient = Mat::zeros(w.nrows(), 1);
         for (index, group) in self.factor.groups().iter().enumerate() {
@@ -312,8 +304,7 @@ impl Problem {
         hessian
     }
 
-    /// Moves `w` along −direction as far as −log L falls enough (Armijo); false if it does not fall at
-    /// all.
+    /// Moves `w` along −direction as far as −log L falls enough (Armijo); false if it does not fall at all.
     fn line_search(&self, w: &mut Mat<f64>, direction: &Mat<f64>, decrement: f64) -> bool {
         let before = self.cost(w);
         let mut length = 1.0;

@@ -114,8 +114,7 @@ impl MotionLog {
         Block::unfiltered(self.joints, t, signals, tau)
     }
 
-    /// One row for each period as it was when it began, with the acceleration of the period before:
-    /// nothing
+    /// One row for each period as it was when it began, with the acceleration of the period before: nothing
     /// that the noise of a period has done to the motion is in its own row. The torques of the rows are
     /// `tau`, `[period × joint]` of those that count.
     pub fn before_noise(&self, tau: Vec<f64>) -> Block {
@@ -124,10 +123,8 @@ impl MotionLog {
         block
     }
 
-    /// One row for each period as it could be foreseen when it began: where the joints would be in its
-    /// middle
-    /// at the speed that they had, that speed, the acceleration of the period before, and the torque
-    /// that was
+    /// One row for each period as it could be foreseen when it began: where the joints would be in its middle
+    /// at the speed that they had, that speed, the acceleration of the period before, and the torque that was
     /// commanded.
     pub(crate) fn begun(&self) -> Block {
         let mut block = self.beginnings();

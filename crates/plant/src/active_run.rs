@@ -1,7 +1,6 @@
 //! A run under way: the controller's periods, and the integration steps within them.
 //!
-//! `Plant::run` begins a motion and steps it, and each step works in the plant: the two files name each
-//! other
+//! `Plant::run` begins a motion and steps it, and each step works in the plant: the two files name each other
 //! because a run cannot outlive its plant.
 
 use crate::joint_drive::JointDrive;

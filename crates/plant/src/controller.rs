@@ -8,8 +8,7 @@ use phiw_dynamics::{DimensionError, Tree, Workspace};
 
 /// What a controller believes that a motion needs.
 pub trait TorqueModel {
-    /// Writes the torque of each joint for positions `q` \[rad, m\], velocities `v` and accelerations
-    /// `a` of
+    /// Writes the torque of each joint for positions `q` \[rad, m\], velocities `v` and accelerations `a` of
     /// the joints.
     ///
     /// # Errors
@@ -29,8 +28,7 @@ pub struct RigidBodyModel {
 }
 
 impl RigidBodyModel {
-    /// The tree's own parameters, which may be as wrong as one likes, and a coefficient of viscous
-    /// friction
+    /// The tree's own parameters, which may be as wrong as one likes, and a coefficient of viscous friction
     /// for each joint \[N·m·s/rad, N·s/m\]; none if empty.
     ///
     /// # Errors
@@ -113,8 +111,7 @@ pub struct GainSettings {
 
 impl Default for GainSettings {
     /// Small gains, as the paper's: half of the effort limit for a radian, of which a robot's own weight
-    /// pulls a third. The bounds of held commands leave the loops of `cargo xtask paper` (0.01 s)
-    /// stable in
+    /// pulls a third. The bounds of held commands leave the loops of `cargo xtask paper` (0.01 s) stable in
     /// both engines.
     fn default() -> Self {
         GainSettings { bandwidth: 0.0, stiffness: 0.5, held_inertia: 0.04, held_friction: 0.3 }
@@ -179,8 +176,7 @@ pub fn least_apparent_inertia(
 /// 1/(M⁻¹)ⱼⱼ, with `rotor_inertia` on the mass matrix's diagonal (none if empty).
 ///
 /// It is never more than what the joint feels when the others are locked, and often much less. A velocity
-/// gain that is held for a control period must stay below twice this inertia over the period, or the
-/// loop is
+/// gain that is held for a control period must stay below twice this inertia over the period, or the loop is
 /// unstable.
 ///
 /// # Errors
@@ -255,8 +251,7 @@ mod tests {
     use super::*;
     use phiw_dynamics::random_tree::{RandomTreeOptions, random_tree};
 
-    /// Each case asks for more or less than a held command allows: K_p and K_d of inertias of 0.5 kg·m²
-    /// at a
+    /// Each case asks for more or less than a held command allows: K_p and K_d of inertias of 0.5 kg·m² at a
     /// limit that the settings name.
     #[test]
     fn gains_are_as_stiff_as_wanted_and_held_commands_allow() -> Result<(), Box<dyn std::error::Error>> {

@@ -33,12 +33,10 @@ pub struct PlantSetup {
     pub controller: ComputedTorque,
     /// Everything that the robot has beside its rigid bodies and the world's rotors, declared or not.
     pub effects: Vec<PlantEffect>,
-    /// Standard deviation of the torque that actuators add by themselves, over the effort limit; drawn
-    /// anew
+    /// Standard deviation of the torque that actuators add by themselves, over the effort limit; drawn anew
     /// for every command, and never logged. 0.05 in the paper.
     pub actuator_noise: f64,
-    /// Correlation ρ of that torque from one command to the next, between −1 and 1: n' = ρ·n + √(1 −
-    /// ρ²)·ξ.
+    /// Correlation ρ of that torque from one command to the next, between −1 and 1: n' = ρ·n + √(1 − ρ²)·ξ.
     /// 0 in the paper.
     pub actuator_noise_correlation: f64,
     /// Sensors.
@@ -66,18 +64,14 @@ impl PlantSetup {
 
 /// A simulated robot that behaves like a real one, over any [`SimulationBackend`].
 ///
-/// Each control period the controller reads the encoders and commands torques, clipped at the effort
-/// limits.
-/// The actuators deliver them with their noise and faults. Between two commands the backend is stepped,
-/// under
+/// Each control period the controller reads the encoders and commands torques, clipped at the effort limits.
+/// The actuators deliver them with their noise and faults. Between two commands the backend is stepped, under
 /// the torque that is left after all effects have taken theirs: they act inside the physics, and the log
 /// knows nothing of them.
 ///
-/// Effects that are steep in speed or angle (dry friction, presliding, stops, springs of transmissions)
-/// are
+/// Effects that are steep in speed or angle (dry friction, presliding, stops, springs of transmissions) are
 /// solved implicitly for the end of each step, so that steps of 0.5 ms are stable at any smoothing width;
-/// other effects are taken in the step's middle. Beyond torques the effects change the robot itself:
-/// payload,
+/// other effects are taken in the step's middle. Beyond torques the effects change the robot itself: payload,
 /// tilt and rotors are built into the backend's tree and world.
 pub struct Plant {
     /// The robot as built.
@@ -99,13 +93,11 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// Builds the robot with all its effects. `build` makes the backend, of the robot as it is with
-    /// payloads,
+    /// Builds the robot with all its effects. `build` makes the backend, of the robot as it is with payloads,
     /// tilt and rotors, which is not always what `tree` and `world` declare.
     ///
     /// # Errors
-    /// A list, an effect or the world does not fit the robot, a number makes no sense, or the backend
-    /// can not
+    /// A list, an effect or the world does not fit the robot, a number makes no sense, or the backend can not
     /// be built.
     pub fn new(
         tree: &Tree,
@@ -199,12 +191,10 @@ impl Plant {
         Ok(())
     }
 
-    /// Puts the robot at rest into the reference's first posture, lets it settle, and follows the
-    /// reference.
+    /// Puts the robot at rest into the reference's first posture, lets it settle, and follows the reference.
     ///
     /// The first row of the log is that of the motion's start. The reference should start at rest: what it
-    /// asks for at time 0 sets in at once. The same random numbers give the same run; what sensors draw
-    /// does
+    /// asks for at time 0 sets in at once. The same random numbers give the same run; what sensors draw does
     /// not change the motion, unless the controller sees it. On a fall the run ends, which is no error.
     ///
     /// # Errors

@@ -1,5 +1,4 @@
-//! What a simulated robot's log says of a trial: encoders alone or all of the motion, and what is wrong
-//! with
+//! What a simulated robot's log says of a trial: encoders alone or all of the motion, and what is wrong with
 //! its torques.
 
 use phiw_curriculum::CurriculumError;
@@ -11,8 +10,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// What stands between a trial and its log. The default is the paper's: the motion and the command,
-/// exactly.
+/// What stands between a trial and its log. The default is the paper's: the motion and the command, exactly.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measuring {
     /// The encoders, if they are all that is known of the motion; none if positions and speeds are exact.
@@ -143,8 +141,7 @@ fn torques(history: &History, values: &[f64], log: &MotionLog) -> Vec<f64> {
     (0..log.rows()).flat_map(of_row).collect()
 }
 
-/// What the controller was asked for at each row: the reference, and the torque that its model gave for
-/// it.
+/// What the controller was asked for at each row: the reference, and the torque that its model gave for it.
 ///
 /// # Errors
 /// The motion is not of the robot that `torque` is of.

@@ -16,8 +16,7 @@ pub type BuildBackend =
 
 /// A simulated robot: the plant of the paper's Figure 2, over any backend.
 ///
-/// Each trial builds it anew, so that nothing that an engine remembers goes from one trial to the next,
-/// and a
+/// Each trial builds it anew, so that nothing that an engine remembers goes from one trial to the next, and a
 /// run that is taken up again is the same run.
 pub struct SimulatedRobot {
     /// The robot as it truly is; its base may float where the world has a floor.
@@ -50,15 +49,12 @@ pub struct SimulatedRobot {
 /// When a base or a foot counts as still: rows in which it moves are no rows of a robot that stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stillness {
-    /// Turning rate of a base \[rad/s\]. Default: 0.01, what a gyroscope can distinguish from its own
-    /// noise.
+    /// Turning rate of a base \[rad/s\]. Default: 0.01, what a gyroscope can distinguish from its own noise.
     pub base_turning: f64,
-    /// Time around a movement of the base that does not count either, since it lands before it rests
-    /// \[s\].
+    /// Time around a movement of the base that does not count either, since it lands before it rests \[s\].
     /// Default: 0.1.
     pub settles_s: f64,
-    /// Speed of a foot's sole \[m/s\]. Default: 0.005. A foot of a kilogram that goes through that
-    /// within a
+    /// Speed of a foot's sole \[m/s\]. Default: 0.005. A foot of a kilogram that goes through that within a
     /// millisecond takes 5 N.
     pub foot_speed: f64,
     /// Turning rate of a foot \[rad/s\]. Default: 0.05, the same over a lever of 0.1 m.
@@ -111,8 +107,7 @@ impl SimulatedRobot {
         })
     }
 
-    /// Standard deviation of each torque's noise \[N·m, N\]: what the actuator adds and what its sensor
-    /// adds.
+    /// Standard deviation of each torque's noise \[N·m, N\]: what the actuator adds and what its sensor adds.
     pub fn torque_noise(&self) -> Vec<f64> {
         let noise = |joint: usize| {
             let sensor = self.sensors.torque_noise.get(joint).copied().unwrap_or(0.0);

@@ -96,10 +96,8 @@ fn the_paper_s_numbers_relax_as_in_the_paper() {
     }
 }
 
-/// A motion that is done again makes σ_max of Φ larger and σ_min hardly: cond rises, and α went back to
-/// its
-/// maximum, at which nothing was allowed but the safest motion, which was then done again. What was
-/// learnt of
+/// A motion that is done again makes σ_max of Φ larger and σ_min hardly: cond rises, and α went back to its
+/// maximum, at which nothing was allowed but the safest motion, which was then done again. What was learnt of
 /// the torques is never lost.
 #[test]
 fn a_motion_done_again_does_not_tighten_the_constraint() {

@@ -274,10 +274,8 @@ fn the_model_says_what_is_measured() {
     }
 }
 
-/// Engines' steps are semi-implicit: Δq/T followed the noise of a period by three quarters of what it
-/// did to
-/// the velocity and not by half. The likelihood took the difference for friction: −1.6 N·m·s/rad in a
-/// waist
+/// Engines' steps are semi-implicit: Δq/T followed the noise of a period by three quarters of what it did to
+/// the velocity and not by half. The likelihood took the difference for friction: −1.6 N·m·s/rad in a waist
 /// that has 1.3.
 #[test]
 fn positions_and_velocities_are_of_one_instant() {

@@ -2,28 +2,22 @@
 //!
 //! # What it asks
 //!
-//! What five motions of the curriculum leave of the parameters' error and of the torques', depending on
-//! where
-//! the noise is (in the motion, in the log, in both, or in a torque that is measured as it was
-//! delivered), on
-//! its correlation from one command to the next, on what measures the motion, and on who estimates.
-//! Beside an
+//! What five motions of the curriculum leave of the parameters' error and of the torques', depending on where
+//! the noise is (in the motion, in the log, in both, or in a torque that is measured as it was delivered), on
+//! its correlation from one command to the next, on what measures the motion, and on who estimates. Beside an
 //! estimator that finds the noise out stand the likelihood that is told it exactly, the same told 20 % too
 //! little or too much, and equation (4).
 //!
 //! # How it is run
 //!
-//! `cargo xtask noise --seeds 20`. The robot, its motions and its noise are those of `cargo xtask
-//! paper`, and
-//! so are the options that name them. `--noise-in`, `--correlation`, `--sensors` and `--estimators` say
-//! which
+//! `cargo xtask noise --seeds 20`. The robot, its motions and its noise are those of `cargo xtask paper`, and
+//! so are the options that name them. `--noise-in`, `--correlation`, `--sensors` and `--estimators` say which
 //! cells there are: all combinations. The estimators that are told σ are run where they have something to
 //! say, which is with noise in the motion.
 //!
 //! # What it prints
 //!
-//! A table in Markdown: for each cell the medians of RMSE_w (17) and of the held-out torque error (19)
-//! after
+//! A table in Markdown: for each cell the medians of RMSE_w (17) and of the held-out torque error (19) after
 //! the last motion, the worst seed, and in how many seeds one of them is worse than the first belief's.
 //!
 //! # Where results go

@@ -56,8 +56,7 @@ pub struct RunArguments {
     /// The motions: those embedded, or the seated set of the shared data.
     #[arg(long, default_value = "embedded", conflicts_with = "motions")]
     pub dataset: Source,
-    /// A folder of motions of this robot, as `phiw retarget` writes them; what is before the first `_`
-    /// in a
+    /// A folder of motions of this robot, as `phiw retarget` writes them; what is before the first `_` in a
     /// name is its task.
     #[arg(long, value_name = "DIR")]
     pub motions: Option<PathBuf>,

@@ -2,24 +2,18 @@
 //!
 //! # What it asks
 //!
-//! Whether the paper's results come out: how fast the parameters (17), the torques (19) and the count
-//! of well
-//! estimated parameters (18) improve with each iteration, and whether the curriculum does better than
-//! other
+//! Whether the paper's results come out: how fast the parameters (17), the torques (19) and the count of well
+//! estimated parameters (18) improve with each iteration, and whether the curriculum does better than other
 //! ways to choose motions. `--arm` names these ways, `--footing` says whether the robot is bolted to the
-//! floor or stands free to topple, `--secret` gives the plant of each run an effect that nobody
-//! declared, and
+//! floor or stands free to topple, `--secret` gives the plant of each run an effect that nobody declared, and
 //! `--robot whole-body` asks the same of a whole body.
 //!
 //! # How it is run
 //!
-//! `cargo xtask paper` compares 200 seeds under four arms; `--seeds 2 --per-task 2 --backend analytic`
-//! is a
-//! quick look. A run is one seed under one arm. It has a file of its own, written after every
-//! iteration, so a
+//! `cargo xtask paper` compares 200 seeds under four arms; `--seeds 2 --per-task 2 --backend analytic` is a
+//! quick look. A run is one seed under one arm. It has a file of its own, written after every iteration, so a
 //! command that was killed goes on where it was. With `--shard I/N` a machine does its part of the runs,
-//! `cargo xtask paper merge` takes the parts together, and `--slurm N` writes the script of a job array
-//! that
+//! `cargo xtask paper merge` takes the parts together, and `--slurm N` writes the script of a job array that
 //! does both.
 //!
 //! # What it prints
@@ -32,12 +26,9 @@
 //! behind it (`numbers.csv`, `iterations.csv`, `parameters.csv`, `motions.csv`, `detection.csv`,
 //! `secrets.csv`); `setup.json`, which all runs in the folder share; and `runs/`.
 
-// These files know each other around two types. `Setup` is what all runs in a folder share: it is made
-// of the
-// arguments, is written beside the runs, and every run is scored by it. `RunFile` is one run as it is
-// kept,
-// with its job, score and detections; jobs write it and the report's tables read it. subject.rs reads
-// any of
+// These files know each other around two types. `Setup` is what all runs in a folder share: it is made of the
+// arguments, is written beside the runs, and every run is scored by it. `RunFile` is one run as it is kept,
+// with its job, score and detections; jobs write it and the report's tables read it. subject.rs reads any of
 // the robots, and whole_body.rs is the longest of these cases.
 mod arguments;
 mod arm;

@@ -67,8 +67,7 @@ pub struct Validation {
     pub declared: (Factor, f64),
 }
 
-/// What decides the results of a run, beside its arm and seed. Runs with different settings are never
-/// mixed.
+/// What decides the results of a run, beside its arm and seed. Runs with different settings are never mixed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Who computes the physics.
@@ -148,8 +147,7 @@ const SECRET_STREAM: u64 = 1;
 const NOISELESS: f64 = 1e-3;
 
 impl Setup {
-    /// Reads robot and motions, retargets what is not there, and measures the validation motions.
-    /// `console`
+    /// Reads robot and motions, retargets what is not there, and measures the validation motions. `console`
     /// shows how far that is.
     ///
     /// # Errors

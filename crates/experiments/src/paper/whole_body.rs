@@ -1,11 +1,8 @@
-//! The humanoid on its feet: 30 joints, a base that floats, identified from the wrenches under its feet
-//! and
+//! The humanoid on its feet: 30 joints, a base that floats, identified from the wrenches under its feet and
 //! the torques.
 //!
-//! Its base is six joints without motors, so that the same curriculum runs. Its feet stay on the floor:
-//! what
-//! can be told of it are the base parameters of *these* motions, which are fewer than those of a robot
-//! that
+//! Its base is six joints without motors, so that the same curriculum runs. Its feet stay on the floor: what
+//! can be told of it are the base parameters of *these* motions, which are fewer than those of a robot that
 //! may move its feet.
 
 mod pelvis;
@@ -31,26 +28,21 @@ use phiw_zmp::{Stance, SupportPolygon, feet_from_toml};
 
 /// Joints without motors.
 const BASE: usize = VIRTUAL_JOINTS.len();
-/// Time between two commands \[s\], and longest integration step. A foot weighs a kilogram: with the
-/// arms' 10
-/// ms the damping that an ankle needs to carry the body makes the foot flutter as soon as an edge of
-/// its sole
+/// Time between two commands \[s\], and longest integration step. A foot weighs a kilogram: with the arms' 10
+/// ms the damping that an ankle needs to carry the body makes the foot flutter as soon as an edge of its sole
 /// is free, and the robot falls.
 const CONTROL_PERIOD_S: f64 = 0.001;
 const LONGEST_STEP_S: f64 = 5e-4;
-/// Hip, knee and ankle pitch in which it stands \[rad\]: the ankles under the hips, which puts the
-/// middle of
+/// Hip, knee and ankle pitch in which it stands \[rad\]: the ankles under the hips, which puts the middle of
 /// the soles under the arms' reach.
 const CROUCH: [(&str, f64); 3] = [("hip_pitch", -0.40), ("knee", 0.81), ("ankle_pitch", -0.41)];
-/// Gain of the legs over their torque limits \[1/rad\], and K_d over K_p \[s\]: stiff enough that the
-/// ankles
+/// Gain of the legs over their torque limits \[1/rad\], and K_d over K_p \[s\]: stiff enough that the ankles
 /// alone hold it upright, whose weight topples it with 530 N·m/rad.
 const LEG_STIFFNESS: f64 = 12.0;
 const LEG_DAMPING_S: f64 = 0.004;
 /// Sensors under the feet, as data sheets of six-axis sensors for 1 kN have them.
 const WRENCH_NOISE: WrenchNoise = WrenchNoise { force_n: 1.0, moment_nm: 0.1 };
-/// Height of the base over the sensors \[m\]: the lever by which their forces' noise is noise of the
-/// moments
+/// Height of the base over the sensors \[m\]: the lever by which their forces' noise is noise of the moments
 /// at the base.
 const LEVER_M: f64 = 0.75;
 /// Share of its pelvis motion by which a motion is made smaller until the legs can follow.
@@ -204,8 +196,7 @@ impl Subject {
     }
 }
 
-/// The robot in an engine. MuJoCo tells its contact forces for the beginning of a step; they are those
-/// of all
+/// The robot in an engine. MuJoCo tells its contact forces for the beginning of a step; they are those of all
 /// of it with the integrator that looks there only.
 fn build(backend: Engine, tree: &Tree, world: &World) -> Result<Box<dyn SimulationBackend>, BackendError> {
     if backend != Engine::Mujoco {

@@ -1,9 +1,7 @@
 //! The first part of `cargo xtask run`: a curriculum over a robot that has something nobody declared.
 //!
-//! Marker recordings become motions of an 18-joint upper body; a model that is anything between nothing
-//! and
-//! twice the truth chooses among them, five times, and after each the residual is traced. Beside it the
-//! same
+//! Marker recordings become motions of an 18-joint upper body; a model that is anything between nothing and
+//! twice the truth chooses among them, five times, and after each the residual is traced. Beside it the same
 //! without tracing, on the same noise.
 
 use super::curriculum_page;
@@ -29,8 +27,7 @@ const SEED: u64 = 4;
 const PER_TASK: usize = 4;
 /// Iterations, as in the paper.
 const ITERATIONS: usize = 5;
-/// Torque noise over the torque limit. The paper's 5 % are three times this elbow's friction: in five
-/// motions
+/// Torque noise over the torque limit. The paper's 5 % are three times this elbow's friction: in five motions
 /// nobody would see it.
 const NOISE: f64 = 0.02;
 
@@ -110,8 +107,7 @@ fn arguments(backend: Engine, out: &Path) -> RunArguments {
         footing: vec![Footing::Fixed],
         secret: vec![SECRET],
         control: 0,
-        // At this noise the residual has a colour, and a trace needs one effect where a score test
-        // takes two.
+        // At this noise the residual has a colour, and a trace needs one effect where a score test takes two.
         detector: Detector::Trace,
         method: None,
         estimator: EstimatorName::Likelihood,
