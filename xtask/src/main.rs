@@ -6,9 +6,7 @@ mod test;
 mod torture;
 
 use clap::{Parser, Subcommand};
-use phiw_experiments::{
-    consistent, coverage, oracle, paper, plant, retarget, run, synthetic_log, undeclared,
-};
+use phiw_experiments::*;
 use std::process::ExitCode;
 
 #[derive(Parser)]
@@ -24,8 +22,7 @@ enum Task {
     Run(run::Arguments),
     /// A log as long as wanted, to see that memory does not grow with it.
     SyntheticLog(synthetic_log::Arguments),
-    /// Retargeting on one page: whole databases, a film of person and robot, mink on the same markers, figure
-    /// 9 of the paper.
+    /// Retargeting on one page: databases, a film of person and robot, mink on the same markers, figure 9.
     Retarget(retarget::Arguments),
     /// All checks of the workspace, and the count of tests.
     Test(test::Arguments),
@@ -43,28 +40,26 @@ enum Task {
     Undeclared(undeclared::Arguments),
     /// The experiments of the paper's section 5, resumable, on one machine or many.
     Paper(paper::Arguments),
+    /// The curriculum on a robot whose noise nobody knows: estimators, sensors and noises compared.
+    Noise(noise::Arguments),
     /// Robots in physics engines with one secret each, tracked poorly: log, trace with `phiw explain`, score.
     Plant(plant::Arguments),
 }
 
 fn main() -> anyhow::Result<ExitCode> {
-    match Arguments::parse().task {
-        Task::Run(arguments) => {
-            mujoco::fetch_or_go_on_without();
-            run::command(&arguments).map(|()| ExitCode::SUCCESS)
-        }
+    let task = Arguments::parse().task;
+    let wanted = matches!(&task, Task::Paper(paper) if paper.needs_mujoco());
+    mujoco::fetch_if(wanted || matches!(task, Task::Run(_) | Task::Noise(_)));
+    match task {
+        Task::Run(arguments) => run::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::SyntheticLog(arguments) => synthetic_log::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Retarget(arguments) => retarget::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Test(arguments) => test::command(&arguments),
         Task::Torture(arguments) => torture::command(&arguments),
         Task::Mujoco(arguments) => mujoco::command(&arguments),
         Task::Oracle(arguments) => oracle::command(&arguments),
-        Task::Paper(arguments) => {
-            if arguments.needs_mujoco() {
-                mujoco::fetch_or_go_on_without();
-            }
-            paper::command(&arguments).map(|()| ExitCode::SUCCESS)
-        }
+        Task::Paper(arguments) => paper::command(&arguments).map(|()| ExitCode::SUCCESS),
+        Task::Noise(arguments) => noise::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Plant(arguments) => plant::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Consistent(arguments) => consistent::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Coverage(arguments) => coverage::command(&arguments).map(|()| ExitCode::SUCCESS),

@@ -66,9 +66,9 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Fetches the library where it is absent, for a task that can go on without; says so if it has to.
-pub fn fetch_or_go_on_without() {
-    if let Err(error) = fetch(PYTHON) {
+/// Fetches the library where it is `wanted` and absent, for a task that can go on without it.
+pub fn fetch_if(wanted: bool) {
+    if let Some(Err(error)) = wanted.then(|| fetch(PYTHON)) {
         println!("going on without MuJoCo, its tests skip themselves: {error:#}");
     }
 }

@@ -11,7 +11,9 @@ use crate::random::{Purpose, random};
 use crate::relaxation::{ConditionRelaxation, Relaxation};
 use crate::selection::{MotionCandidates, Selection, SmallestCondition, Triangle};
 use crate::{CurriculumError, CurriculumRun, Experiment, IterationRecord};
-use phiw_estimation::{Estimate, Estimator, Evidence, MotionLog, Robot, RobotModel, RowsAt};
+use phiw_estimation::{
+    Estimate, Estimator, Evidence, EvidenceSettings, MotionLog, Robot, RobotModel, RowsAt,
+};
 use phiw_identification::EffectSpec;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -183,11 +185,15 @@ impl<'a> Curriculum<'a> {
         Ok(())
     }
 
+    fn evidence_settings(&self) -> EvidenceSettings {
+        EvidenceSettings { in_order: self.estimator.in_order(), ..self.rows_at.into() }
+    }
+
     /// Line 14, and the search for what the model lacks.
     fn learn(&self, run: &mut CurriculumRun, measured: &MotionLog) -> Result<Learning, CurriculumError> {
         let evidence = match run.evidence.take() {
             Some(evidence) => evidence,
-            None => Evidence::none(&self.robot.design_of(&run.model)?, self.rows_at)?,
+            None => Evidence::none(&self.robot.design_of(&run.model)?, self.evidence_settings())?,
         };
         let mut learning = self.believe(evidence, &run.model, std::slice::from_ref(measured))?;
         let Some(growth) = self.growth else { return Ok(learning) };
@@ -268,7 +274,7 @@ impl<'a> Curriculum<'a> {
             return Ok(learning.clone());
         }
         let model = learning.model.with_effects(self.robot, specs)?;
-        let evidence = Evidence::none(&self.robot.design_of(&model)?, self.rows_at)?;
+        let evidence = Evidence::none(&self.robot.design_of(&model)?, self.evidence_settings())?;
         self.believe(evidence, &model, logs)
     }
 

@@ -119,7 +119,7 @@ impl Evidence {
     /// them, `rate_hz` of each torque a second \[Hz\].
     pub fn of_factor(factor: GroupedFactor, rate_hz: Option<f64>) -> Self {
         let settings = super::RowsAt::Stamps.into();
-        Evidence { settings, factor, instants: Vec::new(), foreseen: Vec::new(), rate_hz }
+        Evidence { settings, factor, instants: Vec::new(), foreseen: Vec::new(), rate_hz, in_order: None }
     }
 
     /// The same of rows that have been weighted and taken together, over these `parameters` of `count`: what

@@ -35,6 +35,11 @@ pub trait Estimator: Send + Sync {
         present_parameters: &[f64],
     ) -> Result<Estimate, EstimationError>;
 
+    /// Whether it asks for rows with those before them ([`crate::EvidenceSettings::in_order`]).
+    fn in_order(&self) -> bool {
+        false
+    }
+
     /// Standard deviation of each torque's noise that it counts on \[N·m, N\]; none from an estimator that
     /// assumes none.
     fn torque_noise(&self) -> Option<&[f64]> {

@@ -1,6 +1,7 @@
 //! All that estimators remember of what was measured.
 
 use super::foresight;
+use super::in_order::InOrder;
 use super::stored::StoredFactor;
 use crate::{EstimationError, MotionLog};
 use phiw_identification::fitting::accumulate;
@@ -33,11 +34,15 @@ pub struct EvidenceSettings {
     /// Time between two instants at which the motion's sensitivity to noise is looked at \[s\]. Shorter costs
     /// time in each estimate. Default: 0.4, in which the inertia of a robot moved by a person changes little.
     pub instant_every_s: f64,
+    /// Whether each row is taken together with the one before it, for estimators that find out how noise is
+    /// correlated in time ([`super::Estimator::in_order`]). It costs four times the columns' square. Rows
+    /// over periods only. Default: no.
+    pub in_order: bool,
 }
 
 impl Default for EvidenceSettings {
     fn default() -> Self {
-        EvidenceSettings { rows_at: RowsAt::default(), instant_every_s: 0.4 }
+        EvidenceSettings { rows_at: RowsAt::default(), instant_every_s: 0.4, in_order: false }
     }
 }
 
@@ -70,6 +75,8 @@ pub struct Evidence {
     pub(super) foreseen: Vec<bool>,
     /// Rows a second of each torque \[Hz\]; none where they are as dense as those of the motions.
     pub(super) rate_hz: Option<f64>,
+    /// The rows with those before them, where the settings ask for them.
+    pub(super) in_order: Option<InOrder>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -82,12 +89,16 @@ struct StoredEvidence {
     foreseen: Vec<bool>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     rate_hz: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    rows_in_order: Option<StoredFactor>,
 }
 
 impl From<Evidence> for StoredEvidence {
     fn from(evidence: Evidence) -> Self {
-        let Evidence { settings, factor, instants, foreseen, rate_hz } = evidence;
-        StoredEvidence { settings, factor: StoredFactor::from(&factor), instants, foreseen, rate_hz }
+        let Evidence { settings, factor, instants, foreseen, rate_hz, in_order } = evidence;
+        let rows_in_order = in_order.map(|in_order| StoredFactor::from(in_order.factor()));
+        let factor = StoredFactor::from(&factor);
+        StoredEvidence { settings, factor, instants, foreseen, rate_hz, rows_in_order }
     }
 }
 
@@ -95,8 +106,10 @@ impl TryFrom<StoredEvidence> for Evidence {
     type Error = IdentificationError;
 
     fn try_from(stored: StoredEvidence) -> Result<Self, IdentificationError> {
-        let StoredEvidence { settings, factor, instants, foreseen, rate_hz } = stored;
-        Ok(Evidence { settings, factor: factor.try_into()?, instants, foreseen, rate_hz })
+        let StoredEvidence { settings, factor, instants, foreseen, rate_hz, rows_in_order } = stored;
+        let in_order: Option<GroupedFactor> = rows_in_order.map(TryInto::try_into).transpose()?;
+        let in_order = in_order.map(InOrder::of_factor);
+        Ok(Evidence { settings, factor: factor.try_into()?, instants, foreseen, rate_hz, in_order })
     }
 }
 
@@ -120,7 +133,9 @@ impl Evidence {
         if !foreseen.contains(&true) {
             foreseen.clear();
         }
-        Ok(Evidence { settings, factor, instants: Vec::new(), foreseen, rate_hz: None })
+        let asked = settings.in_order && settings.rows_at == RowsAt::Periods;
+        let in_order = asked.then(|| InOrder::none(design)).transpose()?;
+        Ok(Evidence { settings, factor, instants: Vec::new(), foreseen, rate_hz: None, in_order })
     }
 
     /// The same for a robot that moves without noise: all columns are those of a period's mean motion.
@@ -143,6 +158,9 @@ impl Evidence {
             foreseen => foresight::factor(design, foreseen, measured)?,
         };
         self.factor = self.factor.merge(&factor)?;
+        if let Some(in_order) = &mut self.in_order {
+            in_order.add(design, &self.foreseen, measured)?;
+        }
         Ok(())
     }
 

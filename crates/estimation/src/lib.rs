@@ -2,15 +2,21 @@
 #![warn(missing_docs)]
 
 mod bayesian;
+mod body_prior;
+mod command;
+mod concentrated;
+mod encoders;
 mod error;
 mod estimator;
 mod evidence;
 mod foresight;
 mod free_directions;
+mod in_order;
 mod least_squares;
 mod likelihood;
 mod motion_log;
 mod prior;
+mod profile;
 mod response;
 mod robot;
 mod score;
@@ -20,12 +26,13 @@ mod stored;
 mod torques;
 
 pub use bayesian::{BayesianLeastSquares, LogNoise};
+pub use concentrated::{ConcentratedLikelihood, ConcentratedSettings, TorqueNoise};
 pub use error::EstimationError;
 pub use estimator::{Estimate, Estimator};
 pub use evidence::{Evidence, EvidenceSettings, Instant, RowsAt, grouped_factor};
 pub use least_squares::{LeastSquares, WeightedLeastSquares};
 pub use likelihood::MotionLikelihood;
-pub use motion_log::MotionLog;
+pub use motion_log::{Asked, MotionLog};
 pub use prior::ParameterPrior;
 pub use robot::{KnownEffect, Robot, RobotModel};
 pub use score::Gain;

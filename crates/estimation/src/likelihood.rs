@@ -170,6 +170,34 @@ impl Estimator for MotionLikelihood {
     }
 }
 
+/// Σ weight·tr(J⁻¹ J_k J⁻¹ J_l) of one instant in so many: a part of them is enough for a step's length.
+pub(super) fn log_determinant_curvature(
+    sensitivities: &[Sensitivity],
+    responses: &[Option<Response>],
+    parameters: usize,
+    every: usize,
+) -> Mat<f64> {
+    let mut curvature = Mat::zeros(parameters, parameters);
+    let every = every.max(1);
+    let all: f64 = sensitivities.iter().map(|sensitivity| sensitivity.weight).sum();
+    let chosen = || sensitivities.iter().zip(responses).skip(every / 2).step_by(every);
+    let part: f64 = chosen().map(|(sensitivity, _)| sensitivity.weight).sum();
+    for (sensitivity, response) in chosen() {
+        let Some(response) = response else { continue };
+        let reduced = response.reduced(sensitivity);
+        let weight = sensitivity.weight * all / part;
+        faer::linalg::matmul::matmul(
+            &mut curvature,
+            faer::Accum::Add,
+            reduced.transpose(),
+            &reduced,
+            weight,
+            faer::Par::Seq,
+        );
+    }
+    curvature
+}
+
 pub(super) fn column(values: &[f64]) -> Mat<f64> {
     Mat::from_fn(values.len(), 1, |row, _| values[row])
 }
@@ -255,27 +283,8 @@ impl Problem {
 
     /// Σ weight·tr(J⁻¹ J_k J⁻¹ J_l).
     pub(super) fn log_determinant_curvature(&self, responses: &[Option<Response>]) -> Mat<f64> {
-        let parameters = self.factor.parameter_count();
-        let mut curvature = Mat::zeros(parameters, parameters);
-        // A part of the instants is enough for a step's length; all of them count in the gradient.
-        let every = self.settings.instants_every.max(1);
-        let all: f64 = self.sensitivities.iter().map(|sensitivity| sensitivity.weight).sum();
-        let chosen = || self.sensitivities.iter().zip(responses).skip(every / 2).step_by(every);
-        let part: f64 = chosen().map(|(sensitivity, _)| sensitivity.weight).sum();
-        for (sensitivity, response) in chosen() {
-            let Some(response) = response else { continue };
-            let reduced = response.reduced(sensitivity);
-            let weight = sensitivity.weight * all / part;
-            faer::linalg::matmul::matmul(
-                &mut curvature,
-                faer::Accum::Add,
-                reduced.transpose(),
-                &reduced,
-                weight,
-                faer::Par::Seq,
-            );
-        }
-        curvature
+        let (parameters, every) = (self.factor.parameter_count(), self.settings.instants_every);
+        log_determinant_curvature(&self.sensitivities, responses, parameters, every)
     }
 
     pub(super) fn hessian(&self, curvature: &Mat<f64>) -> Mat<f64> {

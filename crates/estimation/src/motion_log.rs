@@ -23,6 +23,23 @@ pub struct MotionLog {
     /// which it did not are no rows of a robot on a fixed base, and do not count.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub still: Vec<bool>,
+    /// Torques that were commanded \[N·m, N\], one for each of `tau`; empty where nobody wrote them down.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub command: Vec<f64>,
+    /// What the controller was asked for at each row; none where the log does not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub asked: Option<Asked>,
+}
+
+/// What a controller was asked for. Arrays are row-major, `[row × joints]`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Asked {
+    /// Positions \[rad, m\].
+    pub q: Vec<f64>,
+    /// Velocities \[rad/s, m/s\].
+    pub qd: Vec<f64>,
+    /// Torques of the controller's own model for the reference \[N·m, N\].
+    pub torque: Vec<f64>,
 }
 
 impl MotionLog {
@@ -47,6 +64,8 @@ impl MotionLog {
             qdd: recording.qdd.clone().unwrap_or_default(),
             tau: recording.tau.clone(),
             still: Vec::new(),
+            command: Vec::new(),
+            asked: None,
         })
     }
 
@@ -112,6 +131,12 @@ impl MotionLog {
         let half_s = 0.5 * self.period_s;
         block.q.iter_mut().zip(&block.qd).for_each(|(position, speed)| *position += half_s * speed);
         block
+    }
+
+    /// The rows that count, of those that begin a period.
+    pub(crate) fn counted_rows(&self) -> Vec<usize> {
+        let counts = |row: &usize| self.still.get(*row).copied().unwrap_or(true);
+        (0..self.rows().saturating_sub(1)).filter(counts).collect()
     }
 
     fn beginnings(&self) -> Block {

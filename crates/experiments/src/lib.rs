@@ -9,6 +9,7 @@
 //! |---|---|
 //! | [`mod@run`] | does the whole chain work, from motions and logs to a model with its missing effect found? |
 //! | [`paper`] | do the results of the paper's section 5 come out, with balance and undeclared effects as well? |
+//! | [`noise`] | what does the curriculum learn from a robot whose noise nobody knows? |
 //! | [`undeclared`] | which undeclared effects does `phiw explain` find in logs, and what does it invent? |
 //! | [`plant`] | does it find them in the closed loop of a physics engine, tracked poorly? |
 //! | [`retarget`] | how fast and how close is retargeting, over whole databases and against others? |
@@ -22,6 +23,7 @@
 pub mod consistent;
 pub mod coverage;
 pub mod environment;
+pub mod noise;
 pub mod oracle;
 pub mod paper;
 pub mod plant;

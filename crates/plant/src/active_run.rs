@@ -33,6 +33,8 @@ pub(crate) struct ActiveRun {
     measured: Vec<f64>,
     command: Vec<f64>,
     delivered: Vec<f64>,
+    /// The actuators' own noise, of unit variance.
+    actuator_noise: Vec<f64>,
     external: Vec<f64>,
     jacobian: Vec<f64>,
     placements: Vec<Placement<f64>>,
@@ -85,6 +87,7 @@ impl ActiveRun {
             measured: zeros(),
             command: zeros(),
             delivered: zeros(),
+            actuator_noise: zeros(),
             external: zeros(),
             jacobian: vec![0.0; 6 * tree.velocity_size()],
             placements: vec![Placement::identity(); tree.bodies().len()],
@@ -158,7 +161,10 @@ impl ActiveRun {
             *command = command.clamp(-limit, limit);
             self.delivered[joint] = plant.drives[joint].delivered(*command);
             if plant.actuator_noise > 0.0 {
-                self.delivered[joint] += plant.actuator_noise * limit * normal(&mut self.actuator_rng);
+                let correlation = plant.actuator_noise_correlation;
+                let fresh = (1.0 - correlation * correlation).sqrt() * normal(&mut self.actuator_rng);
+                self.actuator_noise[joint] = correlation * self.actuator_noise[joint] + fresh;
+                self.delivered[joint] += plant.actuator_noise * limit * self.actuator_noise[joint];
             }
         }
         Ok(())

@@ -222,6 +222,14 @@ impl ComputedTorque {
         Ok(())
     }
 
+    /// The torque that the model gives for a reference `[q*, q̇*, q̈*]` by itself, without the PD.
+    ///
+    /// # Errors
+    /// A slice does not fit the model.
+    pub fn feed_forward(&mut self, [q, v, a]: [&[f64]; 3], torque: &mut [f64]) -> Result<(), DimensionError> {
+        self.model.torque(q, v, a, torque)
+    }
+
     /// The torque command for a reference `[q*, q̇*, q̈*]` and the state `[q, q̇]` as measured.
     pub(crate) fn command(
         &mut self,

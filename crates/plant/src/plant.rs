@@ -36,6 +36,9 @@ pub struct PlantSetup {
     /// Standard deviation of the torque that actuators add by themselves, over the effort limit; drawn anew
     /// for every command, and never logged. 0.05 in the paper.
     pub actuator_noise: f64,
+    /// Correlation ρ of that torque from one command to the next, between −1 and 1: n' = ρ·n + √(1 − ρ²)·ξ.
+    /// 0 in the paper.
+    pub actuator_noise_correlation: f64,
     /// Sensors.
     pub sensors: Sensors,
     /// How time is cut.
@@ -51,6 +54,7 @@ impl PlantSetup {
             controller,
             effects: Vec::new(),
             actuator_noise: 0.0,
+            actuator_noise_correlation: 0.0,
             sensors: Sensors::default(),
             timing: Timing::default(),
             fall_tilt_rad: 0.3,
@@ -80,6 +84,7 @@ pub struct Plant {
     pub(crate) couplings: Vec<Coupling>,
     pub(crate) effort: Vec<f64>,
     pub(crate) actuator_noise: f64,
+    pub(crate) actuator_noise_correlation: f64,
     pub(crate) sensors: Sensors,
     pub(crate) timing: Timing,
     pub(crate) fall_tilt_rad: f64,
@@ -100,7 +105,15 @@ impl Plant {
         setup: PlantSetup,
         build: impl FnOnce(&Tree, &World) -> Result<Box<dyn SimulationBackend>, BackendError>,
     ) -> Result<Self, PlantError> {
-        let PlantSetup { controller, effects, actuator_noise, sensors, timing, fall_tilt_rad } = setup;
+        let PlantSetup {
+            controller,
+            effects,
+            actuator_noise,
+            actuator_noise_correlation,
+            sensors,
+            timing,
+            fall_tilt_rad,
+        } = setup;
         world.check(tree)?;
         effects.iter().try_for_each(|effect| effect.check(tree))?;
         controller.check(tree.joint_count())?;
@@ -108,6 +121,12 @@ impl Plant {
         let limits = |joint: usize| tree.joint(joint).limits.effort;
         let effort: Vec<f64> = (0..tree.joint_count()).map(limits).collect();
         check_value(|| "the actuators' noise".to_owned(), actuator_noise, "≥ 0", |share| share >= 0.0)?;
+        check_value(
+            || "the correlation of the actuators' noise".to_owned(),
+            actuator_noise_correlation,
+            "between −1 and 1",
+            |rho| rho.abs() < 1.0,
+        )?;
         if let Some(joint) = effort.iter().position(|limit| actuator_noise > 0.0 && !limit.is_finite()) {
             return Err(PlantError::NoEffortLimit { joint: tree.joint(joint).joint.clone() });
         }
@@ -134,6 +153,7 @@ impl Plant {
             effects,
             effort,
             actuator_noise,
+            actuator_noise_correlation,
             sensors,
             timing,
             fall_tilt_rad,

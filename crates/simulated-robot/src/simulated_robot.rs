@@ -1,10 +1,11 @@
 //! A simulated robot that tries motions, over any backend.
 
-use crate::Controller;
+use crate::measuring::{KnownOfController, asked};
+use crate::{Controller, Measuring};
 use phiw_curriculum::motion::Motion;
 use phiw_curriculum::{CurriculumError, Experiment, Trial};
 use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
-use phiw_estimation::{KnownEffect, MotionLog, Robot, RobotModel};
+use phiw_estimation::{Asked, KnownEffect, MotionLog, Robot, RobotModel};
 use phiw_identification::effect::JointProperty;
 use phiw_plant::{Friction, History, Plant, PlantEffect, PlantRun, PlantSetup, Sensors, Timing};
 use rand::Rng;
@@ -31,6 +32,10 @@ pub struct SimulatedRobot {
     /// What the log says of the motion and of the torques, a row every control period. The controller sees
     /// the encoders, too.
     pub sensors: Sensors,
+    /// Correlation ρ of δf from one command to the next, between −1 and 1; 0 in the paper.
+    pub noise_correlation: f64,
+    /// What the log is like, where it is not all of the motion and the command, exactly.
+    pub measuring: Measuring,
     /// How time is cut.
     pub timing: Timing,
     /// Tilt of its base at which it counts as fallen \[rad\].
@@ -92,6 +97,8 @@ impl SimulatedRobot {
             effects: plant_effects(robot, truth)?,
             controller: Box::new(controller),
             actuator_noise: 0.0,
+            noise_correlation: 0.0,
+            measuring: Measuring::default(),
             sensors: Sensors::exact(timing.control_period_s),
             timing,
             fall_tilt_rad: 0.3,
@@ -104,6 +111,10 @@ impl SimulatedRobot {
     pub fn torque_noise(&self) -> Vec<f64> {
         let noise = |joint: usize| {
             let sensor = self.sensors.torque_noise.get(joint).copied().unwrap_or(0.0);
+            let sensor = match self.measuring.torque_noise {
+                0.0 => sensor,
+                share => sensor.hypot(share * self.tree.joint(joint).limits.effort),
+            };
             match self.actuator_noise {
                 0.0 => sensor,
                 share => sensor.hypot(share * self.tree.joint(joint).limits.effort),
@@ -120,6 +131,7 @@ impl SimulatedRobot {
         motion: &Motion,
         rng: &mut dyn Rng,
     ) -> Result<PlantRun, CurriculumError> {
+        let sensors = self.measuring.sensors(&self.sensors, self.tree.joint_count());
         let period_s = self.sensors.period_s;
         if (period_s / self.timing.control_period_s - 1.0).abs() > 1e-9 {
             let must_be =
@@ -129,7 +141,8 @@ impl SimulatedRobot {
         let setup = PlantSetup {
             effects: self.effects.clone(),
             actuator_noise: self.actuator_noise,
-            sensors: self.sensors.clone(),
+            actuator_noise_correlation: self.noise_correlation,
+            sensors,
             timing: self.timing,
             fall_tilt_rad: self.fall_tilt_rad,
             ..PlantSetup::new(self.controller.controller(robot, model)?)
@@ -138,6 +151,20 @@ impl SimulatedRobot {
             .map_err(CurriculumError::of_experiment)?;
         let reference = |t_s: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| motion.at(t_s, q, v, a);
         plant.run(&reference, motion.duration_s(), rng).map_err(CurriculumError::of_experiment)
+    }
+
+    /// What the controller was asked for at each row of a log.
+    fn asked(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        motion: &Motion,
+        log: &MotionLog,
+    ) -> Result<Asked, CurriculumError> {
+        let mut controller = self.controller.controller(robot, model)?;
+        asked(motion, log, |reference, torque| {
+            controller.feed_forward(reference, torque).map_err(CurriculumError::from)
+        })
     }
 
     /// For each row of the log, whether the base stood still until the next, as a gyroscope in it would
@@ -179,7 +206,15 @@ impl Experiment for SimulatedRobot {
                 period_s: self.timing.control_period_s,
                 ..MotionLog::default()
             },
-            _ => MotionLog { still: self.still(&run.history), ..MotionLog::from_recording(&run.recording)? },
+            _ => MotionLog {
+                still: self.still(&run.history),
+                ..self.measuring.log(&run, &self.tree, &self.timing, rng)?
+            },
+        };
+        let measured = match self.measuring.controller == KnownOfController::Reference && measured.rows() > 1
+        {
+            true => MotionLog { asked: Some(self.asked(robot, model, motion, &measured)?), ..measured },
+            false => measured,
         };
         Ok(Trial { measured, fell_at_s: run.fell_at_s, tracking_error: run.tracking_error })
     }

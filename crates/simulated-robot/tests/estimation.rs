@@ -108,7 +108,7 @@ fn what_rows_do_not_determine_keeps_its_present_value() {
         qd: vec![0.0; joints * rows],
         qdd: Vec::new(),
         tau: tau.repeat(rows),
-        still: Vec::new(),
+        ..MotionLog::default()
     };
     evidence.add(&design, &measured).unwrap();
     let initial = unreliable_model(&arm.truth, 9);

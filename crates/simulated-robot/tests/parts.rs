@@ -231,6 +231,8 @@ fn the_controller_s_torque_is_that_of_the_model() {
         timing: phiw_plant::Timing { settle_s: 0.0, ..Default::default() },
         fall_tilt_rad: 0.3,
         stillness: Default::default(),
+        noise_correlation: 0.0,
+        measuring: Default::default(),
         build: Box::new(|tree, world| {
             Ok(Box::new(phiw_dynamics::AnalyticBackend::in_world(tree.clone(), world)?))
         }),

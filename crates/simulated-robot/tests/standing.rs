@@ -99,6 +99,8 @@ impl Humanoid {
             timing: Timing { control_period_s: 1e-3, longest_step_s: 5e-4, settle_s: 1.0 },
             fall_tilt_rad: 0.3,
             stillness: Default::default(),
+            noise_correlation: 0.0,
+            measuring: Default::default(),
             build,
         };
         let wrench_noise = WrenchNoise { force_n: 0.0, moment_nm: 0.0 };

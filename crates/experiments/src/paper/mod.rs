@@ -36,6 +36,7 @@ mod detection;
 mod ending;
 mod figures;
 mod jobs;
+mod method;
 mod motions;
 mod numbers;
 mod page;

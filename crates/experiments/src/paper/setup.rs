@@ -1,7 +1,8 @@
 //! Everything that all runs share, and what of it decides their results.
 
-use super::arguments::{Detector, EstimatorName, Initial, PriorName, RelaxationName, RunArguments};
-use super::motions::{Motions, Source};
+use super::arguments::{Detector, EstimatorName, Initial, Method, PriorName, RelaxationName, RunArguments};
+use super::method;
+use super::motions::Motions;
 use super::run_file;
 use super::subject::{Subject, SubjectName};
 use super::tasks::two_tasks;
@@ -15,13 +16,13 @@ use phiw_curriculum::Experiment;
 use phiw_curriculum::constraint::ZmpConstraint;
 use phiw_curriculum::growth::Growth;
 use phiw_curriculum::motion::{Motion, MotionDataset};
-use phiw_curriculum::relaxation::{ConditionRelaxation, Relaxation, UncertaintyRelaxation};
+use phiw_curriculum::relaxation::Relaxation;
 use phiw_curriculum::selection::MotionCandidates;
 use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
 use phiw_dynamics::{Workspace, World};
 use phiw_estimation::{
-    Estimator, Evidence, LeastSquares, MotionLikelihood, MotionLog, ParameterPrior, Robot, RobotModel,
-    RowsAt, WeightedLeastSquares,
+    ConcentratedLikelihood, Estimator, Evidence, LeastSquares, MotionLikelihood, MotionLog, ParameterPrior,
+    Robot, RobotModel, RowsAt, WeightedLeastSquares,
 };
 use phiw_growth::{ScoreTest, TraceResidual};
 use phiw_identification::model::{parameter_name, standard_unit};
@@ -83,6 +84,9 @@ pub struct Settings {
     pub held_out: Vec<String>,
     /// The two tasks of the task-specific models.
     pub tasks: [String; 2],
+    /// The whole method, if one was named.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub method: Option<Method>,
     /// How parameters are estimated.
     pub estimator: EstimatorName,
     /// What the estimate falls back on.
@@ -170,16 +174,13 @@ impl Setup {
         let dataset = MotionDataset::new(subject.tree.joint_count(), motions.identification)?;
         let weights = subject.row_weights(if arguments.noise > 0.0 { arguments.noise } else { NOISELESS });
         let candidates = MotionCandidates::new(&robot, robot.declared(), &dataset, &weights)?;
-        let (prior, relaxation) = method(arguments, &subject);
-        let relaxation_of_alpha: Box<dyn Relaxation> = match relaxation {
-            RelaxationName::Condition => Box::new(ConditionRelaxation::default()),
-            RelaxationName::Uncertainty => Box::new(UncertaintyRelaxation::default()),
-        };
+        let (prior, relaxation) = method::method(arguments, &subject);
+        let relaxation_of_alpha = method::relaxation(relaxation, arguments.method);
         let constraint = ZmpConstraint::of_the_paper(subject.stance.clone());
         let settings = Settings {
             backend: format!("{:?}", arguments.backend).to_lowercase(),
             robot: arguments.robot,
-            motions: motions_in_words(arguments, &subject).to_owned(),
+            motions: method::motions_in_words(arguments, &subject).to_owned(),
             digest: motions.digest,
             dataset: dataset
                 .motions()
@@ -194,7 +195,8 @@ impl Setup {
                 .collect(),
             held_out: motions.validation.iter().map(|motion| motion.name.clone()).collect(),
             tasks: two_tasks(&robot, &truth, &dataset, &constraint, relaxation_of_alpha.as_ref())?,
-            estimator: arguments.estimator,
+            method: arguments.method,
+            estimator: arguments.estimator(),
             prior,
             relaxation,
             detector: arguments.detector,
@@ -241,6 +243,11 @@ impl Setup {
         secret: Option<&PlantEffect>,
     ) -> Box<dyn Experiment> {
         let mut experiment = self.experiment(backend, standing, noise);
+        // What is held out is measured without noise, and exactly.
+        if noise > 0.0 {
+            experiment.measuring.encoders =
+                method::encoders(self.settings.method, experiment.timing.control_period_s);
+        }
         experiment.effects.extend(secret.cloned());
         match &self.subject.standing {
             Some(legs) => Box::new(self.subject.on_feet(legs, backend, noise, experiment.effects)),
@@ -264,6 +271,8 @@ impl Setup {
             timing: timing(backend),
             fall_tilt_rad: 0.3,
             stillness: Default::default(),
+            noise_correlation: 0.0,
+            measuring: Default::default(),
             build: Box::new(move |tree, world| backend.build(tree, world)),
         }
     }
@@ -271,6 +280,11 @@ impl Setup {
     /// Who estimates, in a run that begins with `initial`.
     pub fn estimator(&self, initial: &RobotModel) -> Box<dyn Estimator> {
         match self.settings.estimator {
+            EstimatorName::Concentrated => {
+                let standing_on = self.subject.standing.as_ref().map(Standing::foot_bodies);
+                let concentrated = ConcentratedLikelihood::new(initial.clone());
+                Box::new(concentrated.standing_on(standing_on.unwrap_or_default()))
+            }
             EstimatorName::LeastSquares => Box::new(LeastSquares),
             EstimatorName::Weighted => Box::new(WeightedLeastSquares),
             EstimatorName::Likelihood => {
@@ -365,27 +379,6 @@ impl Setup {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(SECRET_STREAM);
         Ok(kind.draw(&robot, &samples, &mut rng))
-    }
-}
-
-/// What the estimate falls back on and what α follows, unless they are asked for. The paper's robot is
-/// excited well, and its method is the paper's.
-fn method(arguments: &RunArguments, subject: &Subject) -> (PriorName, RelaxationName) {
-    let (prior, relaxation) = match subject.standing {
-        Some(_) => (PriorName::Initial, RelaxationName::Uncertainty),
-        None => (PriorName::None, RelaxationName::Condition),
-    };
-    (arguments.prior.unwrap_or(prior), arguments.relaxation.unwrap_or(relaxation))
-}
-
-fn motions_in_words(arguments: &RunArguments, subject: &Subject) -> &'static str {
-    match (&arguments.motions, arguments.dataset) {
-        (Some(_), _) => "of a folder",
-        (None, Source::Embedded) if subject.standing.is_some() => {
-            "embedded (synthetic), on synthetic legs that sway, squat and twist with both feet on the floor"
-        }
-        (None, Source::Embedded) => "embedded (synthetic)",
-        (None, Source::UeAdl) => "ue_adl (measured on people)",
     }
 }
 

@@ -187,6 +187,8 @@ impl Subject {
             },
             fall_tilt_rad: 0.3,
             stillness: Default::default(),
+            noise_correlation: 0.0,
+            measuring: Default::default(),
             build: Box::new(move |tree, world| build(backend, tree, world)),
         };
         let wrench_noise = if noise > 0.0 { WRENCH_NOISE } else { noiseless };

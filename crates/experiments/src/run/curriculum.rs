@@ -109,6 +109,7 @@ fn arguments(backend: Engine, out: &Path) -> RunArguments {
         control: 0,
         // At this noise the residual has a colour, and a trace needs one effect where a score test takes two.
         detector: Detector::Trace,
+        method: None,
         estimator: EstimatorName::Likelihood,
         prior: None,
         relaxation: None,

@@ -79,6 +79,8 @@ impl Arm {
             timing: Timing { longest_step_s: 1e-3, settle_s: 0.2, ..Timing::default() },
             fall_tilt_rad: 0.3,
             stillness: Default::default(),
+            noise_correlation: 0.0,
+            measuring: Default::default(),
             build: Box::new(|tree, world| Ok(Box::new(AnalyticBackend::in_world(tree.clone(), world)?))),
         }
     }
