@@ -49,9 +49,14 @@ impl Search<'_> {
         let following = probe::following(fit, &large)?;
         let over = |row: usize| error.rmse[row] / self.input.noise_floor[row];
         let nearest = (0..error.rmse.len()).map(over).fold(f64::INFINITY, f64::min).max(1.0);
+        let hangs_together =
+            |row: usize| shape.autocorrelation[row].abs() > self.options.structured_correlation;
+        // Where most torques hang together, that is the colour of the sensors' noise.
+        let coloured = 2 * (0..error.rmse.len()).filter(|&row| hangs_together(row)).count();
         let stands_out = |row: usize| {
             over(row) > self.options.structured_ratio * nearest
-                && shape.autocorrelation[row].abs() > self.options.structured_correlation
+                && hangs_together(row)
+                && coloured < error.rmse.len()
         };
         let wanders = |row: usize| shape.wander[row] > self.options.wander;
         let is_structured = |row: &usize| following.contains(row) || wanders(*row) || stands_out(*row);

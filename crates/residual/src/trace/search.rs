@@ -7,7 +7,7 @@ use super::sample::Sample;
 use super::stage::{Fixed, Stage, specs_and_values};
 use super::tracing::Tracing;
 use crate::selection::{Member, Policy, Problem, select, value};
-use phiw_effects::SignalRanges;
+use phiw_effects::{Constants, SignalRanges};
 use phiw_identification::{Data, Design, Effect, EffectSpec, Fold, IdentificationError};
 
 /// Times that all is chosen anew: columns that are made of the model's torque need a second, what they bring
@@ -38,6 +38,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         declared: input.declared.len(),
         folds: split(&data.train),
         chosen: Chosen::default(),
+        refuted: Vec::new(),
         input: &input,
         options,
     };
@@ -47,6 +48,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         let before = search.names();
         search.choose()?;
         search.refine()?;
+        search.leave_out_what_is_not_realised()?;
         if search.names() == before && !search.contest()? {
             break;
         }
@@ -84,6 +86,8 @@ pub(super) struct Search<'a> {
     /// Stretches of the training motion.
     pub folds: Vec<Fold>,
     pub chosen: Chosen,
+    /// Effects that promised more to first order than they held in force: they are not sought again.
+    pub refuted: Vec<EffectSpec>,
     pub input: &'a TraceInput<'a>,
     pub options: &'a TraceOptions,
 }
@@ -124,7 +128,9 @@ impl Search<'_> {
     /// Chooses among all hypotheses, from the present model on.
     pub(super) fn choose(&mut self) -> Result<(), IdentificationError> {
         let present = Present { specs: &self.specs, declared: self.declared };
-        let mut candidates = Candidates::all(self.fixed, present, &self.ranges()?, self.options)?;
+        let mut options = self.options.clone();
+        options.excluded.extend(self.refuted.iter().cloned());
+        let mut candidates = Candidates::all(self.fixed, present, &self.ranges()?, &options)?;
         let effects = std::mem::take(&mut candidates.effects);
         let stage = self.pass(effects)?;
         let problem = self.fixed.problem(&stage, &mut candidates)?;
@@ -146,6 +152,25 @@ impl Search<'_> {
             rows: outcome.rows,
         };
         self.take(&problem, &candidates, &outcome.members, &outcome.fit.values);
+        Ok(())
+    }
+
+    /// Leaves out what was chosen for what it does to first order and, now that it is in force, makes the
+    /// criterion no smaller than it is without it: noise that moves a robot looks like a delay, until the
+    /// signals are shifted.
+    fn leave_out_what_is_not_realised(&mut self) -> Result<(), IdentificationError> {
+        for place in (self.declared..self.specs.len()).rev() {
+            if self.fixed.absent(&self.specs[place])?.is_none() {
+                continue;
+            }
+            let mut branch = self.clone();
+            branch.remove(place)?;
+            branch.refine()?;
+            if branch.value()? <= self.value()? {
+                branch.refuted.push(EffectSpec { constants: Constants::new(), ..self.specs[place].clone() });
+                *self = branch;
+            }
+        }
         Ok(())
     }
 
