@@ -23,7 +23,31 @@ impl Search<'_> {
                 return Ok(tracing);
             }
         }
+        // What is made of the model's torque was judged with that of an earlier fit.
+        if let Some(without) = self.without_what_depends_on_the_model()? {
+            let tracing = without.finish_with(before.clone(), Harm::EachTorque)?;
+            if tracing.model.held_out.relative <= AS_GOOD * most {
+                return Ok(tracing);
+            }
+        }
         self.finish_with(before, Harm::AllTorques { most_relative: most })
+    }
+
+    /// The same without the effects that were found and whose columns are made of the model's torque or are
+    /// linearised about what is in force; nothing if there are none.
+    fn without_what_depends_on_the_model(&self) -> Result<Option<Self>, IdentificationError> {
+        let effects = self.fixed.build(&self.specs)?;
+        let mut branch = self.clone();
+        for place in (self.declared..self.specs.len()).rev() {
+            if effects[place].needs().of_reference() || self.fixed.absent(&self.specs[place])?.is_some() {
+                branch.remove(place)?;
+            }
+        }
+        if branch.specs.len() == self.specs.len() {
+            return Ok(None);
+        }
+        branch.refine()?;
+        Ok(Some(branch))
     }
 
     fn finish_with(
