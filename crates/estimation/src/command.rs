@@ -12,8 +12,7 @@ const NEAR_LIMIT: f64 = 0.9;
 const EXACT: f64 = 1e-7;
 
 impl MotionLog {
-    /// The commands, `[row × joint]`: those that were written down, or what the reference tells of
-    /// them, or
+    /// The commands, `[row × joint]`: those that were written down, or what the reference tells of them, or
     /// else the log's own torques.
     ///
     /// From a reference: of all torques that a controller of the form (13) could have given, a

@@ -11,8 +11,7 @@ use crate::{EstimationError, RobotModel};
 use faer::Mat;
 use phiw_identification::Design;
 
-/// [`super::MotionLikelihood`] without being told the noise: its size, its correlation from a period to
-/// the
+/// [`super::MotionLikelihood`] without being told the noise: its size, its correlation from a period to the
 /// next, and how much of what the log's torque has beside the command moved the robot are found with the
 /// parameters.
 ///
@@ -20,20 +19,16 @@ use phiw_identification::Design;
 ///
 /// - σ, the size. That of the residual under the parameters; the parameters are those that are most likely
 ///   when σ is (concentrated likelihood). What is lost against a known σ is what the noise's own size
-///   tells of
-///   the inertia it shakes.
+///   tells of the inertia it shakes.
 /// - ρ, the correlation from one command to the next. The rows are Φ_t − ρ·Φ_{t−1} (Cochrane & Orcutt
-/// 1949),
-///   whose noise is white, so that the state a period begins with is an instrument again.
+///   1949), whose noise is white, so that the state a period begins with is an instrument again.
 /// - Where the noise is. A controller of the form (13) commands what follows from the reference and the
 ///   encoders ([`crate::MotionLog::commands`]); what the log's torque has beside it is an error of its
-///   sensor,
-///   or was delivered and moved the robot. The share that did is a coefficient of its own.
+///   sensor, or was delivered and moved the robot. The share that did is a coefficient of its own.
 ///
 /// Bodies are possible: the prior is the log-det divergence from what was believed at first, and frictions
-/// stay positive. Where the log knows neither commands nor reference, its torque is taken for the
-/// command: right where
-/// that is what it is, or a torque sensor's noise is small beside the actuators'.
+/// stay positive. Where the log knows neither commands nor reference, its torque is taken for the command:
+/// right where that is what it is, or a torque sensor's noise is small beside the actuators'.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConcentratedLikelihood {
     /// What was believed before anything was measured.
@@ -58,8 +53,7 @@ pub struct ConcentratedSettings {
     pub tempered_rounds: usize,
     /// How many times more it weighs in one of these than in the next. Default: 4.
     pub tempering: f64,
-    /// Rounds after these that take the torques' median correlation for all: under a bad belief the
-    /// residual
+    /// Rounds after these that take the torques' median correlation for all: under a bad belief the residual
     /// of a single torque is no noise yet, and may keep the estimate from ever leaving it. Default: 4.
     pub rounds_in_common: usize,
     /// Rounds after these at most, each torque with its own correlation. Default: 6.
@@ -69,8 +63,7 @@ pub struct ConcentratedSettings {
     pub steps_a_round: usize,
     /// Change of a correlation from which on another round is worth it. Default: 0.005.
     pub settled: f64,
-    /// Largest correlation of the noise. Default: 0.98: rows of a noise that is nearly a constant say
-    /// nothing
+    /// Largest correlation of the noise. Default: 0.98: rows of a noise that is nearly a constant say nothing
     /// of weights.
     pub largest_correlation: f64,
     /// Least standard deviation of a torque's noise over the RMS of its command. Default: 3·10⁻³. No drive
@@ -106,8 +99,7 @@ pub struct TorqueNoise {
     pub std: f64,
     /// Its correlation from one command to the next.
     pub correlation: f64,
-    /// Share of what the log's torque has beside the command that moved the robot: 0 where it is the
-    /// error of
+    /// Share of what the log's torque has beside the command that moved the robot: 0 where it is the error of
     /// a sensor, 1 where it was delivered.
     pub felt: f64,
 }

@@ -1,18 +1,13 @@
 //! The motion at each command, from encoders alone.
 //!
-//! A command is held until the next, and with it, nearly, the acceleration: friction takes some of it
-//! within
-//! the period. So a joint's angle is a cubic between commands: it is continuous, its speed is
-//! continuous, and
-//! its acceleration jumps where a command, or the noise in it, does. A filter would smear such a jump
-//! over the
-//! periods around it, and what the noise of a period has done to the motion would be in the periods
-//! before it.
-//! (Were the acceleration constant in each period, frictions would come out a third too large.)
+//! A command is held until the next, and with it, nearly, the acceleration: friction takes some of it within
+//! the period. So a joint's angle is a cubic between commands: it is continuous, its speed is continuous, and
+//! its acceleration jumps where a command, or the noise in it, does. A filter would smear such a jump over
+//! the periods around it, and what the noise of a period has done to the motion would be in the periods
+//! before it. (Were the acceleration constant in each period, frictions would come out a third too large.)
 //!
 //! Where encoders are read several times a period, their readings alone decide. Where they are read once a
-//! period, a speed that alternates from knot to knot is not seen by them: the accelerations are then
-//! held to
+//! period, a speed that alternates from knot to knot is not seen by them: the accelerations are then held to
 //! their mean over the neighbouring periods, each within the spread that the readings show.
 
 use crate::{EstimationError, MotionLog};
@@ -27,10 +22,8 @@ const CHANGE: f64 = 0.3;
 const ROUNDING: f64 = 0.288_675_134_594_812_9;
 
 impl MotionLog {
-    /// From a recording of encoders alone, read every `recording` period or less often than every
-    /// `period_s`
-    /// \[s\], for which a command is held; the first row is that of a command. `step` is the encoders'
-    /// step
+    /// From a recording of encoders alone, read every `recording` period or less often than every `period_s`
+    /// \[s\], for which a command is held; the first row is that of a command. `step` is the encoders' step
     /// \[rad, m\]. The torques are those recorded nearest to each command.
     ///
     /// # Errors
@@ -114,8 +107,7 @@ impl Spline<'_> {
             .collect()
     }
 
-    /// The acceleration of each period, times its square, as its neighbours have it: the change of
-    /// speed over
+    /// The acceleration of each period, times its square, as its neighbours have it: the change of speed over
     /// them all.
     fn expected(&self) -> Vec<f64> {
         let knots = self.at_knots();
@@ -129,8 +121,7 @@ impl Spline<'_> {
             .collect()
     }
 
-    /// Standard deviation of the accelerations about those, times the period's square: the second
-    /// difference
+    /// Standard deviation of the accelerations about those, times the period's square: the second difference
     /// of the knots is the mean of two of them, and has the readings' rounding in it.
     fn spread(&self, expected: &[f64], step: f64) -> f64 {
         let knots = self.at_knots();

@@ -1,11 +1,9 @@
 //! Rows beside those of the period before: what noise that is correlated in time asks for.
 //!
-//! Where the noise of a period is ρ times that of the period before and something new, the rows
-//! Φ_t − ρ·Φ_{t−1} have the new alone. ρ is not known when a log is read, but R of \[Φ_{t−1} Φ_t\]
-//! gives R of
-//! these rows for any ρ. What the log's torque has beside the command ([`MotionLog::commands`]) is a
-//! column of
-//! its own, so that how much of it the motion felt can be asked later, too.
+//! Where the noise of a period is ρ times that of the period before and something new, the rows Φ_t −
+//! ρ·Φ_{t−1} have the new alone. ρ is not known when a log is read, but R of \[Φ_{t−1} Φ_t\] gives R of these
+//! rows for any ρ. What the log's torque has beside the command ([`MotionLog::commands`]) is a column of its
+//! own, so that how much of it the motion felt can be asked later, too.
 
 use crate::{EstimationError, Evidence, MotionLog, foresight};
 use faer::Mat;
@@ -16,8 +14,7 @@ use phiw_regressor::least_squares::{Group, GroupedFactor};
 
 /// R of the rows of all torques with those before them.
 ///
-/// The columns of a torque are `[Φ d u]` of the period before, then of the period: u the command, d
-/// what the
+/// The columns of a torque are `[Φ d u]` of the period before, then of the period: u the command, d what the
 /// log's torque has beside it.
 #[derive(Clone, Debug)]
 pub(super) struct InOrder {
@@ -153,10 +150,8 @@ impl InOrder {
         GroupedFactor::new(self.parameters, groups?)
     }
 
-    /// The colour of each torque's noise under parameters `w`: the felt share and the correlation that
-    /// leave
-    /// least, found one after the other until they stay. `least` is the variance of each torque's noise
-    /// that
+    /// The colour of each torque's noise under parameters `w`: the felt share and the correlation that leave
+    /// least, found one after the other until they stay. `least` is the variance of each torque's noise that
     /// nothing is believed to fall short of, and that is white: a residual below it has no colour.
     pub fn colours(&self, w: &[f64], least: &[f64], largest: f64) -> Vec<Colour> {
         let colour = |(group, least): (&Group, &f64)| {

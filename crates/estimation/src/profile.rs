@@ -1,9 +1,8 @@
 //! The likelihood of a motion with the noise's size replaced by its most likely value.
 //!
-//! −log L = Σ_t ½‖Φ_t w − f_t‖²_σ + N·Σ log σ_j − Σ_t log det J_t(w) has its least value over σ_j at
-//! σ_j² = S_j/N, S_j = Σ_t (Φ_t w − f_t)_j²; what is left is Σ_j (N/2)·log S_j − Σ_t log det J_t, to
-//! which the
-//! prior is added. (Concentrated likelihood: Barndorff-Nielsen & Cox 1994, section 3.4.)
+//! −log L = Σ_t ½‖Φ_t w − f_t‖²_σ + N·Σ log σ_j − Σ_t log det J_t(w) has its least value over σ_j at σ_j² =
+//! S_j/N, S_j = Σ_t (Φ_t w − f_t)_j²; what is left is Σ_j (N/2)·log S_j − Σ_t log det J_t, to which the prior
+//! is added. (Concentrated likelihood: Barndorff-Nielsen & Cox 1994, section 3.4.)
 
 use super::body_prior::BodyPrior;
 use super::likelihood::log_determinant_curvature;
@@ -143,8 +142,7 @@ impl Profile<'_> {
         Minimum { x, covariance, settled }
     }
 
-    /// Adds the squares' part of gradient and curvature, and returns what is to be taken off the latter
-    /// as a
+    /// Adds the squares' part of gradient and curvature, and returns what is to be taken off the latter as a
     /// matrix times its transpose: σ follows w.
     fn add_squares(&self, w: &Mat<f64>, gradient: &mut Mat<f64>, hessian: &mut Mat<f64>) -> Mat<f64> {
         let groups = self.factor.groups();

@@ -63,8 +63,7 @@ fn found(measuring: Measuring) -> (Arm, Found) {
     (arm, Found { error, least_squares, initial, deviations, noise })
 }
 
-/// σ, ρ and where the noise is come with the parameters, from encoders and a torque sensor that is as
-/// bad as
+/// σ, ρ and where the noise is come with the parameters, from encoders and a torque sensor that is as bad as
 /// the actuators.
 #[test]
 fn the_noise_is_found_with_the_parameters() {
