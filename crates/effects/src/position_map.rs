@@ -22,8 +22,10 @@ const KNOTS: &str = "knots";
 /// Ends of the arc \[rad, m\]: the first and the last knot, or a whole turn.
 const LOWER: &str = "lower";
 const UPPER: &str = "upper";
-/// Numbers of knots that are scanned.
-const SCANNED: [f64; 2] = [6.0, 12.0];
+/// Number of knots that a map is sought with: few enough to be cheap for every joint.
+const SCANNED: f64 = 9.0;
+/// Number of knots of a declared map.
+const DECLARED: f64 = 12.0;
 /// Numbers between which the data choose, once a map was found.
 const FEWEST: usize = 6;
 const MOST: usize = 24;
@@ -48,8 +50,8 @@ impl EffectKind for PositionMap {
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         let (lower, upper) = ranges.joints[site[0]].position;
         let ends = [(LOWER.to_owned(), lower), (UPPER.to_owned(), upper.max(lower + SHORTEST_ARC))];
-        let with = |knots: f64| ends.iter().cloned().chain([(KNOTS.to_owned(), knots)]).collect();
-        SCANNED.map(with).to_vec()
+        let with = |knots: f64| ends.into_iter().chain([(KNOTS.to_owned(), knots)]).collect();
+        vec![with(SCANNED)]
     }
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
         let (Some(&knots), Some(factor)) = (found.get(KNOTS), FACTORS.get(step)) else { return Vec::new() };
@@ -58,7 +60,7 @@ impl EffectKind for PositionMap {
         near.map(|knots| found.clone().into_iter().chain([(KNOTS.to_owned(), knots)]).collect()).collect()
     }
     fn declared_constants(&self) -> Option<Constants> {
-        Some(Constants::from([(KNOTS.to_owned(), SCANNED[1])]))
+        Some(Constants::from([(KNOTS.to_owned(), DECLARED)]))
     }
     fn telling_motion(&self) -> &'static str {
         "slow motion over the whole range of the joint, several times and in both directions"
@@ -98,7 +100,7 @@ impl EffectKind for PositionMap {
 
 /// The curve of these constants.
 fn spline(constants: &Constants, turns: bool) -> TrigonometricSpline {
-    let knots = (constant(constants, KNOTS, SCANNED[0]) as usize).clamp(FEWEST, MOST);
+    let knots = (constant(constants, KNOTS, SCANNED) as usize).clamp(FEWEST, MOST);
     let lower = constant(constants, LOWER, -1.0);
     let length = (constant(constants, UPPER, 1.0) - lower).max(SHORTEST_ARC);
     if turns && length >= TAU {

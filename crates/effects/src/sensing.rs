@@ -2,7 +2,7 @@
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant, values};
+use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant};
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::effect::{EffectParameter, Entry, Evaluator, Needs, Sample};
 use phiw_identification::{Effect, EffectSpec};
@@ -217,6 +217,8 @@ impl Evaluator for OffsetColumns<'_> {
 pub struct ActuatorSaturation;
 
 const LIMIT: &str = "limit";
+/// The lowest limit that is plausible: the steps of refinement together once led below the torque's RMS.
+const LEAST_LIMIT: &str = "least_limit";
 /// Share of the limit that the model's torque reaches where the drive clips; the model was fitted with the
 /// clipping, and is not exact.
 const REACHED: f64 = 0.9;
@@ -241,14 +243,17 @@ impl EffectKind for ActuatorSaturation {
             return Vec::new();
         }
         let step = (highest / lowest).powf(1.0 / 7.0);
-        values(LIMIT, (0..8).map(|power| lowest * step.powi(power)))
+        let with =
+            |limit: f64| Constants::from([(LIMIT.to_owned(), limit), (LEAST_LIMIT.to_owned(), lowest)]);
+        (0..8).map(|power| with(lowest * step.powi(power))).collect()
     }
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
         let Some(&limit) = found.get(LIMIT) else { return Vec::new() };
         let spread = 0.04 * 0.5_f64.powi(step as i32);
-        [1.0 - spread, 1.0 + spread]
-            .map(|factor| Constants::from([(LIMIT.to_owned(), limit * factor)]))
-            .to_vec()
+        let least = constant(found, LEAST_LIMIT, 0.0);
+        let near = [1.0 - spread, 1.0 + spread].map(|factor| limit * factor).into_iter();
+        let with = |limit: f64| found.clone().into_iter().chain([(LIMIT.to_owned(), limit)]).collect();
+        near.filter(|limit| *limit >= least).map(with).collect()
     }
     fn telling_motion(&self) -> &'static str {
         "a motion that asks for more torque than the drive has"

@@ -127,7 +127,7 @@ impl<'a> Search<'a> {
     }
 
     fn run(&mut self) {
-        for _ in 0..ROUNDS {
+        for round in 0..ROUNDS {
             let before = self.model.members.clone();
             // What the textbook has first, or a form of it takes its place. The effective rows are renewed
             // between the phases: within one the criterion falls with each step, so that each ends.
@@ -143,7 +143,7 @@ impl<'a> Search<'a> {
             self.renew();
             while self.prune() {}
             self.sweep();
-            if self.choose_anew() {
+            if round == 0 && self.choose_anew() {
                 self.sweep();
             }
             while self.prune() {}
