@@ -66,7 +66,7 @@ const SENTENCES: &[(&str, &str)] = &[
     ),
     (
         "position_map",
-        "The torque of shoulder depends on its position in no simple form (a cable, a hose, cogging): it varies by 0.148 N·m RMS from -1.000 to 1.000 rad.",
+        "The torque of shoulder depends on its position in no simple form (a cable, a hose, cogging): it varies by 0.159 N·m RMS from -1.000 to 1.000 rad.",
     ),
 ];
 

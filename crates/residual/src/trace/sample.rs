@@ -5,7 +5,7 @@ use phiw_identification::{BlockSource, Data, Fold, IdentificationError, KeptBloc
 use phiw_telemetry::Block;
 
 /// Samples that the search looks at, at most: some minutes of motion.
-const SEARCHED_SAMPLES: f64 = 150_000.0;
+const SEARCHED_SAMPLES: f64 = 60_000.0;
 /// Length of a piece \[s\]: long against a residual's correlation and against the filters' reach.
 const PIECE_S: f64 = 5.0;
 /// Conditioned samples that are kept between passes; what does not fit is read again \[bytes\].
