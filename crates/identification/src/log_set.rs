@@ -3,9 +3,9 @@
 use crate::checks::{check_excitation, check_logs};
 use crate::{BlockSource, Fold, IdentificationError};
 use phiw_dynamics::Tree;
-use phiw_telemetry::{Block, Conditioning, ConditioningOptions, LogError, Survey, TorqueColumns};
+use phiw_telemetry::{Block, Conditioning, ConditioningOptions, LogError, LogSource, Survey, TorqueColumns};
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Stretches of time that the training logs are cut into: long against the residual's correlation, enough for
 /// a standard deviation.
@@ -33,10 +33,10 @@ impl LogSet {
     ///
     /// # Errors
     /// A log that cannot be read or does not fit the robot, or a joint that moves in none.
-    pub fn open(
+    pub fn open<S: Clone + Into<LogSource>>(
         tree: &Tree,
-        train: &[PathBuf],
-        validate: &[PathBuf],
+        train: &[S],
+        validate: &[S],
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
@@ -49,43 +49,44 @@ impl LogSet {
     ///
     /// # Errors
     /// A log that cannot be read or does not fit the robot.
-    pub fn open_unexcited(
+    pub fn open_unexcited<S: Clone + Into<LogSource>>(
         tree: &Tree,
-        train: &[PathBuf],
-        validate: &[PathBuf],
+        train: &[S],
+        validate: &[S],
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
-        Self::surveyed(tree, [train, validate], TorqueColumns::Required, options, progress)
+        Self::surveyed(tree, [sources(train), sources(validate)], TorqueColumns::Required, options, progress)
     }
 
     /// The same of logs that a model is used on: they need no torques.
     ///
     /// # Errors
     /// A log that cannot be read or does not fit the robot.
-    pub fn open_for_prediction(
+    pub fn open_for_prediction<S: Clone + Into<LogSource>>(
         tree: &Tree,
-        logs: &[PathBuf],
+        logs: &[S],
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
-        Self::surveyed(tree, [logs, &[]], TorqueColumns::Optional, options, progress)
+        Self::surveyed(tree, [sources(logs), Vec::new()], TorqueColumns::Optional, options, progress)
     }
 
     fn surveyed(
         tree: &Tree,
-        [train, validate]: [&[PathBuf]; 2],
+        [train, validate]: [Vec<LogSource>; 2],
         torque: TorqueColumns,
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
         let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
-        let survey = |path: &PathBuf| {
-            let mut report = |done: u64, total: u64| progress(&reading("surveying", path), done, total);
-            phiw_telemetry::survey(path, &joints, torque, &mut report)
+        let survey = |source: &LogSource| {
+            let what = reading("surveying", &source.path);
+            let mut report = |done: u64, total: u64| progress(&what, done, total);
+            phiw_telemetry::survey(source, &joints, torque, &mut report)
         };
         let mut surveys =
-            train.iter().chain(validate).map(survey).collect::<Result<Vec<Survey>, LogError>>()?;
+            train.iter().chain(&validate).map(survey).collect::<Result<Vec<Survey>, LogError>>()?;
         phiw_telemetry::arrange_session(&mut surveys);
         let (training, held_out) = surveys.split_at(train.len());
         check_logs(tree, training, held_out)?;
@@ -181,6 +182,10 @@ impl LogSet {
     pub fn sources<'a>(&'a self, progress: Progress<'a>) -> Vec<LogFile<'a>> {
         self.surveys.iter().map(|survey| LogFile::new(survey, &self.conditioning, progress)).collect()
     }
+}
+
+fn sources<S: Clone + Into<LogSource>>(logs: &[S]) -> Vec<LogSource> {
+    logs.iter().cloned().map(Into::into).collect()
 }
 
 fn reading(what: &str, path: &Path) -> String {

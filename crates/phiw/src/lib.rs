@@ -20,6 +20,7 @@ mod identified_mjcf;
 mod identified_urdf;
 pub mod identify;
 mod input;
+mod log_inputs;
 mod model_file;
 mod model_use;
 pub mod next;
