@@ -26,7 +26,7 @@ pub(crate) struct CsvTable {
 impl CsvTable {
     /// Reads the header. `file` is at its beginning, and has `bytes` bytes.
     pub fn new(path: &Path, mut file: File, bytes: u64, packing: Packing) -> Result<Self, FormatError> {
-        let unreadable = |source| FormatError::reading(path, source);
+        let unreadable = |source| packing.error(path, source);
         let separator = separator(&head(path, &mut file, packing).map_err(unreadable)?);
         let stream = TextStream::new(file, packing).map_err(unreadable)?;
         let passed = stream.passed();
@@ -39,7 +39,7 @@ impl CsvTable {
             .buffer_capacity(1 << 16)
             .from_reader(stream);
         let mut record = csv::ByteRecord::new();
-        let unreadable = |error: csv::Error| FormatError::reading(path, error.into());
+        let unreadable = |error: csv::Error| packing.error(path, error.into());
         if !csv.read_byte_record(&mut record).map_err(unreadable)? {
             return Err(FormatError::Empty { path: path.into() });
         }
@@ -126,7 +126,7 @@ impl Table for CsvTable {
         self.has_ahead = self
             .csv
             .read_byte_record(&mut self.ahead)
-            .map_err(|error| FormatError::reading(&self.path, error.into()))?;
+            .map_err(|error| self.packing.error(&self.path, error.into()))?;
         let line = self.record.position().map_or(0, csv::Position::line);
         let is_last = !self.has_ahead;
         let (expected, found) = (self.columns.len(), self.record.len());

@@ -159,6 +159,17 @@ pub enum FormatError {
 }
 
 impl FormatError {
+    /// An [`io::Error`] met while reading and unpacking `path`.
+    pub(crate) fn unpacking(path: &Path, packing: &'static str, source: io::Error) -> Self {
+        match source.kind() {
+            io::ErrorKind::NotFound => FormatError::NotFound { path: path.into() },
+            _ => {
+                let what = source.to_string().replace('\n', " ");
+                FormatError::Damaged { path: path.into(), format: packing, what }
+            }
+        }
+    }
+
     /// An [`io::Error`] met while reading `path`.
     pub(crate) fn reading(path: &Path, source: io::Error) -> Self {
         match source.kind() {

@@ -4,6 +4,10 @@ mod arrays;
 mod content_hash;
 mod csv;
 mod error;
+#[cfg(feature = "hdf5")]
+mod hdf5;
+#[cfg(feature = "lerobot")]
+mod lerobot;
 mod messages;
 mod number;
 mod open;

@@ -1,5 +1,6 @@
 //! The bytes of a text, unpacked where they are packed, hashed as they pass.
 
+use crate::FormatError;
 use phiw_limits::Limits;
 use std::cell::RefCell;
 use std::fs::File;
@@ -14,6 +15,29 @@ pub(crate) enum Packing {
     None,
     Gzip,
     Zstd,
+}
+
+impl Packing {
+    /// Its name in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Packing::None => "text",
+            Packing::Gzip => "gzip",
+            Packing::Zstd => "zstd",
+        }
+    }
+
+    /// What an error that was met while reading means.
+    pub fn error(self, path: &Path, source: io::Error) -> FormatError {
+        match self {
+            Packing::None => FormatError::reading(path, source),
+            // What is wrong with the text itself has no kind.
+            _ if source.kind() == io::ErrorKind::Other && source.to_string().starts_with("line ") => {
+                FormatError::reading(path, source)
+            }
+            _ => FormatError::unpacking(path, self.name(), source),
+        }
+    }
 }
 
 /// What is known of the bytes that have passed.

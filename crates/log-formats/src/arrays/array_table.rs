@@ -1,6 +1,7 @@
 //! Named arrays as a table: rows are the entries along the time.
 
 use super::element::Element;
+use super::rows::{Order, entry_name, orientation, row_count};
 use super::section::{Section, SectionReader};
 use crate::FormatError;
 use crate::content_hash::ContentHash;
@@ -8,15 +9,6 @@ use crate::table::{Column, Step, Table};
 use phiw_limits::Limits;
 use std::io;
 use std::path::{Path, PathBuf};
-
-/// Which index of an array goes through its bytes fastest.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Order {
-    /// The last: C.
-    LastFastest,
-    /// The first: Fortran.
-    FirstFastest,
-}
 
 /// An array of numbers in a file.
 #[derive(Debug, Clone)]
@@ -33,9 +25,6 @@ pub(crate) struct Array {
 
 /// Bytes that are read at once from each array.
 const BUFFER: usize = 1 << 15;
-/// What the time may be called; the first that is there says how many rows there are.
-const TIMES: [&str; 6] = ["t", "time", "timestamp", "timestamps", "stamp", "times"];
-
 /// Arrays of one length, as a table.
 pub(crate) struct ArrayTable {
     path: PathBuf,
@@ -81,14 +70,7 @@ impl ArrayTable {
     /// # Errors
     /// No array is as long as the time.
     pub fn new(path: &Path, format: &'static str, arrays: Vec<Array>) -> Result<Self, FormatError> {
-        let length = |array: &Array| array.shape.first().copied().unwrap_or(0);
-        let is_line = |array: &&Array| array.shape.iter().filter(|&&size| size > 1).count() <= 1;
-        let time =
-            TIMES.iter().find_map(|time| arrays.iter().filter(is_line).find(|array| array.name == *time));
-        let rows = match time {
-            Some(time) => time.shape.iter().fold(1, |rows: usize, &size| rows.saturating_mul(size)),
-            None => arrays.iter().map(length).max().unwrap_or(0),
-        };
+        let rows = row_count(arrays.iter().map(|array| (array.name.as_str(), array.shape.as_slice())));
         if rows == 0 {
             return Err(FormatError::Empty { path: path.into() });
         }
@@ -111,23 +93,11 @@ impl ArrayTable {
     }
 
     /// The columns of an array, where it has an entry for each row.
-    fn add(&mut self, mut array: Array) -> Result<(), FormatError> {
-        // Axes of length 1 say nothing: MATLAB's vectors have them.
-        let own_shape = array.shape.clone();
-        array.shape.retain(|&size| size != 1);
-        let (width, by_rows) = match (array.shape.as_slice(), array.order) {
-            ([], _) if self.rows == 1 => (1, true),
-            ([rows], _) if *rows == self.rows => (1, true),
-            ([rows, width], Order::LastFastest) if *rows == self.rows => (*width, true),
-            ([rows, width], Order::FirstFastest) if *rows == self.rows => (*width, false),
-            // The time goes along the other axis.
-            ([width, rows], Order::LastFastest) if *rows == self.rows => (*width, false),
-            ([width, rows], Order::FirstFastest) if *rows == self.rows => (*width, true),
-            _ => {
-                let shape: Vec<String> = own_shape.iter().map(usize::to_string).collect();
-                self.other_lengths.push(format!("`{}` ({})", array.name, shape.join(" x ")));
-                return Ok(());
-            }
+    fn add(&mut self, array: Array) -> Result<(), FormatError> {
+        let Some((width, by_rows)) = orientation(&array.shape, self.rows, array.order) else {
+            let shape: Vec<String> = array.shape.iter().map(usize::to_string).collect();
+            self.other_lengths.push(format!("`{}` ({})", array.name, shape.join(" x ")));
+            return Ok(());
         };
         let columns = self.columns.len().saturating_add(width);
         if columns > Limits::default().log_columns {
@@ -135,11 +105,7 @@ impl ArrayTable {
             return Err(FormatError::TooManyColumns { path, header: String::new(), columns });
         }
         for entry in 0..width {
-            let name = match array.shape.len() {
-                0 | 1 => array.name.clone(),
-                _ => format!("{}[{entry}]", array.name),
-            };
-            self.columns.push(Column::named(name));
+            self.columns.push(Column::named(entry_name(&array.name, width, entry)));
             self.places.push(Place { array: array.clone(), width, entry, by_rows });
         }
         Ok(())

@@ -1,7 +1,8 @@
 //! MATLAB's files up to version 7 (level 5 MAT-files): arrays of numbers; structures and cells are passed over.
 
-use super::array_table::{Array, Order};
+use super::array_table::Array;
 use super::element::{Element, ElementKind};
+use super::rows::Order;
 use super::section::{Section, SectionPacking, SectionReader};
 use crate::FormatError;
 use std::fs::File;

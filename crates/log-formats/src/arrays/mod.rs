@@ -4,6 +4,7 @@ mod array_table;
 mod element;
 mod mat5;
 mod npy;
+pub(crate) mod rows;
 mod section;
 mod zip_arrays;
 

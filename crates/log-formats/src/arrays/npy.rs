@@ -1,7 +1,8 @@
 //! The format of NumPy's arrays.
 
-use super::array_table::{Array, Order};
+use super::array_table::Array;
 use super::element::{Element, ElementKind};
+use super::rows::Order;
 use super::section::{Section, SectionPacking, SectionReader};
 use crate::FormatError;
 use phiw_limits::Limits;

@@ -2,7 +2,7 @@
 
 use super::topic::{Topic, choose};
 use super::topic_table::TopicTable;
-use super::{MCAP, MessageFile, Messages, SQLITE};
+use super::{MCAP, MessageFile, Messages, ROS1_BAG, SQLITE};
 use crate::open::start_of;
 use crate::table::Table;
 use crate::{FormatError, OpenOptions};
@@ -69,6 +69,12 @@ fn reader_of(path: &Path, start: &[u8]) -> Result<Box<dyn MessageFile>, FormatEr
         return Ok(Box::new(super::mcap_file::McapFile::new(path)));
         #[cfg(not(feature = "mcap"))]
         return Err(FormatError::LeftOut { path: path.into(), format: "MCAP", feature: "mcap" });
+    }
+    if start.starts_with(ROS1_BAG) {
+        #[cfg(feature = "ros1")]
+        return Ok(Box::new(super::ros1_bag::Ros1Bag::open(path)?));
+        #[cfg(not(feature = "ros1"))]
+        return Err(FormatError::LeftOut { path: path.into(), format: "a ROS 1 bag", feature: "ros1" });
     }
     #[cfg(feature = "ros2-sqlite")]
     return Ok(Box::new(super::ros2_sqlite::SqliteBag::open(path)?));

@@ -6,6 +6,8 @@ mod decode;
 mod folder;
 #[cfg(feature = "mcap")]
 mod mcap_file;
+#[cfg(feature = "ros1")]
+mod ros1_bag;
 #[cfg(feature = "ros2-sqlite")]
 mod ros2_sqlite;
 mod schema;
@@ -23,6 +25,9 @@ use crate::FormatError;
 pub(crate) const MCAP: &[u8] = b"\x89MCAP0\r\n";
 /// First bytes of an SQLite database.
 pub(crate) const SQLITE: &[u8] = b"SQLite format 3\0";
+
+/// First bytes of a ROS 1 bag.
+pub(crate) const ROS1_BAG: &[u8] = b"#ROSBAG V2.0\n";
 
 /// A file of messages.
 pub(crate) trait MessageFile {

@@ -303,17 +303,18 @@ impl Lookup<'_> {
             return Ok(Some(column));
         }
         let Some(index) = self.joints.iter().position(|name| name == joint) else { return Ok(None) };
-        if !self.is_array_of_joints(signal) {
-            return Ok(None);
+        match (self.is_array_of_joints(signal), self.joints.len()) {
+            (true, _) => self.by_name(&format!("{}[{index}]", signal.name())),
+            (false, 1) => self.by_name(signal.name()),
+            _ => Ok(None),
         }
-        self.by_name(&format!("{}[{index}]", signal.name()))
     }
 
     /// Whether there is an array with as many entries as there are joints.
     pub fn is_array_of_joints(&self, signal: Signal) -> bool {
         let has = |index: usize| {
             let name = format!("{}[{index}]", signal.name());
-            self.columns.iter().any(|column| column.name == name)
+            self.columns.iter().any(|column| column.name == name || column.signal.as_ref() == Some(&name))
         };
         has(self.joints.len().saturating_sub(1)) && !has(self.joints.len())
     }
