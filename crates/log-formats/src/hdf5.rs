@@ -140,6 +140,22 @@ fn collect(
 }
 
 fn damaged(path: &Path, error: &hdf5_pure::Error) -> FormatError {
+    // What a later version of the format has, and what its filters are.
+    let newer = match error {
+        hdf5_pure::Error::Format(error) => {
+            let text = error.to_string();
+            text.contains("version") || text.contains("unsupported")
+        }
+        _ => false,
+    };
+    if newer {
+        return FormatError::Unsupported {
+            path: path.into(),
+            what: format!("this HDF5 file has what is not read ({error}), or is damaged"),
+            mend: "write it for older readers (h5py: libver=\"v114\"; filters gzip, shuffle, lzf), or as npz"
+                .into(),
+        };
+    }
     let what = error.to_string().replace('\n', " ");
     FormatError::Damaged { path: path.into(), format: "HDF5 file", what }
 }
