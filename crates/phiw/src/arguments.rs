@@ -1,6 +1,7 @@
 //! The command line.
 
 pub use crate::export::ExportArguments;
+pub use crate::map::MapArguments;
 pub use crate::simulate::Backend;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -35,6 +36,9 @@ pub enum Command {
     /// Say what is in logs before anything is fitted: late velocities, torques that are missing or clipped,
     /// units, clocks, and what to do about it.
     Check(CheckArguments),
+    /// Write a first map of a log's columns: which is which signal of which joint, in what unit, guessed by
+    /// names and ranges.
+    Map(MapArguments),
     /// Turn marker recordings of people into motions of the robot: for each a log without torques, and what
     /// it is worth.
     Retarget(RetargetArguments),
@@ -53,6 +57,7 @@ impl Command {
             Command::Simulate(simulate) => simulate.quiet,
             Command::Export(export) => export.quiet,
             Command::Check(check) => check.quiet,
+            Command::Map(map) => map.quiet,
             Command::Retarget(retarget) => retarget.quiet,
             Command::Next(next) => next.quiet,
         }
@@ -394,7 +399,7 @@ impl SessionArguments {
 }
 
 /// `JOINT` or `JOINT=VALUE`.
-fn held_joint(text: &str) -> Result<(String, f64), String> {
+pub(crate) fn held_joint(text: &str) -> Result<(String, f64), String> {
     let (joint, value) = text.split_once('=').unwrap_or((text, "0"));
     let joint = joint.trim();
     if joint.is_empty() {

@@ -21,6 +21,7 @@ mod identified_urdf;
 pub mod identify;
 mod input;
 mod log_inputs;
+pub mod map;
 mod model_file;
 mod model_use;
 pub mod next;
