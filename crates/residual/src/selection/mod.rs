@@ -10,6 +10,7 @@
 
 mod admissible;
 mod anew;
+mod cholesky;
 mod criterion;
 mod cross_validation;
 mod design_effect;
