@@ -4,8 +4,8 @@
 use phiw_identification::{BlockSource, Data, Fold, IdentificationError, KeptBlocks};
 use phiw_telemetry::Block;
 
-/// Samples that the search looks at, at most: some minutes of motion.
-const SEARCHED_SAMPLES: f64 = 60_000.0;
+/// Samples that the search looks at, at most: a minute or two of motion.
+const SEARCHED_SAMPLES: f64 = 20_000.0;
 /// Length of a piece \[s\]: long against a residual's correlation and against the filters' reach.
 const PIECE_S: f64 = 5.0;
 /// Conditioned samples that are kept between passes; what does not fit is read again \[bytes\].
