@@ -46,6 +46,8 @@ pub(crate) struct Outcome {
 pub(crate) struct Variants {
     pub members: Vec<Member>,
     pub fit: Fit,
+    /// By how much the criterion is smaller than with those of the start.
+    pub gained: f64,
 }
 
 /// A model on its way.
@@ -78,7 +80,7 @@ const FORWARD_PHASES: usize = 4;
 /// Times that forward, prune and swap follow each other.
 const ROUNDS: usize = 6;
 /// The criterion must fall by this much for a step: less says nothing.
-pub(super) const LEAST_STEP: f64 = 0.5;
+pub(crate) const LEAST_STEP: f64 = 0.5;
 /// By how much, and by which share, a hypothesis may gain less than the member whose place it would take, to
 /// first order, and still be fitted in full.
 pub(super) const NEAR: (f64, f64) = (20.0, 0.03);
@@ -101,8 +103,9 @@ pub(crate) fn value(problem: &Problem, members: &[Member], rows: &[f64]) -> f64 
 /// The variants of the members of `start` at which the criterion is smallest.
 pub(crate) fn choose_variants(problem: &Problem, start: Vec<Member>, policy: Policy) -> Variants {
     let mut search = Search::new(problem, start, policy);
+    let before = search.model.value;
     search.sweep();
-    Variants { members: search.model.members, fit: search.model.fit }
+    Variants { gained: before - search.model.value, members: search.model.members, fit: search.model.fit }
 }
 
 impl<'a> Search<'a> {
