@@ -5,7 +5,7 @@ use phiw_identification::{BlockSource, Data, Fold, IdentificationError, KeptBloc
 use phiw_telemetry::Block;
 
 /// Samples that the search looks at, at most: a minute or two of motion.
-const SEARCHED_SAMPLES: f64 = 20_000.0;
+const SEARCHED_SAMPLES: f64 = 30_000.0;
 /// Length of a piece \[s\]: long against a residual's correlation and against the filters' reach.
 const PIECE_S: f64 = 5.0;
 /// What comes before a piece, for effects with memory \[s\].
