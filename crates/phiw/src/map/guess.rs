@@ -103,7 +103,7 @@ fn seconds(unit: Option<&UnitGuess>) -> f64 {
 
 fn time_of(contents: &LogContents, names: &[Vec<String>]) -> Option<usize> {
     let is_named = |time: &&str| contents.columns.iter().position(|column| column.name == *time);
-    let exact = TIMES.iter().find_map(|time| is_named(time));
+    let exact = TIMES.iter().find_map(is_named);
     exact.or_else(|| names.iter().position(|name| name.iter().any(|word| TIMES.contains(&word.as_str()))))
 }
 
