@@ -30,8 +30,11 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// A log as CSV with columns of its own: name, and value in a row.
-fn write_log(path: &Path, rows: usize, columns: &[(String, Box<dyn Fn(usize) -> f64 + '_>)]) {
+/// A column of a log: its name, and its value in a row.
+type LogColumn<'a> = (String, Box<dyn Fn(usize) -> f64 + 'a>);
+
+/// A log as CSV with columns of its own.
+fn write_log(path: &Path, rows: usize, columns: &[LogColumn<'_>]) {
     let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
     let mut text = names.join(",") + "\n";
     for row in 0..rows {
@@ -46,8 +49,7 @@ const TORQUE_CONSTANT: f64 = 0.07;
 
 /// The same recording with positions in degrees, a clock in milliseconds, and motor currents in mA.
 fn write_with_currents(recording: &Recording, path: &Path) {
-    let mut columns: Vec<(String, Box<dyn Fn(usize) -> f64 + '_>)> =
-        vec![("stamp_ms".into(), Box::new(|row| 1e3 * recording.t[row]))];
+    let mut columns: Vec<LogColumn<'_>> = vec![("stamp_ms".into(), Box::new(|row| 1e3 * recording.t[row]))];
     for joint in 0..3 {
         let name = joint + 1;
         columns.push((
@@ -116,9 +118,8 @@ fn a_log_of_a_controller_s_law_names_the_same_effects() {
             (q(after, joint) - q(before, joint)) * synthetic::RATE / (after - before) as f64
         })
         .collect();
-    let columns = || -> Vec<(String, Box<dyn Fn(usize) -> f64 + '_>)> {
-        let mut columns: Vec<(String, Box<dyn Fn(usize) -> f64 + '_>)> =
-            vec![("t".into(), Box::new(|row| recording.t[row]))];
+    let columns = || -> Vec<LogColumn<'_>> {
+        let mut columns: Vec<LogColumn<'_>> = vec![("t".into(), Box::new(|row| recording.t[row]))];
         for joint in 0..3 {
             let name = joint + 1;
             let (recording, qd) = (&recording, &qd);
