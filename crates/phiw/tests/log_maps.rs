@@ -227,3 +227,23 @@ fn a_first_map_is_guessed_by_names_and_ranges() {
     let report = report(&format!("{declare} --train log.csv --map map.toml --out a"), folder.path());
     assert_eq!(report["verdict"], "sufficient");
 }
+
+/// `q[1]` was taken for `joint_1`, though the entries count from 0: the last joint had no column.
+#[test]
+fn entries_that_count_from_zero_were_taken_for_joints_that_count_from_one() {
+    let folder = folder();
+    let recording = synthetic::recording(1, 5.0);
+    let mut columns: Vec<LogColumn<'_>> = vec![("time".into(), Box::new(|row| recording.t[row]))];
+    for joint in 0..3 {
+        let recording = &recording;
+        columns.push((format!("pos[{joint}]"), Box::new(move |row| recording.q[3 * row + joint])));
+        columns.push((format!("effort[{joint}]"), Box::new(move |row| recording.tau[3 * row + joint])));
+    }
+    write_log(&folder.path().join("log.csv"), recording.len(), &columns);
+    let (status, map, stderr) = run("map --urdf robot.urdf log.csv", folder.path());
+    assert!(status == 0 && !stderr.contains("no column"), "{stderr}");
+    for joint in 0..3 {
+        let table = format!("[joint.\"joint_{}\"]\nq = \"pos[{joint}]\"", joint + 1);
+        assert!(map.contains(&table), "no `{table}` in {map}");
+    }
+}
