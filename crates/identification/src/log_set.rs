@@ -1,6 +1,7 @@
 //! The logs of a session: which train, which are held out, and how they are conditioned.
 
 use crate::checks::{check_excitation, check_logs};
+use crate::known_payload::KnownPayload;
 use crate::{BlockSource, Fold, IdentificationError};
 use phiw_dynamics::Tree;
 use phiw_telemetry::{Block, Conditioning, ConditioningOptions, LogError, LogSource, Survey, TorqueColumns};
@@ -22,6 +23,8 @@ pub struct LogSet {
     surveys: Vec<Survey>,
     train: usize,
     conditioning: Conditioning,
+    /// What the robot held in each log.
+    payloads: Vec<Option<KnownPayload>>,
 }
 
 impl LogSet {
@@ -85,6 +88,8 @@ impl LogSet {
             let mut report = |done: u64, total: u64| progress(&what, done, total);
             phiw_telemetry::survey(source, &joints, torque, &mut report)
         };
+        let payloads = train.iter().chain(&validate).map(|source| KnownPayload::of(tree, source));
+        let payloads = payloads.collect::<Result<Vec<_>, LogError>>()?;
         let mut surveys =
             train.iter().chain(&validate).map(survey).collect::<Result<Vec<Survey>, LogError>>()?;
         phiw_telemetry::arrange_session(&mut surveys);
@@ -93,14 +98,19 @@ impl LogSet {
         let conditioning = Conditioning::choose(training, options)?;
         // Cut-offs that were told must fit the logs held out, too.
         held_out.iter().try_for_each(|survey| conditioning.plan(survey).map(drop))?;
-        Ok(LogSet { train: train.len(), conditioning, surveys })
+        Ok(LogSet { train: train.len(), conditioning, surveys, payloads })
     }
 
     /// The same logs, each row of which goes out.
     pub fn with_every_row(&self) -> Self {
         let mut conditioning = self.conditioning.clone();
         conditioning.options.decimation = Some(1);
-        LogSet { surveys: self.surveys.clone(), train: self.train, conditioning }
+        LogSet {
+            surveys: self.surveys.clone(),
+            train: self.train,
+            conditioning,
+            payloads: self.payloads.clone(),
+        }
     }
 
     /// All surveys: training logs, then those for validation.
@@ -180,7 +190,18 @@ impl LogSet {
 
     /// The logs as sources of blocks.
     pub fn sources<'a>(&'a self, progress: Progress<'a>) -> Vec<LogFile<'a>> {
-        self.surveys.iter().map(|survey| LogFile::new(survey, &self.conditioning, progress)).collect()
+        self.sources_conditioned(&self.conditioning, progress)
+    }
+
+    /// The same, conditioned in another way.
+    pub(crate) fn sources_conditioned<'a>(
+        &'a self,
+        conditioning: &'a Conditioning,
+        progress: Progress<'a>,
+    ) -> Vec<LogFile<'a>> {
+        let logs = self.surveys.iter().zip(&self.payloads);
+        logs.map(|(survey, payload)| LogFile { survey, conditioning, payload: payload.as_ref(), progress })
+            .collect()
     }
 }
 
@@ -218,20 +239,30 @@ fn cut<'a>(parts: impl Iterator<Item = (usize, &'a Survey, f64, f64)>, count: us
 pub struct LogFile<'a> {
     survey: &'a Survey,
     conditioning: &'a Conditioning,
+    payload: Option<&'a KnownPayload>,
     progress: Progress<'a>,
-}
-
-impl<'a> LogFile<'a> {
-    pub(crate) fn new(survey: &'a Survey, conditioning: &'a Conditioning, progress: Progress<'a>) -> Self {
-        LogFile { survey, conditioning, progress }
-    }
 }
 
 impl BlockSource for LogFile<'_> {
     fn stream(&self, sink: &mut dyn FnMut(Block) -> ControlFlow<()>) -> Result<(), LogError> {
         let what = reading("reading", &self.survey.path);
         let mut report = |done: u64, total: u64| (self.progress)(&what, done, total);
-        phiw_telemetry::stream(self.survey, self.conditioning, &mut report, sink)?;
-        Ok(())
+        let Some(payload) = self.payload else {
+            phiw_telemetry::stream(self.survey, self.conditioning, &mut report, sink)?;
+            return Ok(());
+        };
+        let (mut workspace, mut wrong) = (payload.workspace(), None);
+        let mut without = |block: Block| match payload.taken_off(block, &mut workspace) {
+            Ok(block) => sink(block),
+            Err(error) => {
+                wrong = Some(error);
+                ControlFlow::Break(())
+            }
+        };
+        phiw_telemetry::stream(self.survey, self.conditioning, &mut report, &mut without)?;
+        match (wrong, &self.survey.source.map) {
+            (Some(error), Some(map)) => Err(map.payload_error(error.to_string()).into()),
+            _ => Ok(()),
+        }
     }
 }

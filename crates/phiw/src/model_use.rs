@@ -1,7 +1,7 @@
 //! A `model.json` used by itself, on new logs: its robot, its columns, and the logs.
 
 use crate::Error;
-use crate::log_inputs::{read_map, sources};
+use crate::log_inputs::{read_map, sources, without_payload};
 use crate::model_file::ModelFile;
 use phiw_dynamics::Tree;
 use phiw_dynamics::urdf::{UrdfOptions, held_joints, read_urdf};
@@ -76,6 +76,7 @@ impl ModelUse {
         let held_before = model.held.iter().map(|(joint, _)| joint.as_str());
         let joints: Vec<String> = tree.joint_names().chain(held_before).map(str::to_owned).collect();
         let map = read_map(reading.map, &joints)?;
+        without_payload(reading.logs, map.as_ref())?;
         let sources = sources(reading.logs, map.as_ref());
         let logs = match reading.complete {
             true => LogSet::open_unexcited(&logged, &sources, &[], &every_row, progress)?,

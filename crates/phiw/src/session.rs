@@ -66,7 +66,7 @@ impl Session {
             ..ConditioningOptions::default()
         };
         let map = read_map(arguments.map.as_deref(), &robot.all_joints())?;
-        let [train, validate] = train_and_validate(&arguments.train, &arguments.validate, map.as_ref())?;
+        let [train, validate] = train_and_validate(&arguments.train, &arguments.validate, map.as_ref());
         let logs = LogSet::open_unexcited(&robot.tree, &train, &validate, &options, progress)?;
         Ok(Session {
             tree: robot.tree,
