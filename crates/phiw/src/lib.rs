@@ -19,7 +19,7 @@ mod held_out_reproduction;
 mod identified_mjcf;
 mod identified_urdf;
 pub mod identify;
-mod input;
+pub mod input;
 mod model_file;
 mod model_use;
 pub mod next;
