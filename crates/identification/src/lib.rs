@@ -19,6 +19,7 @@ pub mod held_joints;
 mod identify;
 mod jackknife;
 mod kept_blocks;
+mod log_access;
 mod log_set;
 mod model_sources;
 mod predict;
@@ -37,7 +38,8 @@ pub use effect::{Effect, EffectCatalogue, EffectSpec};
 pub use error::IdentificationError;
 pub use identify::{Data, Identified, Variants, identify};
 pub use kept_blocks::KeptBlocks;
-pub use log_set::{LogFile, LogSet, Progress};
+pub use log_access::{LogAccess, LogFile, Progress};
+pub use log_set::LogSet;
 pub use model::Model;
 pub use predict::{Prediction, predict};
 

@@ -1,10 +1,10 @@
 //! The logs of a session: which train, which are held out, and how they are conditioned.
 
 use crate::checks::{check_excitation, check_logs};
-use crate::{BlockSource, Fold, IdentificationError};
+use crate::log_access::{LogAccess, LogFile, Progress, reading};
+use crate::{Fold, IdentificationError};
 use phiw_dynamics::Tree;
-use phiw_telemetry::{Block, Conditioning, ConditioningOptions, LogError, Survey, TorqueColumns};
-use std::ops::ControlFlow;
+use phiw_telemetry::{Conditioning, ConditioningOptions, LogError, Survey, TorqueColumns};
 use std::path::{Path, PathBuf};
 
 /// Stretches of time that the training logs are cut into: long against the residual's correlation, enough for
@@ -14,14 +14,12 @@ const HELD_OUT_FOLDS: usize = 8;
 /// Speed of a joint at rest over its RMS speed.
 const REST_SHARE: f64 = 0.01;
 
-/// Reports how far a pass over the logs is: what is being done, bytes done, bytes in total.
-pub type Progress<'a> = &'a (dyn Fn(&str, u64, u64) + Sync);
-
 /// Logs, surveyed and with their conditioning chosen.
 pub struct LogSet {
     surveys: Vec<Survey>,
     train: usize,
     conditioning: Conditioning,
+    access: LogAccess,
 }
 
 impl LogSet {
@@ -56,7 +54,8 @@ impl LogSet {
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
-        Self::surveyed(tree, [train, validate], TorqueColumns::Required, options, progress)
+        let access = LogAccess::default();
+        Self::surveyed(tree, [train, validate], TorqueColumns::Required, options, access, progress)
     }
 
     /// The same of logs that a model is used on: they need no torques.
@@ -69,20 +68,27 @@ impl LogSet {
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
-        Self::surveyed(tree, [logs, &[]], TorqueColumns::Optional, options, progress)
+        let access = LogAccess::default();
+        Self::surveyed(tree, [logs, &[]], TorqueColumns::Optional, options, access, progress)
     }
 
-    fn surveyed(
+    /// [`LogSet::open_unexcited`], or with optional torques [`LogSet::open_for_prediction`], of logs for
+    /// training and for validation that may be in memory.
+    ///
+    /// # Errors
+    /// A log that cannot be read or does not fit the robot; the work is called off.
+    pub fn surveyed(
         tree: &Tree,
         [train, validate]: [&[PathBuf]; 2],
         torque: TorqueColumns,
         options: &ConditioningOptions,
+        access: LogAccess,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
         let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
         let survey = |path: &PathBuf| {
             let mut report = |done: u64, total: u64| progress(&reading("surveying", path), done, total);
-            phiw_telemetry::survey(path, &joints, torque, &mut report)
+            access.survey(path, &joints, torque, &mut report)
         };
         let mut surveys =
             train.iter().chain(validate).map(survey).collect::<Result<Vec<Survey>, LogError>>()?;
@@ -92,14 +98,14 @@ impl LogSet {
         let conditioning = Conditioning::choose(training, options)?;
         // Cut-offs that were told must fit the logs held out, too.
         held_out.iter().try_for_each(|survey| conditioning.plan(survey).map(drop))?;
-        Ok(LogSet { train: train.len(), conditioning, surveys })
+        Ok(LogSet { train: train.len(), conditioning, surveys, access })
     }
 
     /// The same logs, each row of which goes out.
     pub fn with_every_row(&self) -> Self {
         let mut conditioning = self.conditioning.clone();
         conditioning.options.decimation = Some(1);
-        LogSet { surveys: self.surveys.clone(), train: self.train, conditioning }
+        LogSet { conditioning, surveys: self.surveys.clone(), train: self.train, access: self.access.clone() }
     }
 
     /// All surveys: training logs, then those for validation.
@@ -118,6 +124,10 @@ impl LogSet {
     /// told (see [`bandwidth`](crate::bandwidth)).
     pub fn set_parallel_cutoff(&mut self, cutoff_hz: f64) {
         self.conditioning.parallel_cutoff_hz = cutoff_hz;
+    }
+    /// Where the logs are.
+    pub fn access(&self) -> &LogAccess {
+        &self.access
     }
     /// Whether the end of each training log is held out, since no other log is given.
     pub fn splits_training_logs(&self) -> bool {
@@ -179,12 +189,9 @@ impl LogSet {
 
     /// The logs as sources of blocks.
     pub fn sources<'a>(&'a self, progress: Progress<'a>) -> Vec<LogFile<'a>> {
-        self.surveys.iter().map(|survey| LogFile::new(survey, &self.conditioning, progress)).collect()
+        let source = |survey| LogFile::new(survey, &self.conditioning, &self.access, progress);
+        self.surveys.iter().map(source).collect()
     }
-}
-
-fn reading(what: &str, path: &Path) -> String {
-    format!("{what} {}", path.file_name().unwrap_or(path.as_os_str()).to_string_lossy())
 }
 
 /// Cuts a part of each log into stretches of about equal length, `count` or a few more in all.
@@ -207,26 +214,4 @@ fn cut<'a>(parts: impl Iterator<Item = (usize, &'a Survey, f64, f64)>, count: us
         folds.extend((0..pieces).map(|piece| Fold { log, start: edge(piece), end: edge(piece + 1) }));
     }
     folds
-}
-
-/// A log on disk.
-pub struct LogFile<'a> {
-    survey: &'a Survey,
-    conditioning: &'a Conditioning,
-    progress: Progress<'a>,
-}
-
-impl<'a> LogFile<'a> {
-    pub(crate) fn new(survey: &'a Survey, conditioning: &'a Conditioning, progress: Progress<'a>) -> Self {
-        LogFile { survey, conditioning, progress }
-    }
-}
-
-impl BlockSource for LogFile<'_> {
-    fn stream(&self, sink: &mut dyn FnMut(Block) -> ControlFlow<()>) -> Result<(), LogError> {
-        let what = reading("reading", &self.survey.path);
-        let mut report = |done: u64, total: u64| (self.progress)(&what, done, total);
-        phiw_telemetry::stream(self.survey, self.conditioning, &mut report, sink)?;
-        Ok(())
-    }
 }

@@ -1,6 +1,7 @@
 //! The command line.
 
 pub use crate::export::ExportArguments;
+pub use crate::in_memory::InMemory;
 pub use crate::simulate::Backend;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -115,6 +116,9 @@ pub struct PredictArguments {
     /// Print nothing but errors.
     #[arg(long)]
     pub quiet: bool,
+    /// What stands in memory for the files.
+    #[arg(skip)]
+    pub in_memory: InMemory,
 }
 
 /// Arguments of `phiw simulate`.
@@ -160,6 +164,9 @@ pub struct CheckArguments {
     /// Print nothing but errors.
     #[arg(long)]
     pub quiet: bool,
+    /// What stands in memory for the files.
+    #[arg(skip)]
+    pub in_memory: InMemory,
 }
 
 impl CheckArguments {
@@ -170,6 +177,7 @@ impl CheckArguments {
             train: self.logs.clone(),
             hold: self.hold.clone(),
             quiet: self.quiet,
+            in_memory: self.in_memory.clone(),
             ..SessionArguments::default()
         }
     }
@@ -263,6 +271,9 @@ pub struct NextArguments {
     /// Print nothing but errors.
     #[arg(long)]
     pub quiet: bool,
+    /// What stands in memory for the files.
+    #[arg(skip)]
+    pub in_memory: InMemory,
 }
 
 impl NextArguments {
@@ -276,6 +287,7 @@ impl NextArguments {
             cutoff_hz: self.cutoff_hz,
             parallel_cutoff_hz: self.parallel_cutoff_hz,
             quiet: self.quiet,
+            in_memory: self.in_memory.clone(),
             ..SessionArguments::default()
         }
     }
@@ -330,6 +342,9 @@ pub struct SessionArguments {
     /// Print nothing but errors.
     #[arg(long)]
     pub quiet: bool,
+    /// What stands in memory for the files.
+    #[arg(skip)]
+    pub in_memory: InMemory,
 }
 
 impl SessionArguments {

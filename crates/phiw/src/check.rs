@@ -45,7 +45,8 @@ pub fn check(arguments: &CheckArguments, console: &Console) -> Result<CheckOutco
     let mut surveys = Vec::new();
     for path in &arguments.logs {
         let mut progress = |done, total| console.progress("surveying", done, total);
-        surveys.push(phiw_telemetry::survey(path, &joints, TorqueColumns::Optional, &mut progress)?);
+        let access = &arguments.in_memory.logs;
+        surveys.push(access.survey(path, &joints, TorqueColumns::Optional, &mut progress)?);
     }
     console.finish();
     let findings = robot_findings(tree, &surveys, &CheckSettings::default());

@@ -2,6 +2,8 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::Write;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Characters of a message that are shown; a name in a broken file can fill screens.
 const LONGEST_MESSAGE: usize = 1000;
@@ -47,7 +49,12 @@ fn push_visible(text: &mut String, c: char) {
 /// Shows how far the work is on standard error, or nothing.
 pub struct Console {
     bar: ProgressBar,
+    listener: Option<Listener>,
+    interruption: Arc<AtomicBool>,
 }
+
+/// Is told how far the work is: what is being done, how much of it is done, and how much there is.
+pub type Listener = Box<dyn Fn(&str, u64, u64) + Send + Sync>;
 
 impl Console {
     /// Shows progress if standard error is a terminal and `quiet` is not asked for.
@@ -59,7 +66,15 @@ impl Console {
         if let Ok(style) = ProgressStyle::with_template("{msg:<40!} {wide_bar} {percent:>3} % {eta:>5}") {
             bar.set_style(style.progress_chars("━╸─"));
         }
-        Console { bar }
+        Console { bar, listener: None, interruption: Arc::default() }
+    }
+
+    /// Shows nothing, but tells a listener; `interruption` calls the work off when it is set.
+    pub fn told_to(listener: Listener, interruption: Arc<AtomicBool>) -> Self {
+        let mut console = Console::silent();
+        console.listener = Some(listener);
+        console.interruption = interruption;
+        console
     }
 
     /// Shows nothing.
@@ -67,8 +82,16 @@ impl Console {
         Console::of_terminal(true)
     }
 
+    /// Whether the work is called off.
+    pub fn is_interrupted(&self) -> bool {
+        self.interruption.load(Ordering::Relaxed)
+    }
+
     /// `done` bytes of `total` of what is being done.
     pub fn progress(&self, what: &str, done: u64, total: u64) {
+        if let Some(listener) = &self.listener {
+            listener(what, done, total);
+        }
         if self.bar.is_hidden() {
             return;
         }

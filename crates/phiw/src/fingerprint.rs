@@ -4,7 +4,7 @@ use crate::Error;
 use crate::session::Session;
 use crate::warnings::file_name;
 use phiw_identification::model::{DataFingerprint, DataRole};
-use phiw_telemetry::Survey;
+use phiw_telemetry::{NamedColumns, Survey};
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{self, Write};
@@ -20,7 +20,7 @@ pub fn of_session(session: &Session) -> Result<Vec<DataFingerprint>, Error> {
         Ok(DataFingerprint {
             log: file_name(&survey.path),
             role: if index < training { DataRole::Train } else { DataRole::Validate },
-            sha256: sha256(&survey.path)?,
+            sha256: sha256(session.logs.access().in_memory(&survey.path), &survey.path)?,
             rows: survey.rows,
             used_rows: survey.used_rows,
         })
@@ -28,11 +28,23 @@ pub fn of_session(session: &Session) -> Result<Vec<DataFingerprint>, Error> {
     session.logs.surveys().iter().enumerate().map(of_log).collect()
 }
 
-/// The hash of a file's bytes, in hexadecimal digits.
-fn sha256(path: &Path) -> Result<String, Error> {
+/// The hash of a file's bytes, in hexadecimal digits; of a log in memory that of its columns: each name, a line
+/// feed, the values' bytes, lowest first.
+fn sha256(in_memory: Option<&NamedColumns>, path: &Path) -> Result<String, Error> {
     let unreadable = |source| Error::Unreadable { path: path.to_owned(), source };
     let mut hasher = Hasher(Sha256::new());
-    io::copy(&mut File::open(path).map_err(unreadable)?, &mut hasher).map_err(unreadable)?;
+    match in_memory {
+        Some(log) => {
+            for (name, values) in log.columns() {
+                hasher.0.update(name.as_bytes());
+                hasher.0.update(b"\n");
+                values.iter().for_each(|value| hasher.0.update(value.to_le_bytes()));
+            }
+        }
+        None => {
+            io::copy(&mut File::open(path).map_err(unreadable)?, &mut hasher).map_err(unreadable)?;
+        }
+    }
     Ok(hasher.0.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
 }
 

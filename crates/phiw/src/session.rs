@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::arguments::SessionArguments;
-use crate::input::read_text;
+use crate::in_memory::text_of;
 use phiw_dynamics::urdf::{Finding, UrdfOptions, UrdfReading, read_urdf};
 use phiw_dynamics::{DimensionError, JointType, Tree};
 use phiw_effects::{Catalogue, SignalRanges};
@@ -13,7 +13,7 @@ use phiw_identification::{BlockSource, Data, IdentificationError, LogFile, LogSe
 use phiw_limits::Limits;
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_residual::trace::ranges_of_residual;
-use phiw_telemetry::ConditioningOptions;
+use phiw_telemetry::{ConditioningOptions, TorqueColumns};
 use std::path::PathBuf;
 
 /// Robot, logs and declared effects, read and checked.
@@ -64,8 +64,14 @@ impl Session {
             parallel_cutoff_hz: arguments.parallel_cutoff_hz,
             ..ConditioningOptions::default()
         };
-        let logs =
-            LogSet::open_unexcited(&robot.tree, &arguments.train, &arguments.validate, &options, progress)?;
+        let logs = LogSet::surveyed(
+            &robot.tree,
+            [&arguments.train, &arguments.validate],
+            TorqueColumns::Required,
+            &options,
+            arguments.in_memory.logs.clone(),
+            progress,
+        )?;
         Ok(Session {
             tree: robot.tree,
             xml: robot.xml,
@@ -194,7 +200,8 @@ pub(crate) struct RobotOfUrdf {
 /// The robot of a session.
 pub(crate) fn read_robot(arguments: &SessionArguments) -> Result<RobotOfUrdf, Error> {
     let path = || arguments.urdf.clone();
-    let xml = read_text(&arguments.urdf, Limits::default().urdf_bytes)?;
+    let given = arguments.in_memory.urdf.as_ref();
+    let xml = text_of(given, &arguments.urdf, Limits::default().urdf_bytes)?;
     let options = UrdfOptions { held: arguments.hold.clone(), snap: true, ..UrdfOptions::default() };
     let reading =
         read_urdf(&xml, &options).map_err(|source| Error::Urdf { path: path(), source: Box::new(source) })?;

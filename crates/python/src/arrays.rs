@@ -33,6 +33,9 @@ impl<'py> Doubles<'py> {
     }
 }
 
+/// An array that is given to Python.
+pub type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+
 /// States of a robot: one, or a batch.
 pub struct States<'py> {
     numbers: Doubles<'py>,
@@ -83,10 +86,6 @@ pub fn same_count(arrays: &[(&str, &States<'_>)]) -> PyResult<Option<usize>> {
 }
 
 /// Numbers as an array of this shape; they are moved, not copied.
-pub fn array<'py>(
-    py: Python<'py>,
-    numbers: Vec<f64>,
-    shape: &[usize],
-) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+pub fn array<'py>(py: Python<'py>, numbers: Vec<f64>, shape: &[usize]) -> PyResult<Array<'py>> {
     PyArray1::from_vec(py, numbers).reshape(shape.to_vec())
 }

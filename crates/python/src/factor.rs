@@ -1,7 +1,6 @@
 //! `phiw.Factor`: rows of [Φ f] reduced to a triangle; triangles merge.
 
-use crate::arrays::{Doubles, array};
-use numpy::PyArrayDyn;
+use crate::arrays::{Array, Doubles, array};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::Factor;
 use pyo3::exceptions::PyValueError;
@@ -70,7 +69,7 @@ impl PyFactor {
 
     /// R, upper triangular, shape (k + 1, k + 1); its last column belongs to f.
     #[getter]
-    fn r<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    fn r<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         let size = self.factor.columns();
         let entry = |row, column| if column < row { 0.0 } else { self.factor.entry(row, column) };
         let entries = (0..size).flat_map(|row| (0..size).map(move |column| entry(row, column)));
@@ -111,10 +110,7 @@ impl PyFactor {
     ///     Standard deviations, if the rows' errors are independent and alike.
     /// rmse : float
     ///     Root mean square of Φ·w − f.
-    fn solve<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, f64)> {
+    fn solve<'py>(&self, py: Python<'py>) -> PyResult<(Array<'py>, Array<'py>, f64)> {
         let solution = self.factor.solve().map_err(wrong)?;
         let std = self.factor.standard_deviations(solution.residual_std()).map_err(wrong)?;
         let (size, rmse) = (solution.parameters.len(), solution.rmse());
@@ -135,7 +131,7 @@ impl PyFactor {
 
     /// Singular values of Φ, largest first, shape (k,).
     #[getter]
-    fn singular_values<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    fn singular_values<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         let values = self.factor.singular_values().map_err(wrong)?;
         let size = values.len();
         array(py, values, &[size])
@@ -149,7 +145,6 @@ impl PyFactor {
         format!("Factor({} parameters, {} rows)", self.factor.parameters(), self.factor.rows())
     }
 
-    #[allow(clippy::type_complexity)] // what pickle wants
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (usize, u64, Vec<f64>))> {
         let factor = &slf.get().factor;
         let again = slf.get_type().getattr("_restored")?;

@@ -2,9 +2,12 @@
 
 mod arrays;
 mod batch;
+mod examples;
 mod factor;
 mod hold;
 mod robot;
+mod session;
+mod work;
 
 use pyo3::prelude::*;
 
@@ -12,7 +15,13 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _phiw {
     #[pymodule_export]
+    use crate::examples::example_urdfs;
+    #[pymodule_export]
     use crate::factor::PyFactor;
     #[pymodule_export]
     use crate::robot::Robot;
+    #[pymodule_export]
+    use crate::session::{check, command, explain, identify, next_motion, predict, retarget, write_results};
+    #[pymodule_export]
+    use crate::work::{InputError, PhiwError};
 }

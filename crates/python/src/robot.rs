@@ -1,9 +1,8 @@
 //! `phiw.Robot`: a robot from its URDF, and its dynamics over batches of states.
 
-use crate::arrays::{Doubles, States, array, same_count};
+use crate::arrays::{Array, Doubles, States, array, same_count};
 use crate::batch::{LANES, Lane, over_states, put};
 use crate::hold::hold;
-use numpy::PyArrayDyn;
 use phiw_dynamics::inertia::PARAMETER_NAMES;
 use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
 use phiw_dynamics::scalar::Lanes;
@@ -16,9 +15,6 @@ use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
-
-/// An array of numpy that is given back.
-type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
 /// A robot, read from a URDF.
 ///
@@ -325,6 +321,7 @@ impl Robot {
         format!("Robot('{}', {} joints)", self.tree.name(), self.tree.joint_count())
     }
 
+    #[allow(clippy::type_complexity)] // what pickle takes
     /// Pickles: the URDF's text and what is held, and the parameters, which may be other ones.
     fn __reduce__<'py>(
         slf: &Bound<'py, Self>,

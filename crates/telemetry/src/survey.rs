@@ -9,7 +9,7 @@ use crate::histogram::Histogram;
 use crate::joint_survey::JointSurvey;
 use crate::joint_survey::{Five, JointCollector};
 use crate::log_file::open_log;
-use crate::reader::{Row, Rows};
+use crate::reader::{LogFile, Row, Rows};
 use crate::segments::{GapCount, Segment};
 use crate::segments::{RowCounts, SegmentSink, SpikeCount, split};
 use crate::spectrum::Spectrum;
@@ -137,8 +137,17 @@ pub fn survey(
     torque: TorqueColumns,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Survey, LogError> {
-    let mut open = || open_log(path, joints, torque);
-    let (mut survey, reader) = survey_rows(&mut open, joints, progress)?;
+    survey_opened(&mut || open_log(path, joints, torque), joints, torque, progress)
+}
+
+/// [`survey`] of the log that `open` opens.
+pub(crate) fn survey_opened<'a>(
+    open: &mut dyn FnMut() -> Result<Box<dyn LogFile + 'a>, LogError>,
+    joints: &[String],
+    torque: TorqueColumns,
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<Survey, LogError> {
+    let (mut survey, reader) = survey_rows(open, joints, progress)?;
     survey.torque = torque;
     survey.ignored_columns = reader.ignored_columns().to_vec();
     survey.content_hash = reader.content_hash();
