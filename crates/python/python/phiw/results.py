@@ -29,7 +29,7 @@ FILES = ("model.json", "report.json", "report.html", "identified.urdf", "identif
 def frame(rows: Union[List[Dict[str, Any]], Mapping[str, np.ndarray]]) -> Any:
     """A DataFrame if pandas is installed, else the rows (or columns) as they are."""
     try:
-        import pandas
+        import pandas  # type: ignore[import-untyped,unused-ignore]
     except ImportError:
         return rows
     return pandas.DataFrame(rows)
@@ -392,7 +392,7 @@ class Retargeted:
     summary: str
     warnings: List[str]
     #: Recordings that could not be retargeted, each with the reason.
-    failures: List[Tuple[PathLike, str]]
+    failures: List[Tuple[str, str]]
 
     @property
     def motions(self) -> List[pathlib.Path]:

@@ -148,7 +148,7 @@ def predict(
         Joints that stand still in the logs, see :class:`Robot`; what the model holds need not be named.
     """
     text = model_text(model)
-    joints: List[str] = json.loads(text)["joints"]
+    joints = _joints(text)
     taken = taken_logs(logs, [joint for joint in joints if joint not in _held(hold)], "logs")
     names, columns, log, relative, warnings = _phiw.predict(
         text, taken, hold, cutoff_hz, parallel_cutoff_hz, progress
@@ -252,6 +252,16 @@ def retarget(
 
 def _robot(robot: Union[Robot, PathLike]) -> Robot:
     return robot if isinstance(robot, Robot) else Robot(robot)
+
+
+def _joints(model: str) -> List[str]:
+    try:
+        joints = json.loads(model)["joints"]
+    except (ValueError, KeyError, TypeError):
+        joints = None
+    if not isinstance(joints, list) or not joints:
+        raise InputError("this is not a model.json of phiw: it names no joints")
+    return joints
 
 
 def _names(names: Names) -> List[str]:
