@@ -60,7 +60,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     Ok(if passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// The package's tests as a part of all tests, built with the profile of `cargo test` so that what is
+/// The package's tests as a part of all tests, built with the profile of this program so that what is
 /// compiled is shared. Where there is no Python with `venv`, or no package index, they are skipped. What is
 /// returned are problems: one line each.
 ///
@@ -80,7 +80,7 @@ pub fn test(tally: &mut Tally) -> anyhow::Result<Vec<String>> {
             return Ok(Vec::new());
         }
     };
-    if let Err(error) = environment.install_package("test") {
+    if let Err(error) = environment.install_package("dev") {
         tally.add_failures(1);
         return Ok(vec![format!("the Python package does not build: {error:#}")]);
     }

@@ -16,7 +16,9 @@ fn log(tree: &Tree, path: &Path) -> NamedColumns {
     recording.write_csv(path).unwrap();
     let column = |values: &[f64], joint: usize| values.iter().skip(joint).step_by(3).copied().collect();
     let mut columns = vec![("t".to_owned(), recording.t.clone())];
-    for (signal, values) in [("q", &recording.q), ("tau", &recording.tau)] {
+    let optional = [("qd", &recording.qd), ("qdd", &recording.qdd)];
+    let optional = optional.into_iter().filter_map(|(signal, values)| Some((signal, values.as_ref()?)));
+    for (signal, values) in [("q", &recording.q), ("tau", &recording.tau)].into_iter().chain(optional) {
         let named = |(joint, name)| (format!("{signal}.{name}"), column(values, joint));
         columns.extend(recording.joints.iter().enumerate().map(named));
     }
