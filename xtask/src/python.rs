@@ -26,16 +26,8 @@ const PYTHON: &str = if cfg!(windows) { "python" } else { "python3" };
 /// Where the package is.
 const PACKAGE: &str = "crates/python";
 /// What builds it, and what it is tested with; fetched from PyPI.
-const REQUIREMENTS: [&str; 8] = [
-    "maturin>=1.9.4,<2",
-    "numpy",
-    "pandas",
-    "pytest",
-    "nbclient",
-    "nbformat",
-    "ipykernel",
-    "matplotlib",
-];
+const REQUIREMENTS: [&str; 8] =
+    ["maturin>=1.9.4,<2", "numpy", "pandas", "pytest", "nbclient", "nbformat", "ipykernel", "matplotlib"];
 /// What it is compared with.
 const OTHERS: [&str; 2] = ["pin==4.1.0", "figaroh==1.0.2"];
 
@@ -99,7 +91,8 @@ impl Environment {
     fn fresh(python: &str) -> anyhow::Result<Self> {
         let folder = environment::target_directory()?.join("python-package");
         if folder.exists() {
-            std::fs::remove_dir_all(&folder).with_context(|| format!("cannot remove {}", folder.display()))?;
+            std::fs::remove_dir_all(&folder)
+                .with_context(|| format!("cannot remove {}", folder.display()))?;
         }
         Self::kept(python)
     }
@@ -181,7 +174,8 @@ impl Environment {
 /// Runs a program whose output goes to the terminal.
 fn run(command: &mut Command) -> anyhow::Result<()> {
     let program = command.get_program().to_string_lossy().into_owned();
-    let status = command.stdin(Stdio::null()).status().with_context(|| format!("{program} cannot be started"))?;
+    let status =
+        command.stdin(Stdio::null()).status().with_context(|| format!("{program} cannot be started"))?;
     ensure!(status.success(), "{program} has failed ({status})");
     Ok(())
 }

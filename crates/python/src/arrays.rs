@@ -36,6 +36,9 @@ impl<'py> Doubles<'py> {
 /// An array that is given to Python.
 pub type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
+/// What pickle takes: what makes a value again, and what of.
+pub type Pickled<'py, T> = (Bound<'py, PyAny>, T);
+
 /// States of a robot: one, or a batch.
 pub struct States<'py> {
     numbers: Doubles<'py>,

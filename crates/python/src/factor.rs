@@ -1,6 +1,6 @@
 //! `phiw.Factor`: rows of [Φ f] reduced to a triangle; triangles merge.
 
-use crate::arrays::{Array, Doubles, array};
+use crate::arrays::{Array, Doubles, Pickled, array};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::Factor;
 use pyo3::exceptions::PyValueError;
@@ -145,7 +145,7 @@ impl PyFactor {
         format!("Factor({} parameters, {} rows)", self.factor.parameters(), self.factor.rows())
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (usize, u64, Vec<f64>))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py, (usize, u64, Vec<f64>)>> {
         let factor = &slf.get().factor;
         let again = slf.get_type().getattr("_restored")?;
         Ok((again, (factor.columns(), factor.rows(), factor.triangle())))

@@ -1,6 +1,6 @@
 //! `phiw.Robot`: a robot from its URDF, and its dynamics over batches of states.
 
-use crate::arrays::{Array, Doubles, States, array, same_count};
+use crate::arrays::{Array, Doubles, Pickled, States, array, same_count};
 use crate::batch::{LANES, Lane, over_states, put};
 use crate::hold::hold;
 use phiw_dynamics::inertia::PARAMETER_NAMES;
@@ -13,7 +13,7 @@ use phiw_regressor::{BaseParameters, BaseParametersOptions, JointTorqueRegressor
 use pulp::Arch;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 use std::path::PathBuf;
 
 /// A robot, read from a URDF.
@@ -321,16 +321,14 @@ impl Robot {
         format!("Robot('{}', {} joints)", self.tree.name(), self.tree.joint_count())
     }
 
-    #[allow(clippy::type_complexity)] // what pickle takes
     /// Pickles: the URDF's text and what is held, and the parameters, which may be other ones.
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, (String, Py<PyDict>, bool, Vec<f64>))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py, Bound<'py, PyTuple>>> {
         let (py, robot) = (slf.py(), slf.get());
         let hold = PyDict::new(py);
         robot.hold.iter().try_for_each(|(joint, value)| hold.set_item(joint, value))?;
-        let again = slf.get_type().getattr("_restored")?;
-        Ok((again, (robot.xml.clone(), hold.unbind(), robot.floating_base, robot.tree.inertial_parameters())))
+        let parameters = robot.tree.inertial_parameters();
+        let what = (robot.xml.as_str(), hold, robot.floating_base, parameters).into_pyobject(py)?;
+        Ok((slf.get_type().getattr("_restored")?, what))
     }
 
     #[staticmethod]
