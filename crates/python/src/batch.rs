@@ -16,21 +16,22 @@ pub type Lane = Lanes<LANES>;
 /// Inputs of a kernel: for each array its numbers, state by state, and how many a state has.
 pub type Inputs<'a, const K: usize> = [(&'a [f64], usize); K];
 
-/// Calls `kernel` for all states, [`LANES`] at a time, and gives its outputs of `width` numbers each.
+/// Calls `kernel` for all states, [`LANES`] at a time, and puts its results of `width` numbers each into
+/// `outputs`.
 ///
 /// `kernel` gets scratch of its thread (from `scratch`), the inputs, and what it writes: the outputs of as
-/// many states as there are, zero before.
+/// many states as there are.
 ///
 /// # Errors
 /// The first of `kernel`.
 pub fn over_states<S: Send, const K: usize>(
     inputs: Inputs<'_, K>,
-    states: usize,
     width: usize,
+    outputs: &mut [f64],
     scratch: impl Fn() -> S + Sync,
     kernel: impl Fn(&mut S, [&[Lane]; K], &mut [f64]) -> Result<(), DimensionError> + Sync,
-) -> Result<Vec<f64>, DimensionError> {
-    let mut outputs = vec![0.0; states * width];
+) -> Result<(), DimensionError> {
+    let states = outputs.len().checked_div(width).unwrap_or(0);
     let start = || (scratch(), inputs.map(|(_, width)| vec![Lanes([0.0; LANES]); width]));
     let work = |(scratch, lanes): &mut (S, [Vec<Lane>; K]), first: usize, outputs: &mut [f64]| {
         for (step, outputs) in outputs.chunks_mut(LANES * width).enumerate() {
@@ -47,17 +48,14 @@ pub fn over_states<S: Send, const K: usize>(
         }
         Ok::<(), DimensionError>(())
     };
-    if states == 0 || width == 0 {
-        return Ok(outputs);
-    }
-    if states <= STRETCH {
-        work(&mut start(), 0, &mut outputs)?;
+    if states == 0 {
+        Ok(())
+    } else if states <= STRETCH {
+        work(&mut start(), 0, outputs)
     } else {
         let stretches = outputs.par_chunks_mut(STRETCH * width).enumerate();
-        stretches
-            .try_for_each_init(start, |own, (stretch, outputs)| work(own, stretch * STRETCH, outputs))?;
+        stretches.try_for_each_init(start, |own, (stretch, outputs)| work(own, stretch * STRETCH, outputs))
     }
-    Ok(outputs)
 }
 
 /// Writes `values`, the outputs of [`LANES`] states side by side, state by state.

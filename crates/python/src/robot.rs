@@ -3,6 +3,7 @@
 use crate::arrays::{Array, Doubles, Pickled, States, array, same_count};
 use crate::batch::{LANES, Lane, over_states, put};
 use crate::hold::hold;
+use numpy::{PyArrayMethods, PyUntypedArrayMethods};
 use phiw_dynamics::inertia::PARAMETER_NAMES;
 use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
 use phiw_dynamics::scalar::Lanes;
@@ -162,24 +163,29 @@ impl Robot {
     /// ----------
     /// q, qd, qdd : array, shape (N, dof) or (dof,)
     ///     Positions (rad, m), velocities (rad/s, m/s) and accelerations (rad/s², m/s²).
+    /// out : array, optional
+    ///     Contiguous, of the result's shape: is written to and given back, which saves the system the work of
+    ///     finding new memory.
     ///
     /// Returns
     /// -------
     /// array, shape (N, dof) or (dof,)
     ///     Torques (N·m) or forces (N).
+    #[pyo3(signature = (q, qd, qdd, *, out=None))]
     fn inverse_dynamics<'py>(
         &self,
         py: Python<'py>,
         q: &Bound<'py, PyAny>,
         qd: &Bound<'py, PyAny>,
         qdd: &Bound<'py, PyAny>,
+        out: Option<Array<'py>>,
     ) -> PyResult<Array<'py>> {
         let dof = self.tree.velocity_size();
         let motion = self.motion(q, ("qd", qd), ("qdd", qdd))?;
         self.batch(
             py,
             motion,
-            &[dof],
+            (&[dof], out),
             || self.scratch(dof),
             |(workspace, torque), [q, v, a], outputs| {
                 Arch::new().dispatch(
@@ -198,24 +204,29 @@ impl Robot {
     /// ----------
     /// q, qd, tau : array, shape (N, dof) or (dof,)
     ///     Positions (rad, m), velocities (rad/s, m/s) and torques (N·m, N).
+    /// out : array, optional
+    ///     Contiguous, of the result's shape: is written to and given back, which saves the system the work of
+    ///     finding new memory.
     ///
     /// Returns
     /// -------
     /// array, shape (N, dof) or (dof,)
     ///     Accelerations (rad/s², m/s²); not finite where the robot is singular (massless links).
+    #[pyo3(signature = (q, qd, tau, *, out=None))]
     fn forward_dynamics<'py>(
         &self,
         py: Python<'py>,
         q: &Bound<'py, PyAny>,
         qd: &Bound<'py, PyAny>,
         tau: &Bound<'py, PyAny>,
+        out: Option<Array<'py>>,
     ) -> PyResult<Array<'py>> {
         let dof = self.tree.velocity_size();
         let motion = self.motion(q, ("qd", qd), ("tau", tau))?;
         self.batch(
             py,
             motion,
-            &[dof],
+            (&[dof], out),
             || self.scratch(dof),
             |(workspace, acceleration), [q, v, f], outputs| {
                 Arch::new().dispatch(
@@ -234,18 +245,27 @@ impl Robot {
     /// ----------
     /// q : array, shape (N, dof) or (dof,)
     ///     Positions (rad, m).
+    /// out : array, optional
+    ///     Contiguous, of the result's shape: is written to and given back, which saves the system the work of
+    ///     finding new memory.
     ///
     /// Returns
     /// -------
     /// array, shape (N, dof, dof) or (dof, dof)
     ///     kg·m² between joints that turn, kg·m and kg where they slide.
-    fn mass_matrix<'py>(&self, py: Python<'py>, q: &Bound<'py, PyAny>) -> PyResult<Array<'py>> {
+    #[pyo3(signature = (q, *, out=None))]
+    fn mass_matrix<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        out: Option<Array<'py>>,
+    ) -> PyResult<Array<'py>> {
         let dof = self.tree.velocity_size();
         let q = [States::of(q, "q", self.tree.configuration_size())?];
         self.batch(
             py,
             q,
-            &[dof, dof],
+            (&[dof, dof], out),
             || self.scratch(dof * dof),
             |(workspace, matrix), [q], outputs| {
                 Arch::new().dispatch(
@@ -265,22 +285,27 @@ impl Robot {
     /// ----------
     /// q, qd, qdd : array, shape (N, dof) or (dof,)
     ///     Positions (rad, m), velocities (rad/s, m/s) and accelerations (rad/s², m/s²).
+    /// out : array, optional
+    ///     Contiguous, of the result's shape: is written to and given back, which saves the system the work of
+    ///     finding new memory.
     ///
     /// Returns
     /// -------
     /// array, shape (N, dof, 10 · links) or (dof, 10 · links)
     ///     Torque (N·m, N) per unit of each parameter, link by link in the order of ``PARAMETER_NAMES``.
+    #[pyo3(signature = (q, qd, qdd, *, out=None))]
     fn joint_torque_regressor<'py>(
         &self,
         py: Python<'py>,
         q: &Bound<'py, PyAny>,
         qd: &Bound<'py, PyAny>,
         qdd: &Bound<'py, PyAny>,
+        out: Option<Array<'py>>,
     ) -> PyResult<Array<'py>> {
         let (rows, columns) = (self.regressor.rows(), self.regressor.columns());
         let motion = self.motion(q, ("qd", qd), ("qdd", qdd))?;
         let scratch = || (self.regressor.scratch(), vec![Lanes([0.0; LANES]); self.regressor.buffer_size()]);
-        self.batch(py, motion, &[rows, columns], scratch, |(scratch, pairs), [q, v, a], outputs| {
+        self.batch(py, motion, (&[rows, columns], out), scratch, |(scratch, pairs), [q, v, a], outputs| {
             self.regressor.compute_lanes(&self.tree, q, v, a, scratch, pairs)?;
             for (lane, phi) in outputs.chunks_exact_mut(rows * columns).enumerate() {
                 self.scatter(pairs, lane, phi);
@@ -392,12 +417,13 @@ impl Robot {
         (Workspace::new(&self.tree), vec![Lanes([0.0; LANES]); outputs])
     }
 
-    /// Runs a kernel over states without Python's lock; the outputs have `shape` for each state.
+    /// Runs a kernel over states without Python's lock; its results have `shape` for each state, and go into
+    /// `out` if that is given.
     fn batch<'py, S: Send, const K: usize>(
         &self,
         py: Python<'py>,
         states: [States<'py>; K],
-        shape: &[usize],
+        (shape, out): (&[usize], Option<Array<'py>>),
         scratch: impl Fn() -> S + Send + Sync,
         kernel: impl Fn(&mut S, [&[Lane]; K], &mut [f64]) -> Result<(), DimensionError> + Send + Sync,
     ) -> PyResult<Array<'py>> {
@@ -407,13 +433,31 @@ impl Robot {
             *input = (states.as_slice()?, states.width);
         }
         let width = shape.iter().product();
-        let outputs = py.detach(|| over_states(inputs, count.unwrap_or(1), width, scratch, kernel));
         let shape: Vec<usize> = count.into_iter().chain(shape.iter().copied()).collect();
-        array(py, outputs.map_err(wrong_size)?, &shape)
+        let Some(out) = out else {
+            let mut outputs = vec![0.0; count.unwrap_or(1) * width];
+            py.detach(|| over_states(inputs, width, &mut outputs, scratch, kernel)).map_err(wrong_size)?;
+            return array(py, outputs, &shape);
+        };
+        if out.shape() != shape {
+            let message = format!("out has the shape {:?}, but the result has {shape:?}", out.shape());
+            return Err(PyValueError::new_err(message));
+        }
+        let unusable = |why: String| PyValueError::new_err(format!("out cannot be written to: {why}"));
+        // A slice of numbers in Fortran's order would be had, too.
+        if !out.is_c_contiguous() {
+            return Err(unusable("it is not contiguous in C's order".to_owned()));
+        }
+        let mut written = out.try_readwrite().map_err(|error| unusable(error.to_string()))?;
+        let outputs = written.as_slice_mut().map_err(|error| unusable(error.to_string()))?;
+        py.detach(|| over_states(inputs, width, outputs, scratch, kernel)).map_err(wrong_size)?;
+        drop(written);
+        Ok(out)
     }
 
-    /// The dense regressor of one of the states side by side; `phi` is zero before.
+    /// The dense regressor of one of the states side by side.
     fn scatter(&self, pairs: &[Lane], lane: usize, phi: &mut [f64]) {
+        phi.fill(0.0);
         let columns = self.regressor.columns();
         let mut blocks = pairs.chunks_exact(PARAMETERS_PER_BODY);
         for (row, phi) in phi.chunks_exact_mut(columns).enumerate() {

@@ -112,6 +112,26 @@ def test_contiguous_doubles_are_taken_as_they_are_and_others_converted(puma):
     np.testing.assert_array_equal(puma.inverse_dynamics(q, qd, qdd), expected)
 
 
+def test_results_go_where_they_are_asked_for(robot):
+    q, qd, qdd = random_states(robot, 600)
+    for kernel, inputs in [
+        (robot.inverse_dynamics, (q, qd, qdd)),
+        (robot.forward_dynamics, (q, qd, qdd)),
+        (robot.mass_matrix, (q,)),
+        (robot.joint_torque_regressor, (q, qd, qdd)),
+    ]:
+        expected = kernel(*inputs)
+        out = np.full_like(expected, np.nan)
+        assert kernel(*inputs, out=out) is out
+        np.testing.assert_array_equal(out, expected)
+        with pytest.raises(ValueError, match="out has the shape"):
+            kernel(*inputs, out=out[:-1])
+        with pytest.raises(ValueError, match="out cannot be written to"):
+            kernel(*inputs, out=np.asfortranarray(out))
+    with pytest.raises(ValueError, match="out cannot be written to"):
+        robot.inverse_dynamics(q, qd, qdd, out=qdd)
+
+
 def test_base_parameters_carry_the_whole_torque(robot):
     q, qd, qdd = random_states(robot, 40)
     columns, to_base = robot.base_parameters()

@@ -61,13 +61,21 @@ class Robot:
         """Shape (links, 10), in the order of ``PARAMETER_NAMES`` (kg, kg·m, kg·m²)."""
     def with_inertial_parameters(self, parameters: ArrayLike) -> "Robot":
         """The same robot with other inertial parameters, for kernels only."""
-    def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+    def inverse_dynamics(
+        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: Optional[Array] = None
+    ) -> Array:
         """Torques (N·m, N) of shape (N, dof), RNEA."""
-    def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
+    def forward_dynamics(
+        self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, *, out: Optional[Array] = None
+    ) -> Array:
         """Accelerations (rad/s², m/s²) of shape (N, dof), ABA."""
-    def mass_matrix(self, q: ArrayLike) -> Array:
+    def mass_matrix(
+        self, q: ArrayLike, *, out: Optional[Array] = None
+    ) -> Array:
         """M(q) of shape (N, dof, dof), CRBA."""
-    def joint_torque_regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+    def joint_torque_regressor(
+        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, out: Optional[Array] = None
+    ) -> Array:
         """φ(q, q̇, q̈) of shape (N, dof, 10 · links)."""
     def base_parameters(self) -> Tuple[List[int], Array]:
         """Columns of φ that stand for the base parameters, and the map to these."""
