@@ -32,7 +32,7 @@ mod robot_findings;
 mod sample;
 
 pub use accumulate::Fold;
-pub use block_source::BlockSource;
+pub use block_source::{BlockSource, EveryNth};
 pub use design::Design;
 pub use effect::{Effect, EffectCatalogue, EffectSpec};
 pub use error::IdentificationError;
