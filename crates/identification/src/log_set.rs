@@ -1,11 +1,11 @@
 //! The logs of a session: which train, which are held out, and how they are conditioned.
 
 use crate::checks::{check_excitation, check_logs};
-use crate::log_access::{LogAccess, LogFile, Progress, reading};
+use crate::log_file::{Interruption, LogFile, Progress, reading};
 use crate::{Fold, IdentificationError};
 use phiw_dynamics::Tree;
-use phiw_telemetry::{Conditioning, ConditioningOptions, LogError, Survey, TorqueColumns};
-use std::path::{Path, PathBuf};
+use phiw_telemetry::{Conditioning, ConditioningOptions, LogError, LogSource, Survey, TorqueColumns};
+use std::path::Path;
 
 /// Stretches of time that the training logs are cut into: long against the residual's correlation, enough for
 /// a standard deviation.
@@ -19,7 +19,7 @@ pub struct LogSet {
     surveys: Vec<Survey>,
     train: usize,
     conditioning: Conditioning,
-    access: LogAccess,
+    interruption: Interruption,
 }
 
 impl LogSet {
@@ -31,10 +31,10 @@ impl LogSet {
     ///
     /// # Errors
     /// A log that cannot be read or does not fit the robot, or a joint that moves in none.
-    pub fn open(
+    pub fn open<S: Clone + Into<LogSource>>(
         tree: &Tree,
-        train: &[PathBuf],
-        validate: &[PathBuf],
+        train: &[S],
+        validate: &[S],
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
@@ -47,65 +47,68 @@ impl LogSet {
     ///
     /// # Errors
     /// A log that cannot be read or does not fit the robot.
-    pub fn open_unexcited(
+    pub fn open_unexcited<S: Clone + Into<LogSource>>(
         tree: &Tree,
-        train: &[PathBuf],
-        validate: &[PathBuf],
+        train: &[S],
+        validate: &[S],
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
-        let access = LogAccess::default();
-        Self::surveyed(tree, [train, validate], TorqueColumns::Required, options, access, progress)
+        let (logs, never) = ([sources(train), sources(validate)], Interruption::default());
+        Self::surveyed(tree, logs, TorqueColumns::Required, options, never, progress)
     }
 
     /// The same of logs that a model is used on: they need no torques.
     ///
     /// # Errors
     /// A log that cannot be read or does not fit the robot.
-    pub fn open_for_prediction(
+    pub fn open_for_prediction<S: Clone + Into<LogSource>>(
         tree: &Tree,
-        logs: &[PathBuf],
+        logs: &[S],
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
-        let access = LogAccess::default();
-        Self::surveyed(tree, [logs, &[]], TorqueColumns::Optional, options, access, progress)
+        let (logs, never) = ([sources(logs), Vec::new()], Interruption::default());
+        Self::surveyed(tree, logs, TorqueColumns::Optional, options, never, progress)
     }
 
     /// [`LogSet::open_unexcited`], or with optional torques [`LogSet::open_for_prediction`], of logs for
-    /// training and for validation that may be in memory.
+    /// training and for validation, which `interruption` can call off.
     ///
     /// # Errors
     /// A log that cannot be read or does not fit the robot; the work is called off.
     pub fn surveyed(
         tree: &Tree,
-        [train, validate]: [&[PathBuf]; 2],
+        [train, validate]: [Vec<LogSource>; 2],
         torque: TorqueColumns,
         options: &ConditioningOptions,
-        access: LogAccess,
+        interruption: Interruption,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
         let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
-        let survey = |path: &PathBuf| {
-            let mut report = |done: u64, total: u64| progress(&reading("surveying", path), done, total);
-            access.survey(path, &joints, torque, &mut report)
+        let survey = |source: &LogSource| {
+            let what = reading("surveying", &source.path);
+            let mut report = |done: u64, total: u64| progress(&what, done, total);
+            interruption.check()?;
+            phiw_telemetry::survey(source, &joints, torque, &mut report)
         };
         let mut surveys =
-            train.iter().chain(validate).map(survey).collect::<Result<Vec<Survey>, LogError>>()?;
+            train.iter().chain(&validate).map(survey).collect::<Result<Vec<Survey>, LogError>>()?;
         phiw_telemetry::arrange_session(&mut surveys);
         let (training, held_out) = surveys.split_at(train.len());
         check_logs(tree, training, held_out)?;
         let conditioning = Conditioning::choose(training, options)?;
         // Cut-offs that were told must fit the logs held out, too.
         held_out.iter().try_for_each(|survey| conditioning.plan(survey).map(drop))?;
-        Ok(LogSet { train: train.len(), conditioning, surveys, access })
+        Ok(LogSet { train: train.len(), conditioning, surveys, interruption })
     }
 
     /// The same logs, each row of which goes out.
     pub fn with_every_row(&self) -> Self {
         let mut conditioning = self.conditioning.clone();
         conditioning.options.decimation = Some(1);
-        LogSet { conditioning, surveys: self.surveys.clone(), train: self.train, access: self.access.clone() }
+        let interruption = self.interruption.clone();
+        LogSet { conditioning, surveys: self.surveys.clone(), train: self.train, interruption }
     }
 
     /// All surveys: training logs, then those for validation.
@@ -125,9 +128,9 @@ impl LogSet {
     pub fn set_parallel_cutoff(&mut self, cutoff_hz: f64) {
         self.conditioning.parallel_cutoff_hz = cutoff_hz;
     }
-    /// Where the logs are.
-    pub fn access(&self) -> &LogAccess {
-        &self.access
+    /// What calls work on the logs off.
+    pub fn interruption(&self) -> &Interruption {
+        &self.interruption
     }
     /// Whether the end of each training log is held out, since no other log is given.
     pub fn splits_training_logs(&self) -> bool {
@@ -189,9 +192,13 @@ impl LogSet {
 
     /// The logs as sources of blocks.
     pub fn sources<'a>(&'a self, progress: Progress<'a>) -> Vec<LogFile<'a>> {
-        let source = |survey| LogFile::new(survey, &self.conditioning, &self.access, progress);
+        let source = |survey| LogFile::new(survey, &self.conditioning, &self.interruption, progress);
         self.surveys.iter().map(source).collect()
     }
+}
+
+fn sources<S: Clone + Into<LogSource>>(logs: &[S]) -> Vec<LogSource> {
+    logs.iter().cloned().map(Into::into).collect()
 }
 
 /// Cuts a part of each log into stretches of about equal length, `count` or a few more in all.

@@ -97,9 +97,13 @@ pub struct PredictArguments {
     /// A model.json of `phiw identify` or `phiw explain`; it holds the robot, too.
     #[arg(long, value_name = "MODEL.json")]
     pub model: PathBuf,
-    /// Logs (CSV); torques are compared where a log has them.
+    /// Logs; torques are compared where a log has them.
     #[arg(value_name = "LOG", required = true)]
     pub logs: Vec<PathBuf>,
+    /// What the columns of the logs mean: topics, units, gears, currents (docs/log-maps.md). Without it they
+    /// are named as in a log of phiw.
+    #[arg(long, value_name = "MAP.toml")]
+    pub map: Option<PathBuf>,
     /// Joints that stand still in the logs, at 0 or at a value (rad, m); they need no column. What the model
     /// holds need not be named. In a name, * stands for any letters and ? for one: --hold 'left_*'.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
@@ -127,9 +131,13 @@ pub struct SimulateArguments {
     /// A model.json of `phiw identify` or `phiw explain`; it holds the robot, too.
     #[arg(long, value_name = "MODEL.json")]
     pub model: PathBuf,
-    /// Logs (CSV) with measured torques.
+    /// Logs with measured torques.
     #[arg(value_name = "LOG", required = true)]
     pub logs: Vec<PathBuf>,
+    /// What the columns of the logs mean: topics, units, gears, currents (docs/log-maps.md). Without it they
+    /// are named as in a log of phiw.
+    #[arg(long, value_name = "MAP.toml")]
+    pub map: Option<PathBuf>,
     /// Joints that stand still, as the model was made with; they need not be named. In a name, * stands for
     /// any letters and ? for one: --hold 'left_*'.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
@@ -151,9 +159,13 @@ pub struct CheckArguments {
     /// The robot's URDF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
-    /// Logs (CSV).
+    /// Logs: CSV, MCAP, ROS bags, LeRobot folders, npz.
     #[arg(value_name = "LOG", required = true)]
     pub logs: Vec<PathBuf>,
+    /// What the columns of the logs mean: topics, units, gears, currents (docs/log-maps.md). Without it they
+    /// are named as in a log of phiw.
+    #[arg(long, value_name = "MAP.toml")]
+    pub map: Option<PathBuf>,
     /// Joints of the URDF that do not move, at 0 or at a value (rad, m); they need no column in the log. In a
     /// name, * stands for any letters and ? for one: --hold 'left_*'.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
@@ -175,6 +187,7 @@ impl CheckArguments {
         SessionArguments {
             urdf: self.urdf.clone(),
             train: self.logs.clone(),
+            map: self.map.clone(),
             hold: self.hold.clone(),
             quiet: self.quiet,
             in_memory: self.in_memory.clone(),
@@ -231,9 +244,13 @@ pub struct NextArguments {
     /// Folder of motions to choose from, as `phiw retarget` writes them: logs with q, qd and qdd.
     #[arg(long, value_name = "DIR")]
     pub motions: PathBuf,
-    /// Logs (CSV) of what the robot has run so far.
+    /// Logs of what the robot has run so far.
     #[arg(long, value_name = "LOG", num_args = 1..)]
     pub measured: Vec<PathBuf>,
+    /// What the columns of the logs mean: topics, units, gears, currents (docs/log-maps.md). Without it they
+    /// are named as in a log of phiw.
+    #[arg(long, value_name = "MAP.toml")]
+    pub map: Option<PathBuf>,
     /// What the robot stands on (soles of links); without it the robot is taken as bolted down.
     #[arg(long, value_name = "SUPPORT.toml")]
     pub support: Option<PathBuf>,
@@ -282,6 +299,7 @@ impl NextArguments {
         SessionArguments {
             urdf: self.urdf.clone(),
             train: self.measured.clone(),
+            map: self.map.clone(),
             declare: self.declare.clone(),
             hold: self.hold.clone(),
             cutoff_hz: self.cutoff_hz,
@@ -308,12 +326,16 @@ pub struct SessionArguments {
     /// The robot's URDF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
-    /// Logs (CSV) that the model is fitted to.
+    /// Logs that the model is fitted to: CSV, MCAP, ROS bags, LeRobot folders, npz.
     #[arg(long, value_name = "LOG", required = true, num_args = 1..)]
     pub train: Vec<PathBuf>,
     /// Logs that its error is measured on; without any, the last 30 % of each training log are held out.
     #[arg(long, value_name = "LOG", num_args = 1..)]
     pub validate: Vec<PathBuf>,
+    /// What the columns of the logs mean: topics, units, gears, currents (docs/log-maps.md). Without it they
+    /// are named as in a log of phiw.
+    #[arg(long, value_name = "MAP.toml")]
+    pub map: Option<PathBuf>,
     /// Effects beside the rigid body, wherever they can act or on the joints named: viscous_friction,
     /// coulomb_friction:j1+j2, transmission_coupling:j5+j6, …
     #[arg(long, value_name = "KIND[:JOINT[+JOINT…]],…", value_delimiter = ',')]
@@ -350,7 +372,8 @@ pub struct SessionArguments {
 impl SessionArguments {
     /// The files that are read.
     pub fn inputs(&self) -> Vec<PathBuf> {
-        std::iter::once(&self.urdf).chain(&self.train).chain(&self.validate).cloned().collect()
+        let logs = self.train.iter().chain(&self.validate);
+        std::iter::once(&self.urdf).chain(logs).chain(&self.map).cloned().collect()
     }
 
     /// The command line that gives these arguments to `phiw` and `command`, quoted for a shell.
@@ -373,6 +396,7 @@ impl SessionArguments {
         option("--urdf", paths(std::slice::from_ref(&self.urdf)));
         option("--train", paths(&self.train));
         option("--validate", paths(&self.validate));
+        option("--map", paths(self.map.as_slice()));
         option("--declare", list(self.declare.clone()));
         option("--hold", list(self.hold.iter().map(held).collect()));
         option("--mass", list(self.mass.iter().map(|(link, mass)| format!("{link}={mass}")).collect()));

@@ -1,9 +1,8 @@
 //! What is shown while the work goes on.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use phiw_identification::Interruption;
 use std::io::Write;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Characters of a message that are shown; a name in a broken file can fill screens.
 const LONGEST_MESSAGE: usize = 1000;
@@ -50,7 +49,7 @@ fn push_visible(text: &mut String, c: char) {
 pub struct Console {
     bar: ProgressBar,
     listener: Option<Listener>,
-    interruption: Arc<AtomicBool>,
+    interruption: Interruption,
 }
 
 /// Is told how far the work is: what is being done, how much of it is done, and how much there is.
@@ -66,11 +65,11 @@ impl Console {
         if let Ok(style) = ProgressStyle::with_template("{msg:<40!} {wide_bar} {percent:>3} % {eta:>5}") {
             bar.set_style(style.progress_chars("━╸─"));
         }
-        Console { bar, listener: None, interruption: Arc::default() }
+        Console { bar, listener: None, interruption: Interruption::default() }
     }
 
-    /// Shows nothing, but tells a listener; `interruption` calls the work off when it is set.
-    pub fn told_to(listener: Listener, interruption: Arc<AtomicBool>) -> Self {
+    /// Shows nothing, but tells a listener; `interruption` can call the work off.
+    pub fn told_to(listener: Listener, interruption: Interruption) -> Self {
         let mut console = Console::silent();
         console.listener = Some(listener);
         console.interruption = interruption;
@@ -84,7 +83,7 @@ impl Console {
 
     /// Whether the work is called off.
     pub fn is_interrupted(&self) -> bool {
-        self.interruption.load(Ordering::Relaxed)
+        self.interruption.is_called_off()
     }
 
     /// `done` bytes of `total` of what is being done.

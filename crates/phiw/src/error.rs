@@ -391,7 +391,7 @@ impl Error {
     }
 
     /// Whether the work was called off (see
-    /// [`LogAccess::interruption`](phiw_identification::LogAccess::interruption)).
+    /// [`Interruption`](phiw_identification::Interruption)).
     pub fn is_interruption(&self) -> bool {
         matches!(
             self,

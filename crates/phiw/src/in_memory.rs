@@ -2,8 +2,11 @@
 
 use crate::Error;
 use crate::input::read_text;
-use phiw_identification::LogAccess;
-use std::path::Path;
+use phiw_identification::Interruption;
+use phiw_telemetry::NamedColumns;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What stands in memory for files. The names that the arguments have for them are what messages say.
 #[derive(Clone, Debug, Default)]
@@ -12,8 +15,10 @@ pub struct InMemory {
     pub urdf: Option<String>,
     /// The text of the `model.json`.
     pub model: Option<String>,
-    /// The logs; and what calls the work off.
-    pub logs: LogAccess,
+    /// Logs, by name.
+    pub logs: BTreeMap<PathBuf, Arc<NamedColumns>>,
+    /// What calls the work off.
+    pub interruption: Interruption,
 }
 
 /// The text that is given, or that of the file `path`.

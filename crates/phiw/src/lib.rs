@@ -22,6 +22,7 @@ mod identified_urdf;
 pub mod identify;
 mod in_memory;
 pub mod input;
+mod log_inputs;
 mod model_file;
 mod model_use;
 pub mod next;

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::arguments::InMemory;
+use crate::log_inputs::{read_map, sources};
 use crate::model_file::ModelFile;
 use phiw_dynamics::Tree;
 use phiw_dynamics::urdf::{UrdfOptions, held_joints, read_urdf};
@@ -18,6 +19,8 @@ const SAME_POSITION: f64 = 1e-9;
 pub struct Reading<'a> {
     /// The logs.
     pub logs: &'a [PathBuf],
+    /// What their columns mean.
+    pub map: Option<&'a Path>,
     /// Joints that stand still in the logs, and where \[rad, m\].
     pub hold: &'a [(String, f64)],
     /// Whether the logs must have torques, and move all joints that the model moves.
@@ -73,9 +76,13 @@ impl ModelUse {
             ..ConditioningOptions::default()
         };
         let every_row = ConditioningOptions { decimation: Some(1), ..thinned.clone() };
+        let held_before = model.held.iter().map(|(joint, _)| joint.as_str());
+        let joints: Vec<String> = tree.joint_names().chain(held_before).map(str::to_owned).collect();
+        let map = read_map(reading.map, &joints)?;
+        let logs = [sources(reading.logs, map.as_ref(), reading.in_memory), Vec::new()];
         let torque = if reading.complete { TorqueColumns::Required } else { TorqueColumns::Optional };
-        let access = reading.in_memory.logs.clone();
-        let logs = LogSet::surveyed(&logged, [reading.logs, &[]], torque, &every_row, access, progress)?;
+        let interruption = reading.in_memory.interruption.clone();
+        let logs = LogSet::surveyed(&logged, logs, torque, &every_row, interruption, progress)?;
         let thinned = phiw_telemetry::Conditioning::choose(logs.surveys(), &thinned)?;
         let stride = |survey: &Survey| Ok(thinned.plan(survey)?.decimation());
         let strides = logs.surveys().iter().map(stride).collect::<Result<_, Error>>()?;

@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::arguments::SessionArguments;
 use crate::in_memory::text_of;
+use crate::log_inputs::{read_map, train_and_validate};
 use phiw_dynamics::urdf::{Finding, UrdfOptions, UrdfReading, read_urdf};
 use phiw_dynamics::{DimensionError, JointType, Tree};
 use phiw_effects::{Catalogue, SignalRanges};
@@ -64,14 +65,12 @@ impl Session {
             parallel_cutoff_hz: arguments.parallel_cutoff_hz,
             ..ConditioningOptions::default()
         };
-        let logs = LogSet::surveyed(
-            &robot.tree,
-            [&arguments.train, &arguments.validate],
-            TorqueColumns::Required,
-            &options,
-            arguments.in_memory.logs.clone(),
-            progress,
-        )?;
+        let map = read_map(arguments.map.as_deref(), &robot.all_joints())?;
+        let given = &arguments.in_memory;
+        let logs = train_and_validate(&arguments.train, &arguments.validate, map.as_ref(), given)?;
+        let interruption = given.interruption.clone();
+        let torque = TorqueColumns::Required;
+        let logs = LogSet::surveyed(&robot.tree, logs, torque, &options, interruption, progress)?;
         Ok(Session {
             tree: robot.tree,
             xml: robot.xml,
@@ -195,6 +194,14 @@ pub(crate) struct RobotOfUrdf {
     pub held: Vec<(String, f64)>,
     /// Number of angles and axes that were made exact.
     pub snapped: usize,
+}
+
+impl RobotOfUrdf {
+    /// Joints that move and joints that are held, by name.
+    pub fn all_joints(&self) -> Vec<String> {
+        let held = self.held.iter().map(|(joint, _)| joint.as_str());
+        self.tree.joint_names().chain(held).map(str::to_owned).collect()
+    }
 }
 
 /// The robot of a session.

@@ -84,23 +84,28 @@ const COLUMNS_NAMED: usize = 10;
 
 /// Skipped rows, jumps, short stretches, unknown columns.
 pub fn of_log(survey: &Survey) -> Vec<String> {
-    let name = file_name(&survey.path);
+    let (name, rows_are) = (file_name(&survey.path), survey.rows_are);
     let gap = |gap: &phiw_telemetry::segments::GapCount| {
         let (count, line) = (gap.count, gap.first_line);
         let rows = if count == 1 { "row" } else { "rows" };
         match gap.reason {
             GapReason::TimeJump if count == 1 => {
-                format!("{name}: time jumps at line {line}; the log is split there")
+                format!("{name}: time jumps at {rows_are} {line}; the log is split there")
             }
             GapReason::TimeJump => {
-                format!("{name}: time jumps {count} times, first at line {line}; the log is split there")
+                format!(
+                    "{name}: time jumps {count} times, first at {rows_are} {line}; the log is split there"
+                )
             }
             GapReason::Spike => {
                 let columns: Vec<String> = survey
                     .spikes
                     .iter()
                     .map(|spike| {
-                        format!("{} ({} first at line {})", spike.column, spike.samples, spike.first_line)
+                        format!(
+                            "{} ({} first at {rows_are} {})",
+                            spike.column, spike.samples, spike.first_line
+                        )
                     })
                     .collect();
                 format!(
@@ -108,8 +113,9 @@ pub fn of_log(survey: &Survey) -> Vec<String> {
                     columns.join(", ")
                 )
             }
+            GapReason::LeftOut => format!("{name}: {count} {rows} left out by the map"),
             reason => format!(
-                "{name}: {count} {rows} skipped ({reason}), first at line {line}; the log is split there"
+                "{name}: {count} {rows} skipped ({reason}), first at {rows_are} {line}; the log is split there"
             ),
         }
     };

@@ -8,6 +8,7 @@ use phiw::arguments::{
     RetargetArguments, SessionArguments,
 };
 use phiw::identify::Results;
+use phiw_identification::Interruption;
 use phiw_result_folder::{Disk, ResultFile, replace_folder};
 use phiw_telemetry::NamedColumns;
 use pyo3::prelude::*;
@@ -31,6 +32,7 @@ pub enum Log<'py> {
 pub struct SessionOptions<'py> {
     train: Vec<Log<'py>>,
     validate: Vec<Log<'py>>,
+    map: Option<PathBuf>,
     declare: Vec<String>,
     mass: Vec<(String, f64)>,
     total_mass: Option<f64>,
@@ -60,7 +62,7 @@ pub fn identify<'py>(
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Told<'py>> {
     let arguments = session(robot.get(), options)?;
-    let interruption = arguments.in_memory.logs.interruption();
+    let interruption = arguments.in_memory.interruption.clone();
     let work = move |console: &_| phiw::identify::results(&arguments, console);
     told(py, run(py, progress, &interruption, work)?)
 }
@@ -79,7 +81,7 @@ pub fn explain<'py>(
     let named = model.as_ref().map(|_| PathBuf::from("model"));
     session.in_memory.model = model;
     let arguments = ExplainArguments { session, model: named, draws, exclude, false_name_rate };
-    let interruption = arguments.session.in_memory.logs.interruption();
+    let interruption = arguments.session.in_memory.interruption.clone();
     let work = move |console: &_| phiw::explain::results(&arguments, console);
     told(py, run(py, progress, &interruption, work)?)
 }
@@ -90,25 +92,27 @@ pub fn check<'py>(
     py: Python<'py>,
     robot: &Bound<'py, Robot>,
     logs: Vec<Log<'py>>,
+    map: Option<PathBuf>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(String, String)> {
     let (urdf, mut in_memory) = of_robot(robot.get())?;
     let logs = taken(logs, &mut in_memory)?;
     let hold = robot.get().hold.clone();
-    let interruption = in_memory.logs.interruption();
-    let arguments = CheckArguments { urdf, logs, hold, out: None, quiet: true, in_memory };
+    let interruption = in_memory.interruption.clone();
+    let arguments = CheckArguments { urdf, logs, map, hold, out: None, quiet: true, in_memory };
     let outcome = run(py, progress, &interruption, move |console| phiw::check::check(&arguments, console))?;
     Ok((outcome.report.to_string(), outcome.summary))
 }
 
 /// Predictions of a model: names, columns, the log of each row, relative error, warnings.
 #[pyfunction]
-#[pyo3(signature = (model, logs, hold, cutoff_hz, parallel_cutoff_hz, progress))]
+#[pyo3(signature = (model, logs, map, hold, cutoff_hz, parallel_cutoff_hz, progress))]
 #[allow(clippy::type_complexity)] // a tuple that only the package takes apart
 pub fn predict<'py>(
     py: Python<'py>,
     model: String,
     logs: Vec<Log<'py>>,
+    map: Option<PathBuf>,
     hold: &Bound<'py, PyAny>,
     cutoff_hz: Option<f64>,
     parallel_cutoff_hz: Option<f64>,
@@ -118,13 +122,14 @@ pub fn predict<'py>(
     let arguments = PredictArguments {
         model: PathBuf::from("model"),
         logs: taken(logs, &mut in_memory)?,
+        map,
         hold: crate::hold::hold(Some(hold))?,
         cutoff_hz,
         parallel_cutoff_hz,
         in_memory,
         ..PredictArguments::default()
     };
-    let interruption = arguments.in_memory.logs.interruption();
+    let interruption = arguments.in_memory.interruption.clone();
     let work = move |console: &_| phiw::predict::predicted_columns(&arguments, console);
     let predicted = run(py, progress, &interruption, work)?;
     let rows = predicted.log.len();
@@ -139,6 +144,7 @@ pub fn predict<'py>(
 pub struct NextOptions<'py> {
     motions: PathBuf,
     measured: Vec<Log<'py>>,
+    map: Option<PathBuf>,
     support: Option<PathBuf>,
     model: Option<String>,
     declare: Vec<String>,
@@ -163,6 +169,7 @@ pub fn next_motion<'py>(
         urdf,
         motions: options.motions,
         measured,
+        map: options.map,
         support: options.support,
         model: in_memory.model.as_ref().map(|_| PathBuf::from("model")),
         declare: options.declare,
@@ -175,7 +182,7 @@ pub fn next_motion<'py>(
         quiet: true,
         in_memory,
     };
-    let interruption = arguments.in_memory.logs.interruption();
+    let interruption = arguments.in_memory.interruption.clone();
     let chosen = run(py, progress, &interruption, move |console| phiw::next::chosen(&arguments, console))?;
     Ok((contents(py, chosen.files)?, without_last_line(&chosen.summary), chosen.warnings))
 }
@@ -217,7 +224,7 @@ pub fn retarget<'py>(
         quiet: true,
     };
     let work = move |console: &_| phiw::retarget::retarget(&arguments, console);
-    let outcome = run(py, progress, &Arc::default(), work)?;
+    let outcome = run(py, progress, &Interruption::default(), work)?;
     let failures = outcome.failures.iter().map(|failure| (failure.file.clone(), failure.reason.to_string()));
     Ok((outcome.summary, outcome.warnings, failures.collect()))
 }
@@ -258,6 +265,7 @@ fn session(robot: &Robot, options: SessionOptions<'_>) -> PyResult<SessionArgume
         urdf,
         train: taken(options.train, &mut in_memory)?,
         validate: taken(options.validate, &mut in_memory)?,
+        map: options.map,
         declare: options.declare,
         hold: robot.hold.clone(),
         mass: options.mass,
@@ -283,7 +291,7 @@ fn taken(logs: Vec<Log<'_>>, in_memory: &mut InMemory) -> PyResult<Vec<PathBuf>>
             let path = PathBuf::from(name);
             let log =
                 NamedColumns::new(&path, own).map_err(|error| InputError::new_err(error.to_string()))?;
-            in_memory.logs.insert(log);
+            in_memory.logs.insert(path.clone(), Arc::new(log));
             Ok(path)
         }
     };

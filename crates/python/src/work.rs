@@ -3,10 +3,10 @@
 use phiw::Error;
 use phiw::console::Console;
 use phiw::threads;
+use phiw_identification::Interruption;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -32,7 +32,7 @@ type Told = Arc<Mutex<Option<(String, u64, u64)>>>;
 pub fn run<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
-    interruption: &Arc<AtomicBool>,
+    interruption: &Interruption,
     work: impl FnOnce(&Console) -> Result<T, Error> + Send + 'static,
 ) -> PyResult<T> {
     let told = Told::default();
@@ -56,7 +56,7 @@ pub fn run<T: Send + 'static>(
         let done = py.detach(wait);
         // What was last told is told before the end, too.
         if let Err(raised) = py.check_signals().and_then(|()| tell(progress, &told)) {
-            interruption.store(true, Ordering::Relaxed);
+            interruption.call_off();
             return Err(raised);
         }
         match done {

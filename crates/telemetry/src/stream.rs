@@ -2,8 +2,8 @@
 
 use crate::blocks::BlockMaker;
 use crate::clock::Resampler;
-use crate::log_file::open_log;
-use crate::reader::{LogFile, Rows};
+use crate::log_rows::open_log;
+use crate::reader::Rows;
 use crate::segments::Segment;
 use crate::segments::{SegmentSink, split};
 use crate::spike::WithoutSpikes;
@@ -43,18 +43,7 @@ pub fn stream(
     sink: &mut dyn FnMut(Block) -> ControlFlow<()>,
 ) -> Result<StreamSummary, LogError> {
     let joints: Vec<String> = survey.joints.iter().map(|joint| joint.name.clone()).collect();
-    let mut rows = open_log(&survey.path, &joints, survey.torque)?;
-    stream_opened(rows.as_mut(), survey, conditioning, progress, sink)
-}
-
-/// [`stream`] of a log that is opened.
-pub(crate) fn stream_opened(
-    mut rows: &mut dyn LogFile,
-    survey: &Survey,
-    conditioning: &Conditioning,
-    progress: &mut dyn FnMut(u64, u64),
-    sink: &mut dyn FnMut(Block) -> ControlFlow<()>,
-) -> Result<StreamSummary, LogError> {
+    let mut rows = open_log(&survey.source, &joints, survey.torque)?;
     let summary = stream_rows(&mut rows, survey, conditioning, progress, sink)?;
     if !summary.stopped && rows.content_hash() != survey.content_hash {
         return Err(LogError::Changed { path: survey.path.clone() });

@@ -8,8 +8,9 @@ use crate::gap::GapReason;
 use crate::histogram::Histogram;
 use crate::joint_survey::JointSurvey;
 use crate::joint_survey::{Five, JointCollector};
-use crate::log_file::open_log;
-use crate::reader::{LogFile, Row, Rows};
+use crate::log_rows::open_log;
+use crate::log_source::LogSource;
+use crate::reader::{Row, Rows};
 use crate::segments::{GapCount, Segment};
 use crate::segments::{RowCounts, SegmentSink, SpikeCount, split};
 use crate::spectrum::Spectrum;
@@ -24,6 +25,12 @@ use std::path::{Path, PathBuf};
 pub struct Survey {
     /// The log.
     pub path: PathBuf,
+    /// How it is read.
+    pub source: LogSource,
+    /// What lines are counted in: `line`, `message` or `row`.
+    pub rows_are: &'static str,
+    /// How the rows came about, where the log does not say it plainly.
+    pub notes: Vec<String>,
     /// Place in the session, see [`arrange_session`].
     pub session: Session,
     /// What was asked for when it was surveyed.
@@ -132,25 +139,19 @@ pub fn arrange_session(surveys: &mut [Survey]) {
 /// A file that can't be read, columns that are missing, cells that are not numbers, time that runs backwards,
 /// no usable row.
 pub fn survey(
-    path: &Path,
+    source: impl Into<LogSource>,
     joints: &[String],
     torque: TorqueColumns,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Survey, LogError> {
-    survey_opened(&mut || open_log(path, joints, torque), joints, torque, progress)
-}
-
-/// [`survey`] of the log that `open` opens.
-pub(crate) fn survey_opened<'a>(
-    open: &mut dyn FnMut() -> Result<Box<dyn LogFile + 'a>, LogError>,
-    joints: &[String],
-    torque: TorqueColumns,
-    progress: &mut dyn FnMut(u64, u64),
-) -> Result<Survey, LogError> {
-    let (mut survey, reader) = survey_rows(open, joints, progress)?;
+    let source = source.into();
+    let mut open = || open_log(&source, joints, torque);
+    let (mut survey, reader) = survey_rows(&mut open, joints, progress)?;
     survey.torque = torque;
     survey.ignored_columns = reader.ignored_columns().to_vec();
     survey.content_hash = reader.content_hash();
+    survey.notes = reader.notes();
+    survey.source = source;
     Ok(survey)
 }
 
@@ -206,10 +207,14 @@ pub(crate) fn survey_rows<R: Rows>(
     if counts.used == 0 {
         return Err(match counts.rows {
             0 => LogError::Empty { path: rows.path().into() },
-            n => LogError::NoUsableRows { path: rows.path().into(), rows: n, reasons: counts.reasons() },
+            n => LogError::NoUsableRows {
+                path: rows.path().into(),
+                rows: n,
+                reasons: counts.reasons(rows.rows_are()),
+            },
         });
     }
-    let survey = collector.finish(rows.path(), joints, counts);
+    let survey = collector.finish(rows.path(), rows.rows_are(), joints, counts);
     Ok((Survey { spikes, spike_bounds, still, ..survey }, rows))
 }
 
@@ -331,7 +336,7 @@ impl<'a> Collector<'a> {
         std::array::from_fn(|i| self.recent[i * self.layout.width + place])
     }
 
-    fn finish(self, path: &Path, joints: &[String], counts: RowCounts) -> Survey {
+    fn finish(self, path: &Path, rows_are: &'static str, joints: &[String], counts: RowCounts) -> Survey {
         let votes: Vec<f64> = self.joints.iter().filter_map(JointCollector::smoother_when_uniform).collect();
         let mean = votes.iter().sum::<f64>() / votes.len().max(1) as f64;
         let jitter = (self.step_square / self.step_count.max(1.0)).sqrt();
@@ -340,6 +345,9 @@ impl<'a> Collector<'a> {
         let period = if self.step_count > 0.0 { self.step_sum / self.step_count } else { self.steps.median };
         Survey {
             path: path.into(),
+            source: LogSource::from(path),
+            rows_are,
+            notes: Vec::new(),
             session: Session::default(),
             torque: if self.layout.torque { TorqueColumns::Required } else { TorqueColumns::Absent },
             rows: counts.rows,

@@ -1,7 +1,7 @@
 //! The training motion that cut-offs are compared on, in memory, to be filtered with any of them.
 
 use super::{BandwidthSettings, beginnings};
-use crate::log_access::LogFile;
+use crate::log_file::LogFile;
 use crate::{BlockSource, Fold, IdentificationError, LogSet, Progress};
 use phiw_telemetry::filter::ParallelFilter;
 use phiw_telemetry::{Block, LogError};
@@ -30,7 +30,7 @@ impl Stretches {
         conditioning.options.parallel_cutoff_hz = Some(lowest_hz);
         let read = |survey| {
             let mut blocks = Vec::new();
-            LogFile::new(survey, &conditioning, logs.access(), progress).blocks(&mut |block| {
+            LogFile::new(survey, &conditioning, logs.interruption(), progress).blocks(&mut |block| {
                 let (Some(&first), Some(&last)) = (block.t.first(), block.t.last()) else { return };
                 let touched = |fold: &Fold| fold.log == block.log && fold.start <= last && first < fold.end;
                 if folds.iter().any(touched) {

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 Hold = Union[str, Sequence[Union[str, Tuple[str, float]]], Mapping[str, float], None]
 _Log = Union[str, Tuple[str, List[Tuple[str, NDArray[Any]]]]]
+_Path = Union[str, "os.PathLike[str]", None]
 _Told = Tuple[Dict[str, bytes], str, List[str]]
 _Progress = Optional[Callable[[str, int, int], Any]]
 
@@ -113,10 +114,11 @@ class Factor:
 
 def identify(robot: Robot, options: Dict[str, Any], progress: _Progress) -> _Told: ...
 def explain(robot: Robot, options: Dict[str, Any], own: Dict[str, Any], progress: _Progress) -> _Told: ...
-def check(robot: Robot, logs: List[_Log], progress: _Progress) -> Tuple[str, str]: ...
+def check(robot: Robot, logs: List[_Log], map: _Path, progress: _Progress) -> Tuple[str, str]: ...
 def predict(
     model: str,
     logs: List[_Log],
+    map: _Path,
     hold: Hold,
     cutoff_hz: Optional[float],
     parallel_cutoff_hz: Optional[float],

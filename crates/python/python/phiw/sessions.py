@@ -29,6 +29,7 @@ def identify(
     validate: Logs = (),
     declare: Names = (),
     *,
+    map: Optional[PathLike] = None,
     mass: Optional[Mapping[str, float]] = None,
     total_mass: Optional[float] = None,
     cutoff_hz: Optional[float] = None,
@@ -44,7 +45,7 @@ def identify(
     train : log or list of logs
         What the model is fitted to. A log is
 
-        - a path of a file that ``phiw identify`` reads;
+        - a path of whatever ``phiw identify`` reads (CSV, MCAP, ROS bags, LeRobot folders, npz, HDF5, …);
         - a dict of arrays: ``t`` (s), shape (N,), strictly increasing; ``q`` (rad, m) and ``tau`` (N·m, N),
           shape (N, dof), and where they were measured ``qd`` (rad/s, m/s), ``qdd`` (rad/s², m/s²), ``temp``
           (°C); or columns ``q.<joint>``, ``tau.<joint>``, …, each of shape (N,);
@@ -55,6 +56,8 @@ def identify(
         What its error is measured on; without any, the last 30 % of each training log are held out.
     declare : str or list of str
         Effects: ``"viscous_friction"`` wherever it can act, ``"coulomb_friction:joint_1+joint_2"``.
+    map : path, optional
+        What the columns of the logs mean: topics, units, gears, currents (docs/log-maps.md).
     mass : dict, optional
         Masses of links that are known (kg).
     total_mass : float, optional
@@ -69,7 +72,7 @@ def identify(
     Result
     """
     robot = _robot(robot)
-    options = _session_options(robot, train, validate, declare, mass, total_mass, cutoff_hz, parallel_cutoff_hz)
+    options = _session_options(robot, train, validate, declare, map, mass, total_mass, cutoff_hz, parallel_cutoff_hz)
     return Result(*_phiw.identify(robot, options, progress))
 
 
@@ -79,6 +82,7 @@ def explain(
     validate: Logs = (),
     declare: Names = (),
     *,
+    map: Optional[PathLike] = None,
     model: Optional[Model] = None,
     exclude: Names = (),
     false_name_rate: Optional[float] = None,
@@ -109,7 +113,7 @@ def explain(
     Result
     """
     robot = _robot(robot)
-    options = _session_options(robot, train, validate, declare, mass, total_mass, cutoff_hz, parallel_cutoff_hz)
+    options = _session_options(robot, train, validate, declare, map, mass, total_mass, cutoff_hz, parallel_cutoff_hz)
     own = {
         "model": None if model is None else model_text(model),
         "exclude": _names(exclude),
@@ -119,11 +123,17 @@ def explain(
     return Result(*_phiw.explain(robot, options, own, progress))
 
 
-def check(robot: Union[Robot, PathLike], logs: Logs, *, progress: Optional[Progress] = None) -> Check:
+def check(
+    robot: Union[Robot, PathLike],
+    logs: Logs,
+    *,
+    map: Optional[PathLike] = None,
+    progress: Optional[Progress] = None,
+) -> Check:
     """Says what is in logs before anything is fitted: late velocities, torques that are missing or clipped,
     units, clocks, and what to do about it. Logs as for :func:`identify`; they need no torques."""
     robot = _robot(robot)
-    report, summary = _phiw.check(robot, taken_logs(logs, robot.joints, "logs"), progress)
+    report, summary = _phiw.check(robot, taken_logs(logs, robot.joints, "logs"), map, progress)
     return Check(json.loads(report), summary)
 
 
@@ -131,6 +141,7 @@ def predict(
     model: Model,
     logs: Logs,
     *,
+    map: Optional[PathLike] = None,
     hold: Any = (),
     cutoff_hz: Optional[float] = None,
     parallel_cutoff_hz: Optional[float] = None,
@@ -151,7 +162,7 @@ def predict(
     joints = _joints(text)
     taken = taken_logs(logs, [joint for joint in joints if joint not in _held(hold)], "logs")
     names, columns, log, relative, warnings = _phiw.predict(
-        text, taken, hold, cutoff_hz, parallel_cutoff_hz, progress
+        text, taken, map, hold, cutoff_hz, parallel_cutoff_hz, progress
     )
     return Prediction(joints, dict(zip(names, columns)), np.array(log, dtype=int), relative, warnings)
 
@@ -161,6 +172,7 @@ def next_motion(
     motions: PathLike,
     measured: Logs = (),
     *,
+    map: Optional[PathLike] = None,
     support: Optional[PathLike] = None,
     model: Optional[Model] = None,
     declare: Names = (),
@@ -194,6 +206,7 @@ def next_motion(
     options = {
         "motions": os.fspath(motions),
         "measured": taken_logs(measured, robot.joints, "measured"),
+        "map": map,
         "support": support,
         "model": None if model is None else model_text(model),
         "declare": _names(declare),
@@ -280,6 +293,7 @@ def _session_options(
     train: Logs,
     validate: Logs,
     declare: Names,
+    map: Optional[PathLike],
     mass: Optional[Mapping[str, float]],
     total_mass: Optional[float],
     cutoff_hz: Optional[float],
@@ -292,6 +306,7 @@ def _session_options(
     return {
         "train": training,
         "validate": taken_logs(validate, robot.joints, "validate"),
+        "map": map,
         "declare": _names(declare),
         "mass": known,
         "total_mass": total_mass,

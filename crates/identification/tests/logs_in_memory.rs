@@ -3,11 +3,11 @@
 mod synthetic;
 
 use phiw_dynamics::Tree;
-use phiw_identification::{BlockSource, IdentificationError, KeptBlocks, LogAccess, LogSet};
-use phiw_telemetry::{Block, ConditioningOptions, LogError, NamedColumns, TorqueColumns};
+use phiw_identification::{BlockSource, IdentificationError, Interruption, KeptBlocks, LogSet};
+use phiw_telemetry::{Block, ConditioningOptions, LogError, LogSource, NamedColumns, TorqueColumns};
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::path::Path;
+use std::sync::Arc;
 
 /// A log of the robot in a file, with a gap, and the columns of that file.
 fn log(tree: &Tree, path: &Path) -> NamedColumns {
@@ -25,9 +25,13 @@ fn log(tree: &Tree, path: &Path) -> NamedColumns {
     NamedColumns::new("in memory", columns).unwrap()
 }
 
-fn logs(tree: &Tree, names: &[PathBuf], access: LogAccess) -> Result<LogSet, IdentificationError> {
+fn logs(
+    tree: &Tree,
+    logs: Vec<LogSource>,
+    interruption: &Interruption,
+) -> Result<LogSet, IdentificationError> {
     let (torque, options) = (TorqueColumns::Required, ConditioningOptions::default());
-    LogSet::surveyed(tree, [names, &[]], torque, &options, access, &|_, _, _| ())
+    LogSet::surveyed(tree, [logs, Vec::new()], torque, &options, interruption.clone(), &|_, _, _| ())
 }
 
 fn blocks(source: &dyn BlockSource) -> Vec<Block> {
@@ -41,9 +45,9 @@ fn a_log_in_memory_gives_the_blocks_of_its_file() {
     let tree = synthetic::robot(8, 3);
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("log.csv");
-    let mut access = LogAccess::default();
-    access.insert(log(&tree, &file));
-    let logs = logs(&tree, &[file, "in memory".into()], access).unwrap();
+    let columns = Some(Arc::new(log(&tree, &file)));
+    let in_memory = LogSource { columns, ..LogSource::from(Path::new("in memory")) };
+    let logs = logs(&tree, vec![file.into(), in_memory], &Interruption::default()).unwrap();
     let surveys = logs.surveys();
     assert_eq!((surveys[0].rows, surveys[0].used_rows), (surveys[1].rows, surveys[1].used_rows));
     let sources = logs.sources(&|_, _, _| ());
@@ -60,24 +64,23 @@ fn what_is_called_off_ends_at_the_next_block() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("log.csv");
     log(&tree, &file);
-    let access = LogAccess::default();
-    let interruption = access.interruption();
-    let logs_of_file = logs(&tree, &[file.clone()], access.clone()).unwrap();
+    let interruption = Interruption::default();
+    let logs_of_file = logs(&tree, vec![file.clone().into()], &interruption).unwrap();
     let sources = logs_of_file.sources(&|_, _, _| ());
     let all = blocks(&sources[0]).len();
     let kept = KeptBlocks::keep(&[&sources[0]], usize::MAX).unwrap();
-    for source in [&sources[0] as &dyn BlockSource, &kept[0]] {
-        interruption.store(false, Ordering::Relaxed);
+    // Of memory first: what is called off stays so.
+    for (source, most) in [(&kept[0] as &dyn BlockSource, 1), (&sources[0], 0)] {
         let mut seen = 0;
         let outcome = source.stream(&mut |_| {
             seen += 1;
-            interruption.store(true, Ordering::Relaxed);
+            interruption.call_off();
             ControlFlow::Continue(())
         });
         assert!(matches!(outcome, Err(LogError::Interrupted)), "{outcome:?}");
-        assert!(seen == 1 && all > 1, "{seen} of {all}");
+        assert!(seen == most && all > 1, "{seen} of {all}");
     }
-    let again = logs(&tree, &[file], access);
+    let again = logs(&tree, vec![file.into()], &interruption);
     assert!(matches!(again, Err(IdentificationError::Log(LogError::Interrupted))));
 }
 
@@ -86,4 +89,6 @@ fn columns_of_a_log_are_equally_long() {
     let columns = vec![("t".to_owned(), vec![0.0, 1.0]), ("q.j".to_owned(), vec![0.0])];
     let message = NamedColumns::new("log", columns).unwrap_err().to_string();
     assert_eq!(message, "log: column `q.j` has 1 values, but `t` has 2; give each as many");
+    let none = NamedColumns::new("log", vec![("t".to_owned(), vec![])]).unwrap_err();
+    assert!(matches!(none, LogError::Empty { .. }));
 }

@@ -1,0 +1,60 @@
+//! Logs as a command line names them, with the map that says what their columns mean.
+
+use crate::Error;
+use crate::in_memory::InMemory;
+use crate::input::read_text;
+use phiw_limits::Limits;
+use phiw_telemetry::{LogError, LogMap, LogPart, LogSource};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Reads a map and checks it against the robot's joints, those that are held among them.
+///
+/// # Errors
+/// It cannot be read, is no map, or names a joint that the robot has not.
+pub fn read_map(path: Option<&Path>, joints: &[String]) -> Result<Option<Arc<LogMap>>, Error> {
+    let Some(path) = path else { return Ok(None) };
+    let text = read_text(path, Limits::default().toml_bytes)?;
+    let map = LogMap::parse(path, &text).map_err(LogError::from)?;
+    map.check_joints(joints).map_err(LogError::from)?;
+    Ok(Some(Arc::new(map)))
+}
+
+/// Logs of which all is read that the map does not leave out.
+pub fn sources(logs: &[PathBuf], map: Option<&Arc<LogMap>>, given: &InMemory) -> Vec<LogSource> {
+    let source = |log: &PathBuf| {
+        let columns = given.logs.get(log).cloned();
+        LogSource { columns, ..LogSource::mapped(log, map.cloned()) }
+    };
+    logs.iter().map(source).collect()
+}
+
+/// Logs to train and to validate on: where the map gives stretches of a training log to validation, they are
+/// taken from it.
+///
+/// # Errors
+/// The map says that the robot held something, which the fit does not take into account.
+pub fn train_and_validate(
+    train: &[PathBuf],
+    validate: &[PathBuf],
+    map: Option<&Arc<LogMap>>,
+    given: &InMemory,
+) -> Result<[Vec<LogSource>; 2], Error> {
+    let Some(map) = map else { return Ok([sources(train, None, given), sources(validate, None, given)]) };
+    for log in train.iter().chain(validate) {
+        map.check_usable(log).map_err(LogError::from)?;
+    }
+    let part = |log: &PathBuf, part| {
+        let columns = given.logs.get(log).cloned();
+        LogSource { part, columns, ..LogSource::mapped(log, Some(map.clone())) }
+    };
+    let has_validation = |log: &&PathBuf| !map.facts(log).validate.is_empty();
+    let training = train.iter().map(|log| part(log, LogPart::Train)).collect();
+    let mut held_out: Vec<LogSource> =
+        train.iter().filter(has_validation).map(|log| part(log, LogPart::Validate)).collect();
+    held_out.extend(validate.iter().map(|log| match has_validation(&log) {
+        true => part(log, LogPart::Validate),
+        false => part(log, LogPart::All),
+    }));
+    Ok([training, held_out])
+}
