@@ -4,6 +4,7 @@ mod arrays;
 mod content_hash;
 mod csv;
 mod error;
+mod guarded;
 #[cfg(feature = "hdf5")]
 mod hdf5;
 #[cfg(feature = "lerobot")]
@@ -15,5 +16,6 @@ mod table;
 mod text_stream;
 
 pub use error::FormatError;
+pub use guarded::is_guarded;
 pub use open::{OpenOptions, looks_like, open};
 pub use table::{Column, MISSING, Step, Table, is_missing};

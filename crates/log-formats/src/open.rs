@@ -1,6 +1,7 @@
 //! Which format a file has is seen in its content, not in its name.
 
 use crate::csv::CsvTable;
+use crate::guarded::GuardedTable;
 use crate::table::Table;
 use crate::text_stream::{Packing, head};
 use crate::{FormatError, arrays, messages};
@@ -24,10 +25,10 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Table>, Format
     // Asked before it is opened: a pipe without a writer would block for ever.
     let metadata = path.metadata().map_err(unreadable)?;
     if metadata.is_dir() {
-        return match path.join("meta/info.json").is_file() {
+        return GuardedTable::open(path, || match path.join("meta/info.json").is_file() {
             true => open_dataset(path),
             false => messages::open_folder(path, options),
-        };
+        });
     }
     if !metadata.is_file() {
         return Err(unreadable(io::Error::other("it is no regular file; name a file")));
@@ -53,16 +54,16 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Table>, Format
         return Ok(Box::new(CsvTable::new(path, file, bytes, packing)?));
     }
     if [messages::MCAP, messages::SQLITE, messages::ROS1_BAG].iter().any(|known| start.starts_with(known)) {
-        return messages::open_file(path, &start, options);
+        return GuardedTable::open(path, || messages::open_file(path, &start, options));
     }
     if [arrays::ZIP, arrays::NPY, arrays::MAT5].iter().any(|known| start.starts_with(known)) {
-        return arrays::open_file(path, &start, options);
+        return GuardedTable::open(path, || arrays::open_file(path, &start, options));
     }
     if start.starts_with(PARQUET) {
-        return open_dataset(path);
+        return GuardedTable::open(path, || open_dataset(path));
     }
     if [HDF5, MATLAB_73].iter().any(|known| start.starts_with(known)) {
-        return open_hdf5(path);
+        return GuardedTable::open(path, || open_hdf5(path));
     }
     if let Some(kind) = looks_like(&start) {
         return Err(FormatError::NoLog { path: path.into(), kind: kind.into() });

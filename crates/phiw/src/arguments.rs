@@ -2,6 +2,7 @@
 
 pub use crate::export::ExportArguments;
 pub use crate::in_memory::InMemory;
+pub use crate::map::MapArguments;
 pub use crate::simulate::Backend;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -36,6 +37,9 @@ pub enum Command {
     /// Say what is in logs before anything is fitted: late velocities, torques that are missing or clipped,
     /// units, clocks, and what to do about it.
     Check(CheckArguments),
+    /// Write a first map of a log's columns: which is which signal of which joint, in what unit, guessed by
+    /// names and ranges.
+    Map(MapArguments),
     /// Turn marker recordings of people into motions of the robot: for each a log without torques, and what
     /// it is worth.
     Retarget(RetargetArguments),
@@ -54,6 +58,7 @@ impl Command {
             Command::Simulate(simulate) => simulate.quiet,
             Command::Export(export) => export.quiet,
             Command::Check(check) => check.quiet,
+            Command::Map(map) => map.quiet,
             Command::Retarget(retarget) => retarget.quiet,
             Command::Next(next) => next.quiet,
         }

@@ -2,7 +2,7 @@
 
 use crate::arguments::CheckArguments;
 use crate::console::Console;
-use crate::log_inputs::{read_map, sources};
+use crate::log_inputs::{read_map, said_of_logs, sources};
 use crate::output::check_folder;
 use crate::warnings::{file_name, of_log, snapped};
 use crate::{Error, session};
@@ -58,7 +58,8 @@ pub fn check(arguments: &CheckArguments, console: &Console) -> Result<CheckOutco
     let findings = robot_findings(tree, &surveys, &CheckSettings::default());
     let refused = [check_logs(tree, &surveys, &[]).err(), check_excitation(tree, &surveys).err()];
     let refused: Vec<String> = refused.iter().flatten().map(InputError::to_string).collect();
-    let notes = Vec::from_iter(snapped(robot.snapped));
+    let mut notes = Vec::from_iter(snapped(robot.snapped));
+    notes.extend(map.iter().flat_map(|map| said_of_logs(map, &arguments.logs)));
     let report = report(tree, &surveys, &findings, (&notes, &refused));
     if let Some((folder, _lock)) = &place {
         let text = serde_json::to_string_pretty(&report)

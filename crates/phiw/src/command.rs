@@ -18,6 +18,9 @@ pub fn main(command_line: impl IntoIterator<Item = OsString>) -> u8 {
     };
     // A fault of ours is one message and status 1, like any other failure that is not the input's.
     std::panic::set_hook(Box::new(|fault| {
+        if phiw_telemetry::is_guarded() {
+            return;
+        }
         // A library's way of saying that the system gave no memory.
         match fault.to_string().contains("AllocError") {
             true => console::say(
@@ -85,6 +88,10 @@ fn told(command: &Command, console: &Console) -> Result<Told, Error> {
         Command::Export(arguments) => {
             let outcome = crate::export::export(arguments)?;
             Told { summary: outcome.summary, warnings: Vec::new(), failures: no_failures }
+        }
+        Command::Map(arguments) => {
+            let outcome = crate::map::map(arguments)?;
+            Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
         }
         Command::Check(arguments) => {
             let outcome = crate::check::check(arguments, console)?;

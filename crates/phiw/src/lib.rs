@@ -23,6 +23,7 @@ pub mod identify;
 mod in_memory;
 pub mod input;
 mod log_inputs;
+pub mod map;
 mod model_file;
 mod model_use;
 pub mod next;

@@ -3,8 +3,9 @@
 use crate::Error;
 use crate::in_memory::InMemory;
 use crate::input::read_text;
+use crate::warnings::file_name;
 use phiw_limits::Limits;
-use phiw_telemetry::{LogError, LogMap, LogPart, LogSource};
+use phiw_telemetry::{LogError, LogMap, LogPart, LogSource, Payload};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -57,4 +58,32 @@ pub fn train_and_validate(
         false => part(log, LogPart::All),
     }));
     Ok([training, held_out])
+}
+
+/// What a map says of logs beside their columns.
+pub fn said_of_logs(map: &LogMap, logs: &[PathBuf]) -> Vec<String> {
+    let mut said = Vec::new();
+    for log in logs {
+        let (name, facts) = (file_name(log), map.facts(log));
+        let stretches = |stretches: &[[f64; 2]]| {
+            stretches.iter().map(|[from, to]| format!("{from} to {to} s")).collect::<Vec<_>>().join(", ")
+        };
+        for (what, part) in
+            [("train", &facts.train), ("validate", &facts.validate), ("left out", &facts.leave_out)]
+        {
+            if !part.is_empty() {
+                said.push(format!("{name}: {what}, as the map says: {}", stretches(part)));
+            }
+        }
+        match facts.payload {
+            None => {}
+            Some(Payload::UnknownButTheSame) => {
+                said.push(format!("{name}: an unknown payload, as the map says; a fit refuses it"));
+            }
+            Some(Payload::Known { link, mass_kg, .. }) => said.push(format!(
+                "{name}: a payload of {mass_kg} kg at `{link}`, as the map says; a fit refuses it"
+            )),
+        }
+    }
+    said
 }

@@ -119,7 +119,8 @@ pub fn of_log(survey: &Survey) -> Vec<String> {
             ),
         }
     };
-    let mut warnings: Vec<String> = survey.gaps.iter().map(gap).collect();
+    let mut warnings: Vec<String> = survey.notes.iter().map(|note| format!("{name}: {note}")).collect();
+    warnings.extend(survey.gaps.iter().map(gap));
     if survey.short_segments > 0 {
         warnings
             .push(format!("{name}: {} stretches between gaps are too short to use", survey.short_segments));

@@ -8,7 +8,7 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, Once, PoisonError};
 use std::time::Duration;
 
 create_exception!(
@@ -35,6 +35,7 @@ pub fn run<T: Send + 'static>(
     interruption: &Interruption,
     work: impl FnOnce(&Console) -> Result<T, Error> + Send + 'static,
 ) -> PyResult<T> {
+    GUARDED_FAULTS.call_once(say_nothing_of_guarded_faults);
     let told = Told::default();
     let (listener, called_off) = (told.clone(), interruption.clone());
     let (sender, receiver) = channel();
@@ -67,6 +68,20 @@ pub fn run<T: Send + 'static>(
             }
         }
     }
+}
+
+/// Whether [`say_nothing_of_guarded_faults`] has been called.
+static GUARDED_FAULTS: Once = Once::new();
+
+/// A reader that fails on a damaged file where it should not is caught, and the file refused: that is no news
+/// for standard error.
+fn say_nothing_of_guarded_faults() {
+    let others = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |fault| {
+        if !phiw_telemetry::is_guarded() {
+            others(fault);
+        }
+    }));
 }
 
 /// Tells what there is new.

@@ -271,8 +271,7 @@ impl Table for TopicTable {
     }
 
     fn notes(&self) -> Vec<String> {
-        let mut notes =
-            vec![format!("rows are the messages of topic `{}` ({})", self.topic.name, self.topic.type_name)];
+        let mut notes = Vec::new();
         if !self.uses_header_stamp {
             notes.push("the messages have no stamp of their own: `t` is when they were recorded".into());
         }
