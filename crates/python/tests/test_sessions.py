@@ -214,6 +214,7 @@ def test_gaps_are_gaps(robot, logs):
         (lambda log: {**log, "t": 0 * log["t"]}, "in all"),
         (lambda log: {key: values[:0] for key, values in log.items()}, "the log is empty"),
         (lambda log: {**log, "q": np.zeros((5000, 2, 2))}, "it has the shape (5000, 2, 2)"),
+        (lambda log: {"t": log["t"], "pos": log["q"]}, "no column `q."),
         (lambda log: 5, "give a log as a path, a dict of arrays, or a data frame"),
         (lambda log: "absent.csv", "absent.csv: no such file"),
     ],
@@ -297,3 +298,25 @@ def test_markers_become_motions(tmp_path):
     markers.write_text("t,a.x,a.y,a.z\n0,0,0,0\n")
     with pytest.raises(phiw.InputError, match="nothing.csv"):
         phiw.retarget(phiw.examples.robot("upper_body18"), markers, tmp_path / "out")
+
+
+def test_a_map_says_what_columns_mean(robot, logs, tmp_path):
+    """Degrees under other names, in arrays and in a file."""
+    columns = {"stamp": logs[0]["t"]}
+    for i, joint in enumerate(robot.joints):
+        columns[f"pos_{i}"] = np.degrees(logs[0]["q"][:, i])
+        columns[f"trq_{i}"] = logs[0]["tau"][:, i]
+    map_ = tmp_path / "map.toml"
+    map_.write_text(
+        f'time = "stamp"\njoints = {json.dumps(robot.joints)}\n'
+        '[every_joint]\nq = { column = "pos_{index}", unit = "deg" }\ntau = "trq_{index}"\n'
+    )
+    result = phiw.identify(robot, columns, map=map_, declare="viscous_friction")
+    plain = phiw.identify(robot, logs[0], declare="viscous_friction")
+    assert result.after.validate.relative == pytest.approx(plain.after.validate.relative, rel=1e-6)
+    arrays = {"stamp": logs[0]["t"], "pos": np.degrees(logs[0]["q"]), "trq": logs[0]["tau"]}
+    map_.write_text(map_.read_text().replace("_{index}", "[{index}]"))
+    assert fitted(phiw.identify(robot, arrays, map=map_, declare="viscous_friction")) == fitted(result)
+    columns = arrays
+    np.savez(tmp_path / "log.npz", **columns)
+    assert fitted(phiw.identify(robot, tmp_path / "log.npz", map=map_, declare="viscous_friction")) == fitted(result)

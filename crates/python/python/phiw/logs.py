@@ -18,18 +18,23 @@ TakenLog = Union[str, Tuple[str, List[Tuple[str, np.ndarray]]]]
 SIGNALS = ("q", "qd", "qdd", "tau", "temp", "qref")
 
 
-def taken_logs(logs: Union[Log, Iterable[Log]], joints: Sequence[str], name: str) -> List[TakenLog]:
-    """All logs as the extension takes them. One that is in memory is called ``name[i]`` in messages."""
+def taken_logs(
+    logs: Union[Log, Iterable[Log]], joints: Sequence[str], name: str, mapped: bool = False
+) -> List[TakenLog]:
+    """All logs as the extension takes them. One that is in memory is called ``name[i]`` in messages.
+
+    Columns of an array are called ``array[i]``, unless it is a signal of all joints. With ``mapped`` a map says
+    what they are."""
     if _is_one(logs):
         logs = [logs]
-    return [_taken(log, joints, f"{name}[{index}]") for index, log in enumerate(logs)]
+    return [_taken(log, joints, f"{name}[{index}]", mapped) for index, log in enumerate(logs)]
 
 
 def _is_one(logs: Any) -> bool:
     return isinstance(logs, (str, bytes, os.PathLike, Mapping)) or hasattr(logs, "columns")
 
 
-def _taken(log: Log, joints: Sequence[str], name: str) -> TakenLog:
+def _taken(log: Log, joints: Sequence[str], name: str, mapped: bool) -> TakenLog:
     if isinstance(log, (str, bytes, os.PathLike)):
         return os.fsdecode(log)
     if isinstance(log, Mapping):
@@ -50,15 +55,17 @@ def _taken(log: Log, joints: Sequence[str], name: str) -> TakenLog:
             continue  # names, units and the like
         if values.ndim == 1 and key in SIGNALS and len(joints) == 1:
             values = values[:, None]
-        if values.ndim == 2 and key in SIGNALS:
-            if values.shape[1] != len(joints):
-                raise InputError(
-                    f"{name}, `{key}`: it has {values.shape[1]} columns, but the robot has {len(joints)} joints"
-                    f" ({', '.join(joints)}); give one column for each, in this order"
-                )
+        if values.ndim == 2 and key in SIGNALS and values.shape[1] == len(joints):
             columns.extend((f"{key}.{joint}", values[:, i]) for i, joint in enumerate(joints))
+        elif values.ndim == 2 and (mapped or key not in SIGNALS):
+            columns.extend((f"{key}[{i}]", values[:, i]) for i in range(values.shape[1]))
         elif values.ndim == 1:
             columns.append((key, values))
+        elif values.ndim == 2:
+            raise InputError(
+                f"{name}, `{key}`: it has {values.shape[1]} columns, but the robot has {len(joints)} joints"
+                f" ({', '.join(joints)}); give one column for each, in this order"
+            )
         else:
             raise InputError(
                 f"{name}, `{key}`: it has the shape {values.shape}; give columns of one number a row,"

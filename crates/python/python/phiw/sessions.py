@@ -48,7 +48,8 @@ def identify(
         - a path of whatever ``phiw identify`` reads (CSV, MCAP, ROS bags, LeRobot folders, npz, HDF5, …);
         - a dict of arrays: ``t`` (s), shape (N,), strictly increasing; ``q`` (rad, m) and ``tau`` (N·m, N),
           shape (N, dof), and where they were measured ``qd`` (rad/s, m/s), ``qdd`` (rad/s², m/s²), ``temp``
-          (°C); or columns ``q.<joint>``, ``tau.<joint>``, …, each of shape (N,);
+          (°C); or columns ``q.<joint>``, ``tau.<joint>``, …, each of shape (N,); with a map any others, those
+          of an array of shape (N, k) by the names ``array[0]`` to ``array[k-1]``;
         - a data frame of pandas or polars with such columns.
 
         NaN is a gap.
@@ -133,7 +134,7 @@ def check(
     """Says what is in logs before anything is fitted: late velocities, torques that are missing or clipped,
     units, clocks, and what to do about it. Logs as for :func:`identify`; they need no torques."""
     robot = _robot(robot)
-    report, summary = _phiw.check(robot, taken_logs(logs, robot.joints, "logs"), map, progress)
+    report, summary = _phiw.check(robot, taken_logs(logs, robot.joints, "logs", map is not None), map, progress)
     return Check(json.loads(report), summary)
 
 
@@ -160,7 +161,8 @@ def predict(
     """
     text = model_text(model)
     joints = _joints(text)
-    taken = taken_logs(logs, [joint for joint in joints if joint not in _held(hold)], "logs")
+    moving = [joint for joint in joints if joint not in _held(hold)]
+    taken = taken_logs(logs, moving, "logs", map is not None)
     names, columns, log, relative, warnings = _phiw.predict(
         text, taken, map, hold, cutoff_hz, parallel_cutoff_hz, progress
     )
@@ -205,7 +207,7 @@ def next_motion(
     robot = _robot(robot)
     options = {
         "motions": os.fspath(motions),
-        "measured": taken_logs(measured, robot.joints, "measured"),
+        "measured": taken_logs(measured, robot.joints, "measured", map is not None),
         "map": map,
         "support": support,
         "model": None if model is None else model_text(model),
@@ -299,13 +301,13 @@ def _session_options(
     cutoff_hz: Optional[float],
     parallel_cutoff_hz: Optional[float],
 ) -> Dict[str, Any]:
-    training = taken_logs(train, robot.joints, "train")
+    training = taken_logs(train, robot.joints, "train", map is not None)
     if not training:
         raise InputError("train holds no log: give at least one")
     known: List[Tuple[str, float]] = [(link, float(kg)) for link, kg in (mass or {}).items()]
     return {
         "train": training,
-        "validate": taken_logs(validate, robot.joints, "validate"),
+        "validate": taken_logs(validate, robot.joints, "validate", map is not None),
         "map": map,
         "declare": _names(declare),
         "mass": known,
