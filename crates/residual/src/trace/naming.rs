@@ -50,6 +50,8 @@ struct Judged {
     folds: f64,
     /// RMS of what it takes over the RMS of a torque that it acts on, the largest.
     size: f64,
+    /// Whether its certainty is that of a name.
+    certain: bool,
     named: bool,
 }
 
@@ -72,6 +74,7 @@ impl Search<'_> {
         };
         let mut judged = self.judge(&trial)?;
         self.judge_small(&trial, &mut judged)?;
+        self.name_families(&mut judged);
         self.in_order(&trial, judged)
     }
 
@@ -187,6 +190,20 @@ impl Search<'_> {
         Ok(())
     }
 
+    /// Names with a kind of the textbook what is as certain of it on other joints, however small, where it has
+    /// a name on most of them: where joints rub, all do that are seen to.
+    fn name_families(&self, judged: &mut [Judged]) {
+        for kind in self.fixed.catalogue.kinds().filter(|kind| kind.joint_property().is_some()) {
+            let is_member =
+                |judged: &&mut Judged| judged.certain && self.specs[judged.place].kind == kind.name();
+            let members: Vec<&mut Judged> = judged.iter_mut().filter(is_member).collect();
+            let named = members.iter().filter(|member| member.named).count();
+            if 2 * named >= members.len() {
+                members.into_iter().for_each(|member| member.named = true);
+            }
+        }
+    }
+
     pub(super) fn remove(&mut self, place: usize) -> Result<(), IdentificationError> {
         let design = self.design()?;
         self.parameters.drain(design.effect_parameters(place));
@@ -226,7 +243,7 @@ impl Search<'_> {
             let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
             let squares = Squares { initial, without, with };
             let material = match level {
-                Some(_) => self.is_form_material(trial, own_member, &squares),
+                Some(_) => self.is_form_material(trial, own_member, &squares, &all),
                 None => self.is_material(trial, own_member, &squares),
             };
             let certainty = certainty(&trial.problem, &trial.fit, own_member);
@@ -237,6 +254,7 @@ impl Search<'_> {
                 significance: certainty.significance,
                 gain: whole.gain(&whole.held_out_squares(&without), &all),
                 folds: whole.better_folds(&without),
+                certain: certainty.tail <= limit,
                 named: certainty.tail <= limit && material,
             });
         }
@@ -244,8 +262,9 @@ impl Search<'_> {
     }
 
     /// Whether a form of something simpler is worth a name of its own: it must take away most of what the
-    /// simpler ones leave, be a share of the torque, and a share of what it is a form of.
-    fn is_form_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
+    /// whole model takes of what the simpler ones leave (`left` is what the whole model leaves), be a share
+    /// of the torque, and a share of what it is a form of.
+    fn is_form_material(&self, trial: &Trial, member: Member, squares: &Squares, left: &[f64]) -> bool {
         let hypothesis = &trial.problem.hypotheses[member.hypothesis];
         hypothesis.torques.iter().any(|&torque| {
             let whole = trial.held_out[torque].right_hand_side().max(f64::MIN_POSITIVE);
@@ -257,7 +276,8 @@ impl Search<'_> {
                 simpler.flat_map(|&other| trial.values_of(other, torque)).collect();
             let of_simpler = trial.held_out[torque].size_of(&simpler);
             !self.is_as_it_was(torque, (without / trial.held_out[torque].rows().max(1.0)).sqrt())
-                && taken >= self.options.least_share_of_kin * without
+                && taken >= self.options.least_share * without
+                && taken >= self.options.least_share_of_kin * (without - left[torque])
                 && taken >= self.options.least_of_simpler * of_simpler
                 && (taken / whole).sqrt() >= self.options.least_size
         })
