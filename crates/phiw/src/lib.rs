@@ -2,6 +2,7 @@
 
 mod actuator_table;
 pub mod analysis;
+mod argument_values;
 pub mod arguments;
 pub mod bandwidth;
 pub mod check;

@@ -27,7 +27,7 @@ pub struct MapArguments {
     pub topic: Option<String>,
     /// Joints of the URDF that do not move, at 0 or at a value (rad, m); they need no column in the log. In a
     /// name, * stands for any letters and ? for one: --hold 'left_*'.
-    #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = crate::arguments::held_joint)]
+    #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = crate::argument_values::held_joint)]
     pub hold: Vec<(String, f64)>,
     /// The map; without it the map is printed.
     #[arg(long, value_name = "MAP.toml")]

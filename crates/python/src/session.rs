@@ -104,28 +104,34 @@ pub fn check<'py>(
     Ok((outcome.report.to_string(), outcome.summary))
 }
 
-/// Predictions of a model: names, columns, the log of each row, relative error, warnings.
+/// Options of predictions.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct PredictOptions<'py> {
+    logs: Vec<Log<'py>>,
+    map: Option<PathBuf>,
+    hold: Bound<'py, PyAny>,
+    cutoff_hz: Option<f64>,
+    parallel_cutoff_hz: Option<f64>,
+}
+
+/// Predictions of a model, given as its text: names, columns, the log of each row, relative error, warnings.
 #[pyfunction]
-#[pyo3(signature = (model, logs, map, hold, cutoff_hz, parallel_cutoff_hz, progress))]
 #[allow(clippy::type_complexity)] // a tuple that only the package takes apart
 pub fn predict<'py>(
     py: Python<'py>,
     model: String,
-    logs: Vec<Log<'py>>,
-    map: Option<PathBuf>,
-    hold: &Bound<'py, PyAny>,
-    cutoff_hz: Option<f64>,
-    parallel_cutoff_hz: Option<f64>,
+    options: PredictOptions<'py>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Vec<String>, Vec<Bound<'py, PyAny>>, Vec<usize>, f64, Vec<String>)> {
     let mut in_memory = InMemory { model: Some(model), ..InMemory::default() };
     let arguments = PredictArguments {
         model: PathBuf::from("model"),
-        logs: taken(logs, &mut in_memory)?,
-        map,
-        hold: crate::hold::hold(Some(hold))?,
-        cutoff_hz,
-        parallel_cutoff_hz,
+        logs: taken(options.logs, &mut in_memory)?,
+        map: options.map,
+        hold: crate::hold::hold(Some(&options.hold))?,
+        cutoff_hz: options.cutoff_hz,
+        parallel_cutoff_hz: options.parallel_cutoff_hz,
         in_memory,
         ..PredictArguments::default()
     };

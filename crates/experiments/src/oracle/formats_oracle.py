@@ -42,7 +42,7 @@ MSG: builtin_interfaces/Time
 int32 sec
 uint32 nanosec
 """
-# Frames a second of the LeRobot datasets, and periods between two episodes as they are read.
+# Periods between two episodes of a LeRobot dataset, as they are read.
 BETWEEN_EPISODES = 10
 
 
@@ -202,7 +202,7 @@ def write_messages(log, folder):
         told(path, "csv")
 
 
-def write_lerobot(log, path, version):
+def write_lerobot(log, path, version, rows_in_group=700):
     """A dataset of two episodes."""
     fresh(path)
     (path / "meta").mkdir(parents=True)
@@ -246,7 +246,7 @@ def write_lerobot(log, path, version):
         for episode, table in enumerate(tables):
             pq.write_table(table, path / f"data/chunk-000/episode_{episode:06d}.parquet")
     else:
-        pq.write_table(pa.concat_tables(tables), path / "data/chunk-000/file-000.parquet", row_group_size=700)
+        pq.write_table(pa.concat_tables(tables), path / "data/chunk-000/file-000.parquet", row_group_size=rows_in_group)
     return info["fps"], half
 
 
@@ -367,7 +367,7 @@ def long(rows, folder):
             file.create_dataset(name, data=array, chunks=True, compression="gzip")
     log = Log.__new__(Log)
     log.joints, log.t, log.q, log.tau = ["hinge"], t, q[:, None], tau[:, None]
-    write_lerobot(log, folder / "long_lerobot", "v3.0")
+    write_lerobot(log, folder / "long_lerobot", "v3.0", 100_000)
     for name in ("long.npz", "long_packed.npz", "long.mat", "long.h5", "long_lerobot"):
         told(folder / name, "csv")
     cdr = struct.Struct("<4sIII5s3xII6s2xIdIId").pack

@@ -6,6 +6,10 @@ use std::path::Path;
 
 /// How messages are laid out in bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(
+    not(feature = "mcap"),
+    allow(dead_code, reason = "which occur depends on the readers that are built")
+)]
 pub(crate) enum Encoding {
     /// The Common Data Representation of the OMG: ROS 2.
     Cdr,

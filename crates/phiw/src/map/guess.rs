@@ -53,25 +53,21 @@ impl Guesses {
             let arrays = by_order(contents, &names, wanted, joints.len());
             for (index, joint) in joints.iter().enumerate() {
                 let own = own_name(contents, wanted, joint);
-                let by_name =
-                    own.map(|column| (column, "its name is that of the signal".to_owned())).or_else(|| {
-                        let mut best: Option<(usize, usize)> = None;
-                        for (column, name) in names.iter().enumerate() {
-                            let is_like = likeness(name, &joint_words[index], &shared) >= LIKE;
-                            if used[column] || !is_like || kind(name, &joint_words[index]) != Some(wanted) {
-                                continue;
-                            }
-                            let left = left_over(name, &joint_words[index]);
-                            if best.is_none_or(|(_, other)| left < other) {
-                                best = Some((column, left));
-                            }
-                        }
-                        best.map(|(column, _)| (column, "its name has those of joint and signal".to_owned()))
-                    });
-                let chosen = by_name.or_else(|| {
+                let own = own.map(|column| (column, "its name is that of the signal".to_owned()));
+                let by_order = || {
                     let column = *arrays.as_ref()?.get(index)?;
                     Some((column, format!("entry {index} in a row of {}; check the order", joints.len())))
-                });
+                };
+                let by_name = || {
+                    let own = (joint_words[index].as_slice(), shared.as_slice());
+                    let column = like(&names, &used, own, wanted)?;
+                    Some((column, "its name has those of joint and signal".to_owned()))
+                };
+                // A number says which entry it is, and counts from 0 or 1: the order is surer than the name.
+                let chosen = match is_number(&joint_words[index], &shared) {
+                    true => own.or_else(by_order).or_else(by_name),
+                    false => own.or_else(by_name).or_else(by_order),
+                };
                 let Some((column, why)) = chosen.filter(|(column, _)| !used[*column]) else { continue };
                 used[column] = true;
                 let unit = UnitGuess { unit: None, why: String::new(), needs: &[] };
@@ -92,6 +88,32 @@ impl Guesses {
     }
 }
 
+/// Whether a joint is told from the others by numbers only.
+fn is_number(joint: &[String], shared: &[String]) -> bool {
+    let mut own = joint.iter().filter(|word| !shared.contains(word));
+    own.all(|word| word.chars().all(|c| c.is_ascii_digit()))
+}
+
+/// The column whose name is likest to a joint's and a signal's.
+fn like(
+    names: &[Vec<String>],
+    used: &[bool],
+    (joint, shared): (&[String], &[String]),
+    wanted: Kind,
+) -> Option<usize> {
+    let mut best: Option<(usize, usize)> = None;
+    for (column, name) in names.iter().enumerate() {
+        if used[column] || likeness(name, joint, shared) < LIKE || kind(name, joint) != Some(wanted) {
+            continue;
+        }
+        let left = left_over(name, joint);
+        if best.is_none_or(|(_, other)| left < other) {
+            best = Some((column, left));
+        }
+    }
+    best.map(|(column, _)| column)
+}
+
 fn seconds(unit: Option<&UnitGuess>) -> f64 {
     match unit.and_then(|unit| unit.unit) {
         Some("ms") => 1e-3,
@@ -103,7 +125,7 @@ fn seconds(unit: Option<&UnitGuess>) -> f64 {
 
 fn time_of(contents: &LogContents, names: &[Vec<String>]) -> Option<usize> {
     let is_named = |time: &&str| contents.columns.iter().position(|column| column.name == *time);
-    let exact = TIMES.iter().find_map(|time| is_named(time));
+    let exact = TIMES.iter().find_map(is_named);
     exact.or_else(|| names.iter().position(|name| name.iter().any(|word| TIMES.contains(&word.as_str()))))
 }
 

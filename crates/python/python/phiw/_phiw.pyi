@@ -116,13 +116,7 @@ def identify(robot: Robot, options: Dict[str, Any], progress: _Progress) -> _Tol
 def explain(robot: Robot, options: Dict[str, Any], own: Dict[str, Any], progress: _Progress) -> _Told: ...
 def check(robot: Robot, logs: List[_Log], map: _Path, progress: _Progress) -> Tuple[str, str]: ...
 def predict(
-    model: str,
-    logs: List[_Log],
-    map: _Path,
-    hold: Hold,
-    cutoff_hz: Optional[float],
-    parallel_cutoff_hz: Optional[float],
-    progress: _Progress,
+    model: str, options: Dict[str, Any], progress: _Progress
 ) -> Tuple[List[str], List[Array], List[int], float, List[str]]: ...
 def next_motion(robot: Robot, options: Dict[str, Any], progress: _Progress) -> _Told: ...
 def retarget(

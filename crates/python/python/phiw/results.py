@@ -411,7 +411,8 @@ def load(path: PathLike) -> Result:
     except OSError as error:
         raise InputError(f"{folder} is no folder of results: {error}") from None
     numbers = json.loads(files["report.json"])
-    return Result(files, f"{numbers['robot']}, from {folder}", (numbers.get("phiw") or {}).get("warnings", []))
+    warnings = numbers.get("warnings") or (numbers.get("phiw") or {}).get("warnings") or []
+    return Result(files, f"{numbers['robot']}, from {folder}", warnings)
 
 
 def model_text(model: Union[Result, Mapping[str, Any], PathLike]) -> str:

@@ -163,9 +163,14 @@ def predict(
     joints = _joints(text)
     moving = [joint for joint in joints if joint not in _held(hold)]
     taken = taken_logs(logs, moving, "logs", map is not None)
-    names, columns, log, relative, warnings = _phiw.predict(
-        text, taken, map, hold, cutoff_hz, parallel_cutoff_hz, progress
-    )
+    options = {
+        "logs": taken,
+        "map": map,
+        "hold": hold,
+        "cutoff_hz": cutoff_hz,
+        "parallel_cutoff_hz": parallel_cutoff_hz,
+    }
+    names, columns, log, relative, warnings = _phiw.predict(text, options, progress)
     return Prediction(joints, dict(zip(names, columns)), np.array(log, dtype=int), relative, warnings)
 
 
