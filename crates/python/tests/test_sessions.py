@@ -65,10 +65,11 @@ def fitted(result):
 def test_the_truth_is_found(explained):
     assert explained.verdict == "explained"
     assert [effect.kind for effect in explained.effects] == ["coulomb_friction"]
-    table = explained.parameters.set_index(["kind", "joints"])
+    table = explained.parameters
     for kind, truth in [("viscous_friction", VISCOUS), ("coulomb_friction", COULOMB)]:
         for joint, value in zip(explained.joints, truth):
-            assert table.loc[(kind, joint), "value"] == pytest.approx(value, rel=0.02)
+            own = table[(table["kind"] == kind) & (table["joints"] == joint)]
+            assert own["value"].item() == pytest.approx(value, rel=0.02)
     assert explained.after.validate.relative < 0.02 < explained.before.validate.relative
     assert set(explained.noise_floor) == set(explained.joints)
     assert "coulomb friction" in str(explained) and "explained" in repr(explained)
