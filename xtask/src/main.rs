@@ -2,6 +2,7 @@
 
 mod consumers;
 mod mujoco;
+mod python;
 mod test;
 mod torture;
 
@@ -28,6 +29,8 @@ enum Task {
     Test(test::Arguments),
     /// Hostile inputs, kills and concurrent runs on the release binary: a table of what came of each class.
     Torture(torture::Arguments),
+    /// The Python package in a fresh environment: pip install, pytest, notebooks; with --timings against others.
+    Python(python::Arguments),
     /// Fetch MuJoCo's library into the user's cache folder, with Python's pip.
     Mujoco(mujoco::Arguments),
     /// Compare with Pinocchio, MuJoCo, ezc3d, CVXPY and Clarabel, installed from PyPI into an environment.
@@ -55,6 +58,7 @@ fn main() -> anyhow::Result<ExitCode> {
         Task::SyntheticLog(arguments) => synthetic_log::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Retarget(arguments) => retarget::command(&arguments).map(|()| ExitCode::SUCCESS),
         Task::Test(arguments) => test::command(&arguments),
+        Task::Python(arguments) => python::command(&arguments),
         Task::Torture(arguments) => torture::command(&arguments),
         Task::Mujoco(arguments) => mujoco::command(&arguments),
         Task::Oracle(arguments) => oracle::command(&arguments),

@@ -1,8 +1,8 @@
 //! `cargo xtask test`: all checks of the workspace, with one line at the end that counts the tests.
 
-mod tally;
+pub mod tally;
 
-use crate::{consumers, mujoco};
+use crate::{consumers, mujoco, python};
 use anyhow::Context;
 use phiw_experiments::environment;
 use std::io::{BufRead, BufReader};
@@ -63,6 +63,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if !run_tests(&consumers, &mut tally)? {
         failed.push(named(&consumers));
     }
+    failed.extend(python::test(&mut tally)?);
     for problem in &failed {
         println!("failed: {problem}");
     }

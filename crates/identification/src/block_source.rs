@@ -12,6 +12,14 @@ pub trait BlockSource: Sync {
     /// The log cannot be read.
     fn stream(&self, sink: &mut dyn FnMut(Block) -> ControlFlow<()>) -> Result<(), LogError>;
 
+    /// Whether whoever asked for the work still wants it.
+    ///
+    /// # Errors
+    /// [`LogError::Interrupted`].
+    fn goes_on(&self) -> Result<(), LogError> {
+        Ok(())
+    }
+
     /// Hands every block to `sink`, in order.
     ///
     /// # Errors

@@ -69,6 +69,10 @@ impl BlockSource for HeldJoints<'_> {
     fn stream(&self, sink: &mut dyn FnMut(Block) -> ControlFlow<()>) -> Result<(), LogError> {
         self.source.stream(&mut |block| sink(self.spread(block)))
     }
+
+    fn goes_on(&self) -> Result<(), LogError> {
+        self.source.goes_on()
+    }
 }
 
 #[cfg(test)]

@@ -59,8 +59,20 @@ fn size(block: &Block) -> usize {
 impl BlockSource for KeptBlocks<'_> {
     fn stream(&self, sink: &mut dyn FnMut(Block) -> ControlFlow<()>) -> Result<(), LogError> {
         match &self.kept {
-            Some(blocks) => blocks.stream(sink),
+            Some(blocks) => {
+                for block in blocks {
+                    self.goes_on()?;
+                    if sink(block.clone()).is_break() {
+                        break;
+                    }
+                }
+                Ok(())
+            }
             None => self.source.stream(sink),
         }
+    }
+
+    fn goes_on(&self) -> Result<(), LogError> {
+        self.source.goes_on()
     }
 }

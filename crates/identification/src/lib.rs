@@ -20,6 +20,7 @@ mod identify;
 mod jackknife;
 mod kept_blocks;
 mod known_payload;
+mod log_file;
 mod log_set;
 mod model_sources;
 mod predict;
@@ -38,7 +39,8 @@ pub use effect::{Effect, EffectCatalogue, EffectSpec};
 pub use error::IdentificationError;
 pub use identify::{Data, Identified, Variants, identify};
 pub use kept_blocks::KeptBlocks;
-pub use log_set::{LogFile, LogSet, Progress};
+pub use log_file::{Interruption, LogFile, Progress};
+pub use log_set::LogSet;
 pub use model::Model;
 pub use predict::{Prediction, predict};
 

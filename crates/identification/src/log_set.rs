@@ -2,10 +2,10 @@
 
 use crate::checks::{check_excitation, check_logs};
 use crate::known_payload::KnownPayload;
-use crate::{BlockSource, Fold, IdentificationError};
+use crate::log_file::{Interruption, LogFile, Progress, reading};
+use crate::{Fold, IdentificationError};
 use phiw_dynamics::Tree;
-use phiw_telemetry::{Block, Conditioning, ConditioningOptions, LogError, LogSource, Survey, TorqueColumns};
-use std::ops::ControlFlow;
+use phiw_telemetry::{Conditioning, ConditioningOptions, LogError, LogSource, Survey, TorqueColumns};
 use std::path::Path;
 
 /// Stretches of time that the training logs are cut into: long against the residual's correlation, enough for
@@ -15,9 +15,6 @@ const HELD_OUT_FOLDS: usize = 8;
 /// Speed of a joint at rest over its RMS speed.
 const REST_SHARE: f64 = 0.01;
 
-/// Reports how far a pass over the logs is: what is being done, bytes done, bytes in total.
-pub type Progress<'a> = &'a (dyn Fn(&str, u64, u64) + Sync);
-
 /// Logs, surveyed and with their conditioning chosen.
 pub struct LogSet {
     surveys: Vec<Survey>,
@@ -25,6 +22,7 @@ pub struct LogSet {
     conditioning: Conditioning,
     /// What the robot held in each log.
     payloads: Vec<Option<KnownPayload>>,
+    interruption: Interruption,
 }
 
 impl LogSet {
@@ -59,7 +57,8 @@ impl LogSet {
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
-        Self::surveyed(tree, [sources(train), sources(validate)], TorqueColumns::Required, options, progress)
+        let (logs, never) = ([sources(train), sources(validate)], Interruption::default());
+        Self::surveyed(tree, logs, TorqueColumns::Required, options, never, progress)
     }
 
     /// The same of logs that a model is used on: they need no torques.
@@ -72,20 +71,28 @@ impl LogSet {
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
-        Self::surveyed(tree, [sources(logs), Vec::new()], TorqueColumns::Optional, options, progress)
+        let (logs, never) = ([sources(logs), Vec::new()], Interruption::default());
+        Self::surveyed(tree, logs, TorqueColumns::Optional, options, never, progress)
     }
 
-    fn surveyed(
+    /// [`LogSet::open_unexcited`], or with optional torques [`LogSet::open_for_prediction`], of logs for
+    /// training and for validation, which `interruption` can call off.
+    ///
+    /// # Errors
+    /// A log that cannot be read or does not fit the robot; the work is called off.
+    pub fn surveyed(
         tree: &Tree,
         [train, validate]: [Vec<LogSource>; 2],
         torque: TorqueColumns,
         options: &ConditioningOptions,
+        interruption: Interruption,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
         let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
         let survey = |source: &LogSource| {
             let what = reading("surveying", &source.path);
             let mut report = |done: u64, total: u64| progress(&what, done, total);
+            interruption.check()?;
             phiw_telemetry::survey(source, &joints, torque, &mut report)
         };
         let payloads = train.iter().chain(&validate).map(|source| KnownPayload::of(tree, source));
@@ -98,7 +105,7 @@ impl LogSet {
         let conditioning = Conditioning::choose(training, options)?;
         // Cut-offs that were told must fit the logs held out, too.
         held_out.iter().try_for_each(|survey| conditioning.plan(survey).map(drop))?;
-        Ok(LogSet { train: train.len(), conditioning, surveys, payloads })
+        Ok(LogSet { train: train.len(), conditioning, surveys, payloads, interruption })
     }
 
     /// The same logs, each row of which goes out.
@@ -110,6 +117,7 @@ impl LogSet {
             train: self.train,
             conditioning,
             payloads: self.payloads.clone(),
+            interruption: self.interruption.clone(),
         }
     }
 
@@ -129,6 +137,10 @@ impl LogSet {
     /// told (see [`bandwidth`](crate::bandwidth)).
     pub fn set_parallel_cutoff(&mut self, cutoff_hz: f64) {
         self.conditioning.parallel_cutoff_hz = cutoff_hz;
+    }
+    /// What calls work on the logs off.
+    pub fn interruption(&self) -> &Interruption {
+        &self.interruption
     }
     /// Whether the end of each training log is held out, since no other log is given.
     pub fn splits_training_logs(&self) -> bool {
@@ -200,17 +212,15 @@ impl LogSet {
         progress: Progress<'a>,
     ) -> Vec<LogFile<'a>> {
         let logs = self.surveys.iter().zip(&self.payloads);
-        logs.map(|(survey, payload)| LogFile { survey, conditioning, payload: payload.as_ref(), progress })
-            .collect()
+        logs.map(|(survey, payload)| {
+            LogFile::new(survey, conditioning, payload.as_ref(), &self.interruption, progress)
+        })
+        .collect()
     }
 }
 
 fn sources<S: Clone + Into<LogSource>>(logs: &[S]) -> Vec<LogSource> {
     logs.iter().cloned().map(Into::into).collect()
-}
-
-fn reading(what: &str, path: &Path) -> String {
-    format!("{what} {}", path.file_name().unwrap_or(path.as_os_str()).to_string_lossy())
 }
 
 /// Cuts a part of each log into stretches of about equal length, `count` or a few more in all.
@@ -233,36 +243,4 @@ fn cut<'a>(parts: impl Iterator<Item = (usize, &'a Survey, f64, f64)>, count: us
         folds.extend((0..pieces).map(|piece| Fold { log, start: edge(piece), end: edge(piece + 1) }));
     }
     folds
-}
-
-/// A log on disk.
-pub struct LogFile<'a> {
-    survey: &'a Survey,
-    conditioning: &'a Conditioning,
-    payload: Option<&'a KnownPayload>,
-    progress: Progress<'a>,
-}
-
-impl BlockSource for LogFile<'_> {
-    fn stream(&self, sink: &mut dyn FnMut(Block) -> ControlFlow<()>) -> Result<(), LogError> {
-        let what = reading("reading", &self.survey.path);
-        let mut report = |done: u64, total: u64| (self.progress)(&what, done, total);
-        let Some(payload) = self.payload else {
-            phiw_telemetry::stream(self.survey, self.conditioning, &mut report, sink)?;
-            return Ok(());
-        };
-        let (mut workspace, mut wrong) = (payload.workspace(), None);
-        let mut without = |block: Block| match payload.taken_off(block, &mut workspace) {
-            Ok(block) => sink(block),
-            Err(error) => {
-                wrong = Some(error);
-                ControlFlow::Break(())
-            }
-        };
-        phiw_telemetry::stream(self.survey, self.conditioning, &mut report, &mut without)?;
-        match (wrong, &self.survey.source.map) {
-            (Some(error), Some(map)) => Err(map.payload_error(error.to_string()).into()),
-            _ => Ok(()),
-        }
-    }
 }

@@ -1,6 +1,9 @@
 //! Values of options, from their text.
 
-/// `JOINT` or `JOINT=VALUE`.
+/// A joint that is held and where \[rad, m\]: `JOINT` or `JOINT=VALUE`.
+///
+/// # Errors
+/// There is no joint, or the value is no number.
 pub fn held_joint(text: &str) -> Result<(String, f64), String> {
     let (joint, value) = text.split_once('=').unwrap_or((text, "0"));
     let joint = joint.trim();

@@ -1,7 +1,9 @@
 //! The command line.
 
-use crate::argument_values::{held_joint, known_mass, positive, quoted, share};
+pub use crate::argument_values::held_joint;
+use crate::argument_values::{known_mass, positive, quoted, share};
 pub use crate::export::ExportArguments;
+pub use crate::in_memory::InMemory;
 pub use crate::map::MapArguments;
 pub use crate::simulate::Backend;
 use clap::{Args, Parser, Subcommand};
@@ -125,6 +127,9 @@ pub struct PredictArguments {
     /// Print nothing but errors.
     #[arg(long)]
     pub quiet: bool,
+    /// What stands in memory for the files.
+    #[arg(skip)]
+    pub in_memory: InMemory,
 }
 
 /// Arguments of `phiw simulate`.
@@ -178,6 +183,9 @@ pub struct CheckArguments {
     /// Print nothing but errors.
     #[arg(long)]
     pub quiet: bool,
+    /// What stands in memory for the files.
+    #[arg(skip)]
+    pub in_memory: InMemory,
 }
 
 impl CheckArguments {
@@ -189,6 +197,7 @@ impl CheckArguments {
             map: self.map.clone(),
             hold: self.hold.clone(),
             quiet: self.quiet,
+            in_memory: self.in_memory.clone(),
             ..SessionArguments::default()
         }
     }
@@ -286,6 +295,9 @@ pub struct NextArguments {
     /// Print nothing but errors.
     #[arg(long)]
     pub quiet: bool,
+    /// What stands in memory for the files.
+    #[arg(skip)]
+    pub in_memory: InMemory,
 }
 
 impl NextArguments {
@@ -300,6 +312,7 @@ impl NextArguments {
             cutoff_hz: self.cutoff_hz,
             parallel_cutoff_hz: self.parallel_cutoff_hz,
             quiet: self.quiet,
+            in_memory: self.in_memory.clone(),
             ..SessionArguments::default()
         }
     }
@@ -358,6 +371,9 @@ pub struct SessionArguments {
     /// Print nothing but errors.
     #[arg(long)]
     pub quiet: bool,
+    /// What stands in memory for the files.
+    #[arg(skip)]
+    pub in_memory: InMemory,
 }
 
 impl SessionArguments {

@@ -49,7 +49,8 @@ pub fn check(arguments: &CheckArguments, console: &Console) -> Result<CheckOutco
     let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
     let map = read_map(arguments.map.as_deref(), &robot.all_joints())?;
     let mut surveys = Vec::new();
-    for source in sources(&arguments.logs, map.as_ref()) {
+    for source in sources(&arguments.logs, map.as_ref(), &arguments.in_memory) {
+        arguments.in_memory.interruption.check()?;
         let mut progress = |done, total| console.progress("surveying", done, total);
         surveys.push(phiw_telemetry::survey(source, &joints, TorqueColumns::Optional, &mut progress)?);
     }

@@ -1,6 +1,7 @@
 //! What is shown while the work goes on.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use phiw_identification::Interruption;
 use std::io::Write;
 
 /// Characters of a message that are shown; a name in a broken file can fill screens.
@@ -47,7 +48,12 @@ fn push_visible(text: &mut String, c: char) {
 /// Shows how far the work is on standard error, or nothing.
 pub struct Console {
     bar: ProgressBar,
+    listener: Option<Listener>,
+    interruption: Interruption,
 }
+
+/// Is told how far the work is: what is being done, how much of it is done, and how much there is.
+pub type Listener = Box<dyn Fn(&str, u64, u64) + Send + Sync>;
 
 impl Console {
     /// Shows progress if standard error is a terminal and `quiet` is not asked for.
@@ -59,7 +65,15 @@ impl Console {
         if let Ok(style) = ProgressStyle::with_template("{msg:<40!} {wide_bar} {percent:>3} % {eta:>5}") {
             bar.set_style(style.progress_chars("━╸─"));
         }
-        Console { bar }
+        Console { bar, listener: None, interruption: Interruption::default() }
+    }
+
+    /// Shows nothing, but tells a listener; `interruption` can call the work off.
+    pub fn told_to(listener: Listener, interruption: Interruption) -> Self {
+        let mut console = Console::silent();
+        console.listener = Some(listener);
+        console.interruption = interruption;
+        console
     }
 
     /// Shows nothing.
@@ -67,8 +81,16 @@ impl Console {
         Console::of_terminal(true)
     }
 
+    /// Whether the work is called off.
+    pub fn is_interrupted(&self) -> bool {
+        self.interruption.is_called_off()
+    }
+
     /// `done` bytes of `total` of what is being done.
     pub fn progress(&self, what: &str, done: u64, total: u64) {
+        if let Some(listener) = &self.listener {
+            listener(what, done, total);
+        }
         if self.bar.is_hidden() {
             return;
         }

@@ -323,6 +323,9 @@ pub enum Error {
     /// The logs, the effects or the fit.
     #[error(transparent)]
     Identification(#[from] IdentificationError),
+    /// Whoever asked for the work wants it no more.
+    #[error("interrupted")]
+    Interrupted,
     /// A result that cannot be written as JSON.
     #[error("{file}: {source}")]
     Json {
@@ -373,6 +376,7 @@ impl Error {
             | Error::TrainingLogs { .. }
             | Error::Output(ResultError::Busy { .. } | ResultError::IsInput { .. })
             | Error::OutIsFile { .. } => 2,
+            error if error.is_interruption() => 1,
             Error::Identification(IdentificationError::Regressor(_)) => 1,
             Error::Identification(_) => 2,
             Error::Curriculum(_)
@@ -381,8 +385,23 @@ impl Error {
             | Error::IdentifiedUrdf(_)
             | Error::IdentifiedMjcf(_)
             | Error::Generated(_)
+            | Error::Interrupted
             | Error::Json { .. } => 1,
         }
+    }
+
+    /// Whether the work was called off (see
+    /// [`Interruption`](phiw_identification::Interruption)).
+    pub fn is_interruption(&self) -> bool {
+        matches!(
+            self,
+            Error::Interrupted
+                | Error::Identification(IdentificationError::Log(LogError::Interrupted))
+                | Error::Curriculum(CurriculumError::Log(LogError::Interrupted))
+                | Error::Curriculum(CurriculumError::Identification(IdentificationError::Log(
+                    LogError::Interrupted
+                )))
+        )
     }
 }
 

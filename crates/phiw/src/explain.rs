@@ -7,7 +7,7 @@ use crate::console::Console;
 use crate::draws::Draws;
 use crate::explain_page;
 use crate::held_out_reproduction::HeldOutReproduction;
-use crate::identify::{Outcome, outputs};
+use crate::identify::{Outcome, Results, outputs};
 use crate::model_file::ModelFile;
 use crate::output::take_folder;
 use crate::report_json::{by_joint, report_json};
@@ -22,7 +22,6 @@ use phiw_report::json::{
     RemainingJson, RivalJson, TorqueErrors, Verdict,
 };
 use phiw_residual::trace::{self, HeldModel, TraceInput, TraceOptions, Tracing, trace};
-use phiw_result_folder::{Disk, replace_folder};
 use std::fmt::Write;
 
 /// A model to start from: its effects' specs, its parameters, and what was known if it is held.
@@ -41,6 +40,14 @@ struct Start {
 pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcome, Error> {
     let inputs: Vec<_> = arguments.session.inputs().into_iter().chain(arguments.model.clone()).collect();
     let place = take_folder(&arguments.session.out, &inputs, "phiw explain")?;
+    results(arguments, console)?.write(&place, &arguments.session.out)
+}
+
+/// The same, without writing anything.
+///
+/// # Errors
+/// An input is wrong.
+pub fn results(arguments: &ExplainArguments, console: &Console) -> Result<Results, Error> {
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
     let excluded = excluded(arguments)?;
     let mut session = Session::open(&arguments.session, &progress)?;
@@ -87,15 +94,9 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
         program.reproduction = reproduction.json();
     });
     let files = outputs(&analysis, &report, page.render())?;
-    replace_folder(&Disk, &place, &files)?;
     let mut summary = story(&analysis, &tracing, in_draws);
     summary.push_str(&summary::summary(&analysis, &arguments.session.out, &files));
-    Ok(Outcome {
-        summary,
-        warnings: analysis.warnings,
-        report_html: arguments.session.out.join("report.html"),
-        report,
-    })
+    Ok(Results { files, summary, warnings: analysis.warnings, report })
 }
 
 /// The command line that gives these arguments to `phiw explain`.
@@ -194,7 +195,7 @@ fn start(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Re
             held: None,
         });
     };
-    let file = ModelFile::read(path)?;
+    let file = ModelFile::given(session.arguments.in_memory.model.as_ref(), path)?;
     let (design, parameters) = file.design(&session.arguments.urdf, &session.tree, &session.catalogue)?;
     let factor = file.factor()?;
     let model = file.model;

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::session::Session;
 use crate::warnings::file_name;
 use phiw_identification::model::{DataFingerprint, DataRole};
-use phiw_telemetry::Survey;
+use phiw_telemetry::{LogSource, Survey};
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{self, Write};
@@ -20,7 +20,7 @@ pub fn of_session(session: &Session) -> Result<Vec<DataFingerprint>, Error> {
         Ok(DataFingerprint {
             log: file_name(&survey.path),
             role: if index < training { DataRole::Train } else { DataRole::Validate },
-            sha256: sha256(&survey.path)?,
+            sha256: sha256(&survey.source)?,
             rows: survey.rows,
             used_rows: survey.used_rows,
         })
@@ -28,11 +28,20 @@ pub fn of_session(session: &Session) -> Result<Vec<DataFingerprint>, Error> {
     session.logs.surveys().iter().enumerate().map(of_log).collect()
 }
 
-/// The hash of the bytes of a file or folder, in hexadecimal digits.
-fn sha256(path: &Path) -> Result<String, Error> {
+/// The hash of the bytes of a file or folder, in hexadecimal digits; of a log in memory that of its columns:
+/// each name, a line feed, the values' bytes, lowest first.
+fn sha256(source: &LogSource) -> Result<String, Error> {
+    let path = &source.path;
     let unreadable = |source| Error::Unreadable { path: path.to_owned(), source };
     let mut hasher = Hasher(Sha256::new());
-    for file in files(path).map_err(unreadable)? {
+    let columns = source.columns.iter().flat_map(|log| log.columns());
+    for (name, values) in columns {
+        hasher.0.update(name.as_bytes());
+        hasher.0.update(b"\n");
+        values.iter().for_each(|value| hasher.0.update(value.to_le_bytes()));
+    }
+    let files = if source.columns.is_some() { Vec::new() } else { files(path).map_err(unreadable)? };
+    for file in files {
         io::copy(&mut File::open(file).map_err(unreadable)?, &mut hasher).map_err(unreadable)?;
     }
     Ok(hasher.0.finalize().iter().map(|byte| format!("{byte:02x}")).collect())

@@ -11,8 +11,8 @@ use crate::report_json::report_json;
 use crate::session::Session;
 use crate::{Error, bandwidth, page, summary};
 use phiw_report::ReportJson;
-use phiw_result_folder::{Disk, ResultFile, replace_folder};
-use std::path::PathBuf;
+use phiw_result_folder::{Disk, Lock, ResultFile, replace_folder};
+use std::path::{Path, PathBuf};
 
 /// What a command has done.
 pub struct Outcome {
@@ -26,6 +26,30 @@ pub struct Outcome {
     pub report: ReportJson,
 }
 
+/// What was computed, before anything is written.
+pub struct Results {
+    /// The files.
+    pub files: Vec<ResultFile>,
+    /// The result as text for a terminal.
+    pub summary: String,
+    /// What a reader should know before trusting a number.
+    pub warnings: Vec<String>,
+    /// The numbers.
+    pub report: ReportJson,
+}
+
+impl Results {
+    /// Writes the files into the folder `out`, which is `place`.
+    ///
+    /// # Errors
+    /// They cannot be written.
+    pub(crate) fn write(self, place: &Lock, out: &Path) -> Result<Outcome, Error> {
+        replace_folder(&Disk, place, &self.files)?;
+        let Results { summary, warnings, report, .. } = self;
+        Ok(Outcome { summary, warnings, report_html: out.join("report.html"), report })
+    }
+}
+
 /// Fits the declared model and writes `model.json`, `report.json`, `report.html`, `identified.urdf` and
 /// `identified.xml`.
 ///
@@ -35,6 +59,14 @@ pub struct Outcome {
 /// An input is wrong, or the results cannot be written: [`Error::exit_status`] tells the two apart.
 pub fn identify(arguments: &SessionArguments, console: &Console) -> Result<Outcome, Error> {
     let place = take_folder(&arguments.out, &arguments.inputs(), "phiw identify")?;
+    results(arguments, console)?.write(&place, &arguments.out)
+}
+
+/// Fits the declared model; writes nothing.
+///
+/// # Errors
+/// An input is wrong.
+pub fn results(arguments: &SessionArguments, console: &Console) -> Result<Results, Error> {
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
     let session = Session::open(arguments, &progress)?;
     let bandwidth = bandwidth::of_session(&session, &progress)?;
@@ -48,13 +80,8 @@ pub fn identify(arguments: &SessionArguments, console: &Console) -> Result<Outco
     let report = report_json(&analysis);
     let files =
         outputs(&analysis, &report, page::page(&analysis, arguments.command_line("identify")).render())?;
-    replace_folder(&Disk, &place, &files)?;
-    Ok(Outcome {
-        summary: summary::summary(&analysis, &arguments.out, &files),
-        warnings: analysis.warnings,
-        report_html: arguments.out.join("report.html"),
-        report,
-    })
+    let summary = summary::summary(&analysis, &arguments.out, &files);
+    Ok(Results { files, summary, warnings: analysis.warnings, report })
 }
 
 /// The files that every identification writes.

@@ -1,6 +1,7 @@
 //! Logs as a command line names them, with the map that says what their columns mean.
 
 use crate::Error;
+use crate::in_memory::InMemory;
 use crate::input::read_text;
 use crate::warnings::file_name;
 use phiw_limits::Limits;
@@ -21,8 +22,12 @@ pub fn read_map(path: Option<&Path>, joints: &[String]) -> Result<Option<Arc<Log
 }
 
 /// Logs of which all is read that the map does not leave out.
-pub fn sources(logs: &[PathBuf], map: Option<&Arc<LogMap>>) -> Vec<LogSource> {
-    logs.iter().map(|log| LogSource::mapped(log, map.cloned())).collect()
+pub fn sources(logs: &[PathBuf], map: Option<&Arc<LogMap>>, given: &InMemory) -> Vec<LogSource> {
+    let source = |log: &PathBuf| {
+        let columns = given.logs.get(log).cloned();
+        LogSource { columns, ..LogSource::mapped(log, map.cloned()) }
+    };
+    logs.iter().map(source).collect()
 }
 
 /// Logs to train and to validate on: where the map gives stretches of a training log to validation, they are
@@ -31,9 +36,13 @@ pub fn train_and_validate(
     train: &[PathBuf],
     validate: &[PathBuf],
     map: Option<&Arc<LogMap>>,
+    given: &InMemory,
 ) -> [Vec<LogSource>; 2] {
-    let Some(map) = map else { return [sources(train, None), sources(validate, None)] };
-    let part = |log: &PathBuf, part| LogSource { part, ..LogSource::mapped(log, Some(map.clone())) };
+    let Some(map) = map else { return [sources(train, None, given), sources(validate, None, given)] };
+    let part = |log: &PathBuf, part| {
+        let columns = given.logs.get(log).cloned();
+        LogSource { part, columns, ..LogSource::mapped(log, Some(map.clone())) }
+    };
     let has_validation = |log: &&PathBuf| !map.facts(log).validate.is_empty();
     let training = train.iter().map(|log| part(log, LogPart::Train)).collect();
     let mut held_out: Vec<LogSource> =

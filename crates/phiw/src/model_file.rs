@@ -1,7 +1,7 @@
 //! A `model.json` that is given, and the robot that it is said to be of.
 
 use crate::Error;
-use crate::input::read_text;
+use crate::in_memory::text_of;
 use phiw_dynamics::Tree;
 use phiw_identification::{Design, EffectCatalogue, IdentificationError, Model};
 use phiw_limits::Limits;
@@ -21,7 +21,15 @@ impl ModelFile {
     /// # Errors
     /// It is no model, or its numbers cannot be a model's.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = read_text(path, Limits::default().model_bytes)?;
+        Self::given(None, path)
+    }
+
+    /// The same, of the text that is given for the file, if one is.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn given(text: Option<&String>, path: &Path) -> Result<Self, Error> {
+        let text = text_of(text, path, Limits::default().model_bytes)?;
         let path = path.to_owned();
         match serde_json::from_str::<Model>(&text) {
             Ok(model) => {

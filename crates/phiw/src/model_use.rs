@@ -1,6 +1,7 @@
 //! A `model.json` used by itself, on new logs: its robot, its columns, and the logs.
 
 use crate::Error;
+use crate::arguments::InMemory;
 use crate::log_inputs::{read_map, sources, without_payload};
 use crate::model_file::ModelFile;
 use phiw_dynamics::Tree;
@@ -8,7 +9,7 @@ use phiw_dynamics::urdf::{UrdfOptions, held_joints, read_urdf};
 use phiw_effects::Catalogue;
 use phiw_identification::held_joints::HeldJoints;
 use phiw_identification::{Design, IdentificationError, LogFile, LogSet, Model, Progress};
-use phiw_telemetry::{ConditioningOptions, Survey};
+use phiw_telemetry::{ConditioningOptions, Survey, TorqueColumns};
 use std::path::{Path, PathBuf};
 
 /// How far two values of one held joint may be apart \[rad, m\].
@@ -28,6 +29,8 @@ pub struct Reading<'a> {
     pub cutoff_hz: Option<f64>,
     /// Cut-off of the parallel filter \[Hz\].
     pub parallel_cutoff_hz: Option<f64>,
+    /// What stands in memory for the model and the logs.
+    pub in_memory: &'a InMemory,
 }
 
 /// A model and the logs that it is used on.
@@ -56,7 +59,7 @@ impl ModelUse {
     /// # Errors
     /// An input is wrong: model, held joint, or log.
     pub fn open(path: &Path, reading: &Reading<'_>, progress: Progress<'_>) -> Result<Self, Error> {
-        let file = ModelFile::read(path)?;
+        let file = ModelFile::given(reading.in_memory.model.as_ref(), path)?;
         let held = extra_holds(&file.model, path, reading.hold)?;
         if let Some((joint, _)) = held.first().filter(|_| reading.complete) {
             return Err(Error::HeldInSimulation { path: path.to_owned(), joint: joint.clone() });
@@ -77,11 +80,10 @@ impl ModelUse {
         let joints: Vec<String> = tree.joint_names().chain(held_before).map(str::to_owned).collect();
         let map = read_map(reading.map, &joints)?;
         without_payload(reading.logs, map.as_ref())?;
-        let sources = sources(reading.logs, map.as_ref());
-        let logs = match reading.complete {
-            true => LogSet::open_unexcited(&logged, &sources, &[], &every_row, progress)?,
-            false => LogSet::open_for_prediction(&logged, &sources, &every_row, progress)?,
-        };
+        let logs = [sources(reading.logs, map.as_ref(), reading.in_memory), Vec::new()];
+        let torque = if reading.complete { TorqueColumns::Required } else { TorqueColumns::Optional };
+        let interruption = reading.in_memory.interruption.clone();
+        let logs = LogSet::surveyed(&logged, logs, torque, &every_row, interruption, progress)?;
         let thinned = phiw_telemetry::Conditioning::choose(logs.surveys(), &thinned)?;
         let stride = |survey: &Survey| Ok(thinned.plan(survey)?.decimation());
         let strides = logs.surveys().iter().map(stride).collect::<Result<_, Error>>()?;

@@ -18,7 +18,7 @@ use phiw_curriculum::selection::SmallestCondition;
 use phiw_curriculum::{CurriculumError, CurriculumSettings};
 use phiw_result_folder::{Disk, Lock, ResultFile, check_inputs, replace_files};
 use standing::Standing;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What the command has done.
 #[derive(Debug)]
@@ -48,6 +48,30 @@ pub fn next(arguments: &NextArguments, console: &Console) -> Result<NextOutcome,
         return Err(Error::MotionNamedJson { out: arguments.out.clone() });
     }
     let place = Lock::acquire(&arguments.out, "phiw next")?;
+    let Chosen { files, summary, warnings, report } = chosen(arguments, console)?;
+    let folder = place.target().parent().unwrap_or(Path::new("."));
+    replace_files(&Disk, folder, &file_name(&arguments.out), &files)?;
+    Ok(NextOutcome { summary, warnings, report, report_json })
+}
+
+/// What was chosen, before anything is written.
+pub struct Chosen {
+    /// The report and the motion.
+    pub files: [ResultFile; 2],
+    /// The choice and its reason, as text for a terminal.
+    pub summary: String,
+    /// What to look at before the robot moves.
+    pub warnings: Vec<String>,
+    /// The numbers.
+    pub report: serde_json::Value,
+}
+
+/// Chooses as [`next`] does, and writes nothing.
+///
+/// # Errors
+/// An input is wrong, or no motion is safe.
+pub fn chosen(arguments: &NextArguments, console: &Console) -> Result<Chosen, Error> {
+    let report_json = arguments.out.with_extension("json");
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
     let session::RobotOfUrdf { tree, xml, findings, held, .. } = session::read_robot(&arguments.session())?;
     let standing = Standing::read(arguments, &xml, &held)?;
@@ -77,14 +101,15 @@ pub fn next(arguments: &NextArguments, console: &Console) -> Result<NextOutcome,
     let report = story.json();
     let json = |source| Error::Json { file: "the report", source };
     let text = serde_json::to_string_pretty(&report).map_err(json)? + "\n";
-    let name = |path: &std::path::Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let files = [
-        ResultFile::new(name(&report_json), text),
-        ResultFile::new(name(&arguments.out), plan_file::csv(motion, &torque, robot.tree())),
+        ResultFile::new(file_name(&report_json), text),
+        ResultFile::new(file_name(&arguments.out), plan_file::csv(motion, &torque, robot.tree())),
     ];
-    let folder = place.target().parent().unwrap_or(std::path::Path::new("."));
-    replace_files(&Disk, folder, &name(&arguments.out), &files)?;
-    Ok(NextOutcome { summary: story.text(&report_json), warnings: story.warnings(), report, report_json })
+    Ok(Chosen { files, summary: story.text(&report_json), warnings: story.warnings(), report })
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// The curriculum's plan with the policy for a real robot.

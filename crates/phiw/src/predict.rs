@@ -15,7 +15,7 @@ use phiw_report::number::{percent, significant};
 use phiw_result_folder::{Disk, Lock, StreamedFile, check_inputs};
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What the command has done.
 #[derive(Debug)]
@@ -40,6 +40,54 @@ pub fn predict(arguments: &PredictArguments, console: &Console) -> Result<Predic
     let inputs: Vec<PathBuf> = std::iter::once(&arguments.model).chain(&arguments.logs).cloned().collect();
     check_inputs(&inputs, std::slice::from_ref(&arguments.out))?;
     let _place = Lock::acquire(&arguments.out, "phiw predict")?;
+    let file = || {
+        let file = StreamedFile::create(&Disk, &arguments.out)?;
+        Ok(CsvRows { file, line: Vec::new(), several_logs: false })
+    };
+    let Predicted { sink, errors, of_logs, rows, used } = predict_into(arguments, console, file)?;
+    sink.file.commit()?;
+    let summary = summary(&used, &errors, &of_logs, rows, arguments);
+    Ok(PredictOutcome { summary, warnings: warnings(&used), errors, rows })
+}
+
+/// Predictions in memory.
+pub struct PredictedColumns {
+    /// Names of the columns: `t`, `tau.<joint>`, `tau_std.<joint>`, `residual.<joint>`, `<kind>.<joint>`.
+    pub names: Vec<String>,
+    /// The values of each; NaN where there is none.
+    pub columns: Vec<Vec<f64>>,
+    /// For each row its log, counted from 0.
+    pub log: Vec<usize>,
+    /// RMS of the residual over RMS of the torque, all joints and logs pooled; NaN without torques.
+    pub relative: f64,
+    /// What a reader should know before trusting a number.
+    pub warnings: Vec<String>,
+}
+
+/// Predicts as [`predict`] does; writes nothing.
+///
+/// # Errors
+/// An input is wrong.
+pub fn predicted_columns(arguments: &PredictArguments, console: &Console) -> Result<PredictedColumns, Error> {
+    let Predicted { sink, errors, used, .. } = predict_into(arguments, console, || Ok(Columns::default()))?;
+    let Columns { names, columns, log } = sink;
+    Ok(PredictedColumns { names, columns, log, relative: errors.relative(), warnings: warnings(&used) })
+}
+
+/// What has been predicted, and where it went.
+struct Predicted<S> {
+    sink: S,
+    errors: PredictionErrors,
+    of_logs: Vec<PredictionErrors>,
+    rows: u64,
+    used: ModelUse,
+}
+
+fn predict_into<S: PredictedRows>(
+    arguments: &PredictArguments,
+    console: &Console,
+    sink: impl FnOnce() -> Result<S, Error>,
+) -> Result<Predicted<S>, Error> {
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
     let reading = Reading {
         logs: &arguments.logs,
@@ -48,6 +96,7 @@ pub fn predict(arguments: &PredictArguments, console: &Console) -> Result<Predic
         complete: false,
         cutoff_hz: arguments.cutoff_hz,
         parallel_cutoff_hz: arguments.parallel_cutoff_hz,
+        in_memory: &arguments.in_memory,
     };
     let used = ModelUse::open(&arguments.model, &reading, &progress)?;
     let mut parts = PredictionParts::of_effects(&used.design);
@@ -58,25 +107,113 @@ pub fn predict(arguments: &PredictArguments, console: &Console) -> Result<Predic
     let sources = used.with_held(&sources)?;
     let sources: Vec<&dyn BlockSource> = sources.iter().map(|source| source as &dyn BlockSource).collect();
 
-    let mut table = Table::begin(&used, &parts, StreamedFile::create(&Disk, &arguments.out)?)?;
+    let mut table = Table::begin(&used, &parts, sink()?)?;
     predict_in_parts(&used.design, &used.parameters, &parts, &sources, &mut |prediction| {
         table.take(prediction)
     })?;
     console.finish();
-    let Table { file, errors, rows, .. } = table;
-    file.commit()?;
-    let pooled = errors
+    let Table { sink, errors: of_logs, rows, .. } = table;
+    let errors = of_logs
         .iter()
         .fold(PredictionErrors::new(used.design.rows().len()), |pooled, errors| pooled.merged(errors));
-    let summary = summary(&used, &pooled, &errors, rows, arguments);
-    Ok(PredictOutcome { summary, warnings: warnings(&used), errors: pooled, rows })
+    Ok(Predicted { sink, errors, of_logs, rows, used })
 }
 
-/// The rows on their way into the file, and what is summed over them.
-struct Table<'a> {
+/// Where predictions go.
+trait PredictedRows {
+    /// Takes the names of the columns, first of all; the first is `t`.
+    fn begin(&mut self, names: Vec<String>, several_logs: bool) -> Result<(), Error>;
+
+    /// Takes a row of a log: its number, its name, its time, and the other numbers.
+    fn row(
+        &mut self,
+        log: (usize, &Path),
+        t: f64,
+        numbers: &mut dyn Iterator<Item = f64>,
+    ) -> Result<(), Error>;
+}
+
+/// Predictions in memory.
+#[derive(Default)]
+struct Columns {
+    names: Vec<String>,
+    columns: Vec<Vec<f64>>,
+    log: Vec<usize>,
+}
+
+impl PredictedRows for Columns {
+    fn begin(&mut self, names: Vec<String>, _several_logs: bool) -> Result<(), Error> {
+        self.columns = vec![Vec::new(); names.len()];
+        self.names = names;
+        Ok(())
+    }
+
+    fn row(
+        &mut self,
+        (log, _): (usize, &Path),
+        t: f64,
+        numbers: &mut dyn Iterator<Item = f64>,
+    ) -> Result<(), Error> {
+        self.log.push(log);
+        self.columns.iter_mut().zip(std::iter::once(t).chain(numbers)).for_each(|(column, x)| column.push(x));
+        Ok(())
+    }
+}
+
+/// Predictions in a CSV file.
+struct CsvRows<'a> {
     file: StreamedFile<'a>,
-    used: &'a ModelUse,
     line: Vec<u8>,
+    several_logs: bool,
+}
+
+impl CsvRows<'_> {
+    fn put_line(&mut self) -> Result<(), Error> {
+        self.line.push(b'\n');
+        self.file.write_all(&self.line).map_err(|source| self.file.unwritable(source))?;
+        self.line.clear();
+        Ok(())
+    }
+
+    /// The cells of a row into the line.
+    fn cells(&mut self, log: &Path, t: f64, numbers: &mut dyn Iterator<Item = f64>) -> io::Result<()> {
+        if self.several_logs {
+            write!(self.line, "{},", cell(&log.display().to_string()))?;
+        }
+        write!(self.line, "{t}")?;
+        for number in numbers {
+            self.line.push(b',');
+            if number.is_finite() {
+                write!(self.line, "{number}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl PredictedRows for CsvRows<'_> {
+    fn begin(&mut self, names: Vec<String>, several_logs: bool) -> Result<(), Error> {
+        self.several_logs = several_logs;
+        self.line.extend_from_slice(if several_logs { b"log," } else { b"" });
+        self.line.extend_from_slice(names.join(",").as_bytes());
+        self.put_line()
+    }
+
+    fn row(
+        &mut self,
+        (_, log): (usize, &Path),
+        t: f64,
+        numbers: &mut dyn Iterator<Item = f64>,
+    ) -> Result<(), Error> {
+        self.cells(log, t, numbers).map_err(|source| self.file.unwritable(source))?;
+        self.put_line()
+    }
+}
+
+/// The rows on their way, and what is summed over them.
+struct Table<'a, S> {
+    sink: S,
+    used: &'a ModelUse,
     std: Vec<f64>,
     /// For each joint whether its residual has a column, and for each log whether it has torques.
     has_residual: Vec<bool>,
@@ -88,8 +225,8 @@ struct Table<'a> {
     last: Option<(usize, usize, usize)>,
 }
 
-impl<'a> Table<'a> {
-    fn begin(used: &'a ModelUse, parts: &PredictionParts, file: StreamedFile<'a>) -> Result<Self, Error> {
+impl<'a, S: PredictedRows> Table<'a, S> {
+    fn begin(used: &'a ModelUse, parts: &PredictionParts, sink: S) -> Result<Self, Error> {
         let joints = used.joints();
         let measured =
             |survey: &phiw_telemetry::Survey| survey.joints.iter().any(|joint| joint.torque.is_some());
@@ -97,20 +234,15 @@ impl<'a> Table<'a> {
         let is_logged = used.is_logged();
         let has_residual: Vec<bool> =
             is_logged.iter().map(|logged| *logged && has_torque.contains(&true)).collect();
-        let mut names = Vec::new();
-        if has_torque.len() > 1 {
-            names.push("log".to_owned());
-        }
-        names.push("t".to_owned());
+        let mut names = vec!["t".to_owned()];
         names.extend(joints.iter().map(|joint| format!("tau.{joint}")));
         names.extend(joints.iter().map(|joint| format!("tau_std.{joint}")));
         let with_residual = joints.iter().zip(&has_residual).filter(|(_, has)| **has);
         names.extend(with_residual.map(|(joint, _)| format!("residual.{joint}")));
         names.extend(parts.shares.iter().map(|share| format!("{}.{}", share.kind, joints[share.row])));
         let mut table = Table {
-            file,
+            sink,
             used,
-            line: Vec::new(),
             std: vec![0.0; joints.len()],
             errors: vec![PredictionErrors::new(joints.len()); has_torque.len()],
             has_residual,
@@ -118,8 +250,7 @@ impl<'a> Table<'a> {
             rows: 0,
             last: None,
         };
-        table.line.extend_from_slice(names.join(",").as_bytes());
-        table.put_line()?;
+        table.sink.begin(names, table.has_torque.len() > 1)?;
         Ok(table)
     }
 
@@ -137,36 +268,14 @@ impl<'a> Table<'a> {
         if self.has_torque[prediction.log] && place.is_multiple_of(self.used.strides[prediction.log]) {
             self.errors[prediction.log].push(prediction, &self.std);
         }
-        self.row(prediction).map_err(|source| self.file.unwritable(source))?;
         self.rows += 1;
-        self.put_line()
-    }
-
-    /// The cells of a row into the line.
-    fn row(&mut self, prediction: &Prediction<'_>) -> io::Result<()> {
-        if self.has_torque.len() > 1 {
-            let log = self.used.logs.surveys()[prediction.log].path.display().to_string();
-            write!(self.line, "{},", cell(&log))?;
-        }
-        write!(self.line, "{}", prediction.t)?;
         let has_torque = self.has_torque[prediction.log];
         let residual = |row: usize| if has_torque { prediction.residual(row) } else { f64::NAN };
         let residuals = (0..self.has_residual.len()).filter(|&row| self.has_residual[row]).map(residual);
         let numbers = prediction.predicted.iter().chain(&self.std).copied();
-        for number in numbers.chain(residuals).chain(prediction.shares.iter().copied()) {
-            self.line.push(b',');
-            if number.is_finite() {
-                write!(self.line, "{number}")?;
-            }
-        }
-        Ok(())
-    }
-
-    fn put_line(&mut self) -> Result<(), Error> {
-        self.line.push(b'\n');
-        self.file.write_all(&self.line).map_err(|source| self.file.unwritable(source))?;
-        self.line.clear();
-        Ok(())
+        let mut numbers = numbers.chain(residuals).chain(prediction.shares.iter().copied());
+        let log = &self.used.logs.surveys()[prediction.log].path;
+        self.sink.row((prediction.log, log), prediction.t, &mut numbers)
     }
 }
 

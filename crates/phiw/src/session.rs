@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::arguments::SessionArguments;
-use crate::input::read_text;
+use crate::in_memory::text_of;
 use crate::log_inputs::{read_map, train_and_validate};
 use phiw_dynamics::urdf::{Finding, UrdfOptions, UrdfReading, read_urdf};
 use phiw_dynamics::{DimensionError, JointType, Tree};
@@ -14,7 +14,7 @@ use phiw_identification::{BlockSource, Data, IdentificationError, LogFile, LogSe
 use phiw_limits::Limits;
 use phiw_regressor::least_squares::GroupedFactor;
 use phiw_residual::trace::ranges_of_residual;
-use phiw_telemetry::ConditioningOptions;
+use phiw_telemetry::{ConditioningOptions, TorqueColumns};
 use std::path::PathBuf;
 
 /// Robot, logs and declared effects, read and checked.
@@ -66,8 +66,11 @@ impl Session {
             ..ConditioningOptions::default()
         };
         let map = read_map(arguments.map.as_deref(), &robot.all_joints())?;
-        let [train, validate] = train_and_validate(&arguments.train, &arguments.validate, map.as_ref());
-        let logs = LogSet::open_unexcited(&robot.tree, &train, &validate, &options, progress)?;
+        let given = &arguments.in_memory;
+        let logs = train_and_validate(&arguments.train, &arguments.validate, map.as_ref(), given);
+        let interruption = given.interruption.clone();
+        let torque = TorqueColumns::Required;
+        let logs = LogSet::surveyed(&robot.tree, logs, torque, &options, interruption, progress)?;
         Ok(Session {
             tree: robot.tree,
             xml: robot.xml,
@@ -204,7 +207,8 @@ impl RobotOfUrdf {
 /// The robot of a session.
 pub(crate) fn read_robot(arguments: &SessionArguments) -> Result<RobotOfUrdf, Error> {
     let path = || arguments.urdf.clone();
-    let xml = read_text(&arguments.urdf, Limits::default().urdf_bytes)?;
+    let given = arguments.in_memory.urdf.as_ref();
+    let xml = text_of(given, &arguments.urdf, Limits::default().urdf_bytes)?;
     let options = UrdfOptions { held: arguments.hold.clone(), snap: true, ..UrdfOptions::default() };
     let reading =
         read_urdf(&xml, &options).map_err(|source| Error::Urdf { path: path(), source: Box::new(source) })?;

@@ -7,7 +7,7 @@ pub use backends::Backend;
 pub(crate) use files::{picture, worse};
 
 use crate::Error;
-use crate::arguments::SimulateArguments;
+use crate::arguments::{InMemory, SimulateArguments};
 use crate::console::Console;
 use crate::model_use::{ModelUse, Reading};
 use crate::output::check_folder;
@@ -118,6 +118,7 @@ pub fn simulate(arguments: &SimulateArguments, console: &Console) -> Result<Simu
         complete: true,
         cutoff_hz: None,
         parallel_cutoff_hz: None,
+        in_memory: &InMemory::default(),
     };
     let used = ModelUse::open(&arguments.model, &reading, &progress)?;
     let sources = used.logs.sources(&progress);

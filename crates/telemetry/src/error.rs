@@ -135,6 +135,26 @@ pub enum LogError {
         /// The highest cut-off that fits, in Hz.
         highest_hz: f64,
     },
+    /// The columns of a log in memory are not equally long.
+    #[error(
+        "{}: column `{column}` has {found} values, but `{first}` has {rows}; give each as many",
+        path.display()
+    )]
+    ColumnLength {
+        /// The log.
+        path: PathBuf,
+        /// The column.
+        column: String,
+        /// Its values.
+        found: usize,
+        /// The log's first column.
+        first: String,
+        /// The values of that.
+        rows: usize,
+    },
+    /// Whoever asked for the work wants it no more.
+    #[error("interrupted")]
+    Interrupted,
     /// The arrays of a [`Recording`](crate::Recording) do not fit each other.
     #[error("recording: `{array}` has {found} values, but {rows} rows of {joints} joints need {expected}", expected = rows * joints)]
     Shape {

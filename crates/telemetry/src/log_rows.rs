@@ -33,10 +33,13 @@ pub(crate) fn open_log(
     joints: &[String],
     torque: TorqueColumns,
 ) -> Result<LogRows, LogError> {
-    let LogSource { path, map, part } = source;
+    let LogSource { path, map, part, columns: in_memory } = source;
     let map = map.as_deref();
     let options = OpenOptions { topic: map.and_then(|map| map.topic()).map(str::to_owned) };
-    let mut table = phiw_log_formats::open(path, &options)?;
+    let mut table = match in_memory {
+        Some(columns) => columns.table(),
+        None => phiw_log_formats::open(path, &options)?,
+    };
     let mut columns = Columns::find(path, table.as_ref(), map, joints, torque)?;
     // A column is read once, whatever it is used for.
     let mut selected: Vec<usize> = Vec::new();

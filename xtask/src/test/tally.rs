@@ -42,6 +42,22 @@ impl Tally {
         }
     }
 
+    /// Takes the next line of what pytest prints: the last one counts, `2 passed, 1 skipped in 0.10s`.
+    pub fn read_line_of_pytest(&mut self, line: &str) {
+        let plain = line.trim_matches('=').trim();
+        let starts_with_count = plain.starts_with(|c: char| c.is_ascii_digit());
+        if starts_with_count && plain.contains(" in ") && plain.ends_with('s') {
+            self.passed += count(plain, "passed");
+            self.failed += count(plain, "failed") + count(plain, "error") + count(plain, "errors");
+            self.skipped += count(plain, "skipped");
+        }
+    }
+
+    /// Counts a group of tests that cannot be run here.
+    pub fn add_skip(&mut self) {
+        self.skipped += 1;
+    }
+
     /// Counts failures that no test reports.
     pub fn add_failures(&mut self, failures: u64) {
         self.failed += failures;
@@ -62,7 +78,7 @@ impl std::fmt::Display for Tally {
 /// The number before `what` in `ok. 2 passed; 0 failed; …`, 0 if there is none.
 fn count(result: &str, what: &str) -> u64 {
     let words: Vec<&str> = result.split_whitespace().collect();
-    let number = words.windows(2).find(|pair| pair[1].trim_end_matches(';') == what);
+    let number = words.windows(2).find(|pair| pair[1].trim_end_matches([';', ',']) == what);
     number.and_then(|pair| pair[0].parse().ok()).unwrap_or(0)
 }
 
@@ -135,6 +151,18 @@ test result: FAILED. 0 passed; 1 failed; 0 ignored; 0 measured; 0 filtered out; 
 ",
             "0 passed, 1 failed, 0 skipped",
         );
+    }
+
+    #[test]
+    fn pytest_is_counted_by_its_last_line() {
+        let mut tally = Tally::default();
+        let lines = [
+            "........s.F                                     [100%]",
+            "1 failed in here, said a test",
+            "===== 1 failed, 9 passed, 1 skipped, 2 errors in 5.08s =====",
+        ];
+        lines.iter().for_each(|line| tally.read_line_of_pytest(line));
+        assert_eq!(tally.to_string(), "9 passed, 3 failed, 1 skipped");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The training motion that cut-offs are compared on, in memory, to be filtered with any of them.
 
 use super::{BandwidthSettings, beginnings};
-use crate::log_set::LogFile;
+use crate::log_file::LogFile;
 use crate::{BlockSource, Fold, IdentificationError, LogSet, Progress};
 use phiw_telemetry::filter::ParallelFilter;
 use phiw_telemetry::{Block, LogError, Survey};

@@ -129,7 +129,11 @@ impl Known {
         motions: &Motions,
         progress: Progress<'_>,
     ) -> Result<Self, Error> {
-        let model = arguments.model.as_ref().map(|path| ModelFile::read(path)).transpose()?;
+        let model = arguments
+            .model
+            .as_ref()
+            .map(|path| ModelFile::given(arguments.in_memory.model.as_ref(), path))
+            .transpose()?;
         let logs = match arguments.measured.is_empty() {
             true => None,
             false => Some(Self::of_logs(arguments, tree, model.as_ref(), progress)?),

@@ -56,12 +56,18 @@ pub fn run(
     let outcomes: Vec<Result<Done, Error>> = motions
         .par_iter()
         .map(|file| {
+            if console.is_interrupted() {
+                return Err(Error::Interrupted);
+            }
             let outcome = one(arguments, urdf, retargeter, file, &trials, suffix.as_deref());
             console.progress("retargeting", done.fetch_add(1, Ordering::Relaxed) + 1, total);
             outcome
         })
         .collect();
     console.finish();
+    if console.is_interrupted() {
+        return Err(Error::Interrupted);
+    }
 
     let (mut qualities, mut kept, mut seconds) = (Vec::new(), 0, 0.0);
     let (mut failures, mut warnings) = (Vec::new(), Vec::new());
