@@ -85,8 +85,8 @@ impl LogRows {
         notes
     }
 
-    /// A hash of all content read so far: of the whole log once the rows are at their end. Logs are read again
-    /// for every pass, so this says whether it is still the same.
+    /// A hash of all content read so far: of the whole log once the rows are at their end. Logs are read
+    /// again for every pass, so this says whether it is still the same.
     pub fn content_hash(&self) -> u64 {
         let hash = self.table.content_hash();
         if self.facts.is_none() {

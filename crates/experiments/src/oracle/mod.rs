@@ -14,8 +14,8 @@
 //! # How it is run
 //!
 //! `cargo xtask oracle`, or one part of it: `cargo xtask oracle dynamics`, `cargo xtask oracle c3d`,
-//! `cargo xtask oracle consistency`, `cargo xtask oracle export`, `cargo xtask oracle formats` (or one part of
-//! it: `--formats same`, `damage`, `memory`; the last writes 5 GB). It needs
+//! `cargo xtask oracle consistency`, `cargo xtask oracle export`, `cargo xtask oracle formats` (or one part
+//! of it: `--formats same`, `damage`, `memory`; the last writes 5 GB). It needs
 //! Python 3.10 or later, and a network the first time: Pinocchio, ezc3d, CVXPY, Clarabel and MuJoCo are
 //! installed from PyPI, pinned. Robots whose logs are absent are skipped.
 //! For this reason it is not part of `cargo xtask test`.

@@ -1,4 +1,5 @@
-//! MATLAB's files up to version 7 (level 5 MAT-files): arrays of numbers; structures and cells are passed over.
+//! MATLAB's files up to version 7 (level 5 MAT-files): arrays of numbers; structures and cells are passed
+//! over.
 
 use super::array_table::Array;
 use super::element::{Element, ElementKind};

@@ -215,7 +215,8 @@ impl DatasetTable {
         let value = |feature: Option<usize>| feature.and_then(|feature| self.row[feature].first().copied());
         let of_frames = value(self.time.frame).zip(self.info.fps).map(|(frame, fps)| frame / fps);
         let own = match (value(self.time.timestamp), of_frames) {
-            // Stamps are kept in single precision; where they say no more than the frame's number, that is exact.
+            // Stamps are kept in single precision; where they say no more than the frame's number, that is
+            // exact.
             (Some(stamp), Some(exact)) if (stamp - exact).abs() <= f64::from(f32::EPSILON) * exact => exact,
             (Some(stamp), _) => stamp,
             (None, exact) => exact.unwrap_or(f64::NAN),
