@@ -1,6 +1,7 @@
 //! A log of a session as a source of blocks, and what calls work on it off.
 
 use crate::BlockSource;
+use crate::known_payload::KnownPayload;
 use phiw_telemetry::{Block, Conditioning, LogError, Survey};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -36,6 +37,7 @@ impl Interruption {
 pub struct LogFile<'a> {
     survey: &'a Survey,
     conditioning: &'a Conditioning,
+    payload: Option<&'a KnownPayload>,
     interruption: &'a Interruption,
     progress: Progress<'a>,
 }
@@ -44,16 +46,17 @@ impl<'a> LogFile<'a> {
     pub(crate) fn new(
         survey: &'a Survey,
         conditioning: &'a Conditioning,
+        payload: Option<&'a KnownPayload>,
         interruption: &'a Interruption,
         progress: Progress<'a>,
     ) -> Self {
-        LogFile { survey, conditioning, interruption, progress }
+        LogFile { survey, conditioning, payload, interruption, progress }
     }
 }
 
 impl BlockSource for LogFile<'_> {
     fn stream(&self, sink: &mut dyn FnMut(Block) -> ControlFlow<()>) -> Result<(), LogError> {
-        let LogFile { survey, conditioning, interruption, progress } = *self;
+        let LogFile { survey, conditioning, payload, interruption, progress } = *self;
         let what = reading("reading", &survey.path);
         let mut report = |done: u64, total: u64| progress(&what, done, total);
         interruption.check()?;
@@ -62,8 +65,24 @@ impl BlockSource for LogFile<'_> {
             goes_on = interruption.check();
             if goes_on.is_ok() { sink(block) } else { ControlFlow::Break(()) }
         };
-        phiw_telemetry::stream(survey, conditioning, &mut report, &mut sink)?;
-        goes_on
+        let Some(payload) = payload else {
+            phiw_telemetry::stream(survey, conditioning, &mut report, &mut sink)?;
+            return goes_on;
+        };
+        let (mut workspace, mut wrong) = (payload.workspace(), None);
+        let mut without = |block: Block| match payload.taken_off(block, &mut workspace) {
+            Ok(block) => sink(block),
+            Err(error) => {
+                wrong = Some(error);
+                ControlFlow::Break(())
+            }
+        };
+        phiw_telemetry::stream(survey, conditioning, &mut report, &mut without)?;
+        goes_on?;
+        match (wrong, &survey.source.map) {
+            (Some(error), Some(map)) => Err(map.payload_error(error.to_string()).into()),
+            _ => Ok(()),
+        }
     }
 
     fn goes_on(&self) -> Result<(), LogError> {

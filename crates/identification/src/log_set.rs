@@ -1,6 +1,7 @@
 //! The logs of a session: which train, which are held out, and how they are conditioned.
 
 use crate::checks::{check_excitation, check_logs};
+use crate::known_payload::KnownPayload;
 use crate::log_file::{Interruption, LogFile, Progress, reading};
 use crate::{Fold, IdentificationError};
 use phiw_dynamics::Tree;
@@ -19,6 +20,8 @@ pub struct LogSet {
     surveys: Vec<Survey>,
     train: usize,
     conditioning: Conditioning,
+    /// What the robot held in each log.
+    payloads: Vec<Option<KnownPayload>>,
     interruption: Interruption,
 }
 
@@ -92,6 +95,8 @@ impl LogSet {
             interruption.check()?;
             phiw_telemetry::survey(source, &joints, torque, &mut report)
         };
+        let payloads = train.iter().chain(&validate).map(|source| KnownPayload::of(tree, source));
+        let payloads = payloads.collect::<Result<Vec<_>, LogError>>()?;
         let mut surveys =
             train.iter().chain(&validate).map(survey).collect::<Result<Vec<Survey>, LogError>>()?;
         phiw_telemetry::arrange_session(&mut surveys);
@@ -100,15 +105,20 @@ impl LogSet {
         let conditioning = Conditioning::choose(training, options)?;
         // Cut-offs that were told must fit the logs held out, too.
         held_out.iter().try_for_each(|survey| conditioning.plan(survey).map(drop))?;
-        Ok(LogSet { train: train.len(), conditioning, surveys, interruption })
+        Ok(LogSet { train: train.len(), conditioning, surveys, payloads, interruption })
     }
 
     /// The same logs, each row of which goes out.
     pub fn with_every_row(&self) -> Self {
         let mut conditioning = self.conditioning.clone();
         conditioning.options.decimation = Some(1);
-        let interruption = self.interruption.clone();
-        LogSet { conditioning, surveys: self.surveys.clone(), train: self.train, interruption }
+        LogSet {
+            surveys: self.surveys.clone(),
+            train: self.train,
+            conditioning,
+            payloads: self.payloads.clone(),
+            interruption: self.interruption.clone(),
+        }
     }
 
     /// All surveys: training logs, then those for validation.
@@ -192,8 +202,20 @@ impl LogSet {
 
     /// The logs as sources of blocks.
     pub fn sources<'a>(&'a self, progress: Progress<'a>) -> Vec<LogFile<'a>> {
-        let source = |survey| LogFile::new(survey, &self.conditioning, &self.interruption, progress);
-        self.surveys.iter().map(source).collect()
+        self.sources_conditioned(&self.conditioning, progress)
+    }
+
+    /// The same, conditioned in another way.
+    pub(crate) fn sources_conditioned<'a>(
+        &'a self,
+        conditioning: &'a Conditioning,
+        progress: Progress<'a>,
+    ) -> Vec<LogFile<'a>> {
+        let logs = self.surveys.iter().zip(&self.payloads);
+        logs.map(|(survey, payload)| {
+            LogFile::new(survey, conditioning, payload.as_ref(), &self.interruption, progress)
+        })
+        .collect()
     }
 }
 

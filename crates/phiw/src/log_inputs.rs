@@ -32,19 +32,13 @@ pub fn sources(logs: &[PathBuf], map: Option<&Arc<LogMap>>, given: &InMemory) ->
 
 /// Logs to train and to validate on: where the map gives stretches of a training log to validation, they are
 /// taken from it.
-///
-/// # Errors
-/// The map says that the robot held something, which the fit does not take into account.
 pub fn train_and_validate(
     train: &[PathBuf],
     validate: &[PathBuf],
     map: Option<&Arc<LogMap>>,
     given: &InMemory,
-) -> Result<[Vec<LogSource>; 2], Error> {
-    let Some(map) = map else { return Ok([sources(train, None, given), sources(validate, None, given)]) };
-    for log in train.iter().chain(validate) {
-        map.check_usable(log).map_err(LogError::from)?;
-    }
+) -> [Vec<LogSource>; 2] {
+    let Some(map) = map else { return [sources(train, None, given), sources(validate, None, given)] };
     let part = |log: &PathBuf, part| {
         let columns = given.logs.get(log).cloned();
         LogSource { part, columns, ..LogSource::mapped(log, Some(map.clone())) }
@@ -57,7 +51,25 @@ pub fn train_and_validate(
         true => part(log, LogPart::Validate),
         false => part(log, LogPart::All),
     }));
-    Ok([training, held_out])
+    [training, held_out]
+}
+
+/// Refuses logs of a robot that held something, where the robot alone is computed.
+///
+/// # Errors
+/// The map says so of one of them.
+pub fn without_payload(logs: &[PathBuf], map: Option<&Arc<LogMap>>) -> Result<(), Error> {
+    let Some(map) = map else { return Ok(()) };
+    match logs.iter().find(|log| map.facts(log).payload.is_some()) {
+        None => Ok(()),
+        Some(log) => {
+            let what = format!(
+                "the model is of the robot alone, which held something in {}; predict or simulate a log without a payload",
+                log.display()
+            );
+            Err(LogError::from(map.payload_error(what)).into())
+        }
+    }
 }
 
 /// What a map says of logs beside their columns.
@@ -78,10 +90,10 @@ pub fn said_of_logs(map: &LogMap, logs: &[PathBuf]) -> Vec<String> {
         match facts.payload {
             None => {}
             Some(Payload::UnknownButTheSame) => {
-                said.push(format!("{name}: an unknown payload, as the map says; a fit refuses it"));
+                said.push(format!("{name}: an unknown payload, as the map says; no fit takes it"));
             }
             Some(Payload::Known { link, mass_kg, .. }) => said.push(format!(
-                "{name}: a payload of {mass_kg} kg at `{link}`, as the map says; a fit refuses it"
+                "{name}: a payload of {mass_kg} kg at `{link}`, as the map says; its torques are taken off where a model is fitted"
             )),
         }
     }

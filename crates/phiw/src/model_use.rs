@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::arguments::InMemory;
-use crate::log_inputs::{read_map, sources};
+use crate::log_inputs::{read_map, sources, without_payload};
 use crate::model_file::ModelFile;
 use phiw_dynamics::Tree;
 use phiw_dynamics::urdf::{UrdfOptions, held_joints, read_urdf};
@@ -79,6 +79,7 @@ impl ModelUse {
         let held_before = model.held.iter().map(|(joint, _)| joint.as_str());
         let joints: Vec<String> = tree.joint_names().chain(held_before).map(str::to_owned).collect();
         let map = read_map(reading.map, &joints)?;
+        without_payload(reading.logs, map.as_ref())?;
         let logs = [sources(reading.logs, map.as_ref(), reading.in_memory), Vec::new()];
         let torque = if reading.complete { TorqueColumns::Required } else { TorqueColumns::Optional };
         let interruption = reading.in_memory.interruption.clone();

@@ -67,7 +67,7 @@ impl Session {
         };
         let map = read_map(arguments.map.as_deref(), &robot.all_joints())?;
         let given = &arguments.in_memory;
-        let logs = train_and_validate(&arguments.train, &arguments.validate, map.as_ref(), given)?;
+        let logs = train_and_validate(&arguments.train, &arguments.validate, map.as_ref(), given);
         let interruption = given.interruption.clone();
         let torque = TorqueColumns::Required;
         let logs = LogSet::surveyed(&robot.tree, logs, torque, &options, interruption, progress)?;

@@ -2,8 +2,8 @@
 
 use crate::session::Session;
 use phiw_identification::Identified;
-use phiw_telemetry::Survey;
 use phiw_telemetry::segments::GapReason;
+use phiw_telemetry::{Payload, Survey};
 use std::path::Path;
 
 /// All warnings: about the logs and the URDF, then about the fit.
@@ -120,6 +120,13 @@ pub fn of_log(survey: &Survey) -> Vec<String> {
         }
     };
     let mut warnings: Vec<String> = survey.notes.iter().map(|note| format!("{name}: {note}")).collect();
+    if let Some(map) = &survey.source.map
+        && let Some(Payload::Known { link, mass_kg, .. }) = map.facts(&survey.path).payload
+    {
+        warnings.push(format!(
+            "{name}: the torques of a payload of {mass_kg} kg at `{link}`, a point mass, are taken off those that were measured"
+        ));
+    }
     warnings.extend(survey.gaps.iter().map(gap));
     if survey.short_segments > 0 {
         warnings

@@ -172,7 +172,7 @@ fn stretches_of_a_map_are_what_is_fitted_and_validated() {
 }
 
 #[test]
-fn a_payload_that_no_fit_uses_is_refused_and_not_ignored() {
+fn an_unknown_payload_is_refused_and_not_ignored() {
     let folder = folder();
     std::fs::write(folder.path().join("log.csv"), synthetic::csv(&synthetic::recording(1, 15.0))).unwrap();
     let map = "[[log]]\nfile = \"l*\"\npayload = \"unknown but the same\"\n";
@@ -184,6 +184,38 @@ fn a_payload_that_no_fit_uses_is_refused_and_not_ignored() {
     assert!(!folder.path().join("a").exists());
     let (status, stdout, _) = run("check --urdf robot.urdf log.csv --map map.toml", folder.path());
     assert!(status == 0 && stdout.contains("payload"), "{stdout}");
+}
+
+/// The robot with 2 kg at its last link is another robot; with the map it is the robot again.
+#[test]
+fn a_payload_that_was_weighed_is_taken_off() {
+    let folder = folder();
+    let mass = "<origin xyz=\"0.15 -0.02 0.02\"/><mass value=\"1.5\"/>";
+    assert!(synthetic::URDF.contains(mass));
+    // A point mass at the centre of the link's mass leaves the inertia about it.
+    let loaded = synthetic::URDF.replace(mass, &mass.replace("1.5\"", "3.5\""));
+    let recording = synthetic::recording_of(&loaded, 1, 30.0);
+    std::fs::write(folder.path().join("loaded.csv"), synthetic::csv(&recording)).unwrap();
+    std::fs::write(folder.path().join("free.csv"), synthetic::csv(&synthetic::recording(2, 30.0))).unwrap();
+    let payload = "payload = { link = \"link_3\", mass_kg = 2.0, com_m = [0.15, -0.02, 0.02] }";
+    let map = format!("[[log]]\nfile = \"loaded.csv\"\n{payload}\n");
+    std::fs::write(folder.path().join("map.toml"), &map).unwrap();
+    let logs = "identify --urdf robot.urdf --declare viscous_friction --train loaded.csv --validate free.csv";
+    let without = report(&format!("{logs} --out a"), folder.path());
+    let with = report(&format!("{logs} --map map.toml --out b"), folder.path());
+    let error = |report: &Value| report.pointer("/before/validate/relative").and_then(Value::as_f64).unwrap();
+    assert!(error(&without) > 5.0 * error(&with), "{} and {}", error(&without), error(&with));
+    assert_eq!(with["verdict"], "sufficient");
+    // A model is of the robot alone.
+    let (status, _, stderr) =
+        run("predict --model b/model.json loaded.csv --map map.toml --out p.csv", folder.path());
+    assert!(status == 2 && stderr.contains("line 3, key `log.payload`"), "{stderr}");
+    std::fs::write(folder.path().join("map.toml"), map.replace("link_3", "tool")).unwrap();
+    let (status, _, stderr) = run(&format!("{logs} --map map.toml --out c"), folder.path());
+    assert!(
+        status == 2 && stderr.contains("`tool`") && stderr.contains("link_1, link_2, link_3"),
+        "{stderr}"
+    );
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::{BandwidthSettings, beginnings};
 use crate::log_file::LogFile;
 use crate::{BlockSource, Fold, IdentificationError, LogSet, Progress};
 use phiw_telemetry::filter::ParallelFilter;
-use phiw_telemetry::{Block, LogError};
+use phiw_telemetry::{Block, LogError, Survey};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -28,9 +28,10 @@ impl Stretches {
         let mut conditioning = logs.conditioning().clone();
         conditioning.parallel_cutoff_hz = lowest_hz;
         conditioning.options.parallel_cutoff_hz = Some(lowest_hz);
-        let read = |survey| {
+        let sources = logs.sources_conditioned(&conditioning, progress);
+        let read = |(survey, source): (&Survey, &LogFile<'_>)| {
             let mut blocks = Vec::new();
-            LogFile::new(survey, &conditioning, logs.interruption(), progress).blocks(&mut |block| {
+            source.blocks(&mut |block| {
                 let (Some(&first), Some(&last)) = (block.t.first(), block.t.last()) else { return };
                 let touched = |fold: &Fold| fold.log == block.log && fold.start <= last && first < fold.end;
                 if folds.iter().any(touched) {
@@ -39,7 +40,8 @@ impl Stretches {
             })?;
             Ok((survey.period, blocks))
         };
-        let logs = logs.training().iter().map(read).collect::<Result<_, IdentificationError>>()?;
+        let logs =
+            logs.training().iter().zip(&sources).map(read).collect::<Result<_, IdentificationError>>()?;
         Ok(Stretches { folds, logs })
     }
 

@@ -98,20 +98,10 @@ impl LogMap {
         Ok(())
     }
 
-    /// Checks that a fit takes into account all that the map says of a log.
-    ///
-    /// # Errors
-    /// The map says that the robot held something.
-    pub fn check_usable(&self, log: &Path) -> Result<(), MapError> {
-        if self.facts(log).payload.is_none() {
-            return Ok(());
-        }
+    /// What is wrong with the payloads that it names.
+    pub fn payload_error(&self, what: impl Into<String>) -> MapError {
         let at = self.text.find("payload").unwrap_or(0);
-        let what = format!(
-            "a fit does not take a payload into account yet; fix the body to its link in the URDF of {}, or leave the log out",
-            log.display()
-        );
-        Err(MapError::new(&self.path, &self.text, at, "log.payload", what))
+        MapError::new(&self.path, &self.text, at, "log.payload", what)
     }
 
     /// What the map says of one log, by its name.
