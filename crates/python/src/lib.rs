@@ -5,6 +5,7 @@ mod batch;
 mod examples;
 mod factor;
 mod hold;
+mod kernel;
 mod robot;
 mod session;
 mod work;

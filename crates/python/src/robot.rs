@@ -1,14 +1,14 @@
 //! `phiw.Robot`: a robot from its URDF, and its dynamics over batches of states.
 
 use crate::arrays::{Array, Doubles, Pickled, States, array, same_count};
-use crate::batch::{LANES, Lane, over_states, put};
+use crate::batch::{LANES, Lane, put};
 use crate::hold::hold;
-use numpy::{PyArrayMethods, PyUntypedArrayMethods};
+use crate::kernel::{over_arrays, wrong_size};
 use phiw_dynamics::inertia::PARAMETER_NAMES;
 use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
 use phiw_dynamics::scalar::Lanes;
 use phiw_dynamics::urdf::{UrdfOptions, UrdfReading, read_urdf};
-use phiw_dynamics::{DimensionError, JointLimits, JointType, Tree, Workspace};
+use phiw_dynamics::{JointLimits, JointType, Tree, Workspace};
 use phiw_limits::Limits;
 use phiw_regressor::{BaseParameters, BaseParametersOptions, JointTorqueRegressor};
 use pulp::Arch;
@@ -182,7 +182,7 @@ impl Robot {
     ) -> PyResult<Array<'py>> {
         let dof = self.tree.velocity_size();
         let motion = self.motion(q, ("qd", qd), ("qdd", qdd))?;
-        self.batch(
+        over_arrays(
             py,
             motion,
             (&[dof], out),
@@ -223,7 +223,7 @@ impl Robot {
     ) -> PyResult<Array<'py>> {
         let dof = self.tree.velocity_size();
         let motion = self.motion(q, ("qd", qd), ("tau", tau))?;
-        self.batch(
+        over_arrays(
             py,
             motion,
             (&[dof], out),
@@ -262,7 +262,7 @@ impl Robot {
     ) -> PyResult<Array<'py>> {
         let dof = self.tree.velocity_size();
         let q = [States::of(q, "q", self.tree.configuration_size())?];
-        self.batch(
+        over_arrays(
             py,
             q,
             (&[dof, dof], out),
@@ -305,7 +305,7 @@ impl Robot {
         let (rows, columns) = (self.regressor.rows(), self.regressor.columns());
         let motion = self.motion(q, ("qd", qd), ("qdd", qdd))?;
         let scratch = || (self.regressor.scratch(), vec![Lanes([0.0; LANES]); self.regressor.buffer_size()]);
-        self.batch(py, motion, (&[rows, columns], out), scratch, |(scratch, pairs), [q, v, a], outputs| {
+        over_arrays(py, motion, (&[rows, columns], out), scratch, |(scratch, pairs), [q, v, a], outputs| {
             self.regressor.compute_lanes(&self.tree, q, v, a, scratch, pairs)?;
             for (lane, phi) in outputs.chunks_exact_mut(rows * columns).enumerate() {
                 self.scatter(pairs, lane, phi);
@@ -417,44 +417,6 @@ impl Robot {
         (Workspace::new(&self.tree), vec![Lanes([0.0; LANES]); outputs])
     }
 
-    /// Runs a kernel over states without Python's lock; its results have `shape` for each state, and go into
-    /// `out` if that is given.
-    fn batch<'py, S: Send, const K: usize>(
-        &self,
-        py: Python<'py>,
-        states: [States<'py>; K],
-        (shape, out): (&[usize], Option<Array<'py>>),
-        scratch: impl Fn() -> S + Send + Sync,
-        kernel: impl Fn(&mut S, [&[Lane]; K], &mut [f64]) -> Result<(), DimensionError> + Send + Sync,
-    ) -> PyResult<Array<'py>> {
-        let count = states[0].count;
-        let mut inputs: [(&[f64], usize); K] = [(&[], 0); K];
-        for (input, states) in inputs.iter_mut().zip(&states) {
-            *input = (states.as_slice()?, states.width);
-        }
-        let width = shape.iter().product();
-        let shape: Vec<usize> = count.into_iter().chain(shape.iter().copied()).collect();
-        let Some(out) = out else {
-            let mut outputs = vec![0.0; count.unwrap_or(1) * width];
-            py.detach(|| over_states(inputs, width, &mut outputs, scratch, kernel)).map_err(wrong_size)?;
-            return array(py, outputs, &shape);
-        };
-        if out.shape() != shape {
-            let message = format!("out has the shape {:?}, but the result has {shape:?}", out.shape());
-            return Err(PyValueError::new_err(message));
-        }
-        let unusable = |why: String| PyValueError::new_err(format!("out cannot be written to: {why}"));
-        // A slice of numbers in Fortran's order would be had, too.
-        if !out.is_c_contiguous() {
-            return Err(unusable("it is not contiguous in C's order".to_owned()));
-        }
-        let mut written = out.try_readwrite().map_err(|error| unusable(error.to_string()))?;
-        let outputs = written.as_slice_mut().map_err(|error| unusable(error.to_string()))?;
-        py.detach(|| over_states(inputs, width, outputs, scratch, kernel)).map_err(wrong_size)?;
-        drop(written);
-        Ok(out)
-    }
-
     /// The dense regressor of one of the states side by side.
     fn scatter(&self, pairs: &[Lane], lane: usize, phi: &mut [f64]) {
         phi.fill(0.0);
@@ -467,8 +429,4 @@ impl Robot {
             }
         }
     }
-}
-
-fn wrong_size(error: DimensionError) -> PyErr {
-    PyValueError::new_err(error.to_string())
 }

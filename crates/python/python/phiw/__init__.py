@@ -5,7 +5,8 @@ All units are SI: rad, m, s, kg, N, N·m. A log is a path, a dict of arrays or a
 
 from . import examples
 from ._phiw import Factor, InputError, PhiwError, Robot
-from .results import Check, Effect, Errors, NextMotion, Prediction, Result, Retargeted, TorqueErrors, load
+from .outcomes import Check, NextMotion, Retargeted
+from .results import Effect, Errors, Prediction, Result, TorqueErrors, load
 from .sessions import check, explain, identify, next_motion, predict, retarget
 
 __all__ = [

@@ -13,7 +13,8 @@ import numpy as np
 from . import _phiw
 from ._phiw import InputError, Robot
 from .logs import Log, taken_logs
-from .results import Check, NextMotion, Prediction, Result, Retargeted, model_text
+from .outcomes import Check, NextMotion, Retargeted
+from .results import Prediction, Result, model_text
 
 #: Is called now and then with what is being done, how much of it is done, and how much there is.
 Progress = Callable[[str, int, int], Any]
