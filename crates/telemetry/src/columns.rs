@@ -1,10 +1,11 @@
 //! From a header line to the columns that are used.
 
 use crate::LogError;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Whether a log must have torque columns (`tau.<joint>`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum TorqueColumns {
     /// Every joint needs one.
     Required,
