@@ -95,6 +95,18 @@ impl LogSet {
         Ok(LogSet { train: train.len(), conditioning, surveys })
     }
 
+    /// Logs that were surveyed and conditioned before, the first `train` of them to fit.
+    pub fn of_surveys(surveys: Vec<Survey>, train: usize, conditioning: Conditioning) -> Self {
+        LogSet { train: train.min(surveys.len()), surveys, conditioning }
+    }
+
+    /// Reads a log from another place from now on; its content must be the same.
+    pub fn set_path(&mut self, log: usize, path: &Path) {
+        if let Some(survey) = self.surveys.get_mut(log) {
+            survey.path = path.to_owned();
+        }
+    }
+
     /// The same logs, each row of which goes out.
     pub fn with_every_row(&self) -> Self {
         let mut conditioning = self.conditioning.clone();

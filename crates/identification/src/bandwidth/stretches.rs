@@ -1,10 +1,9 @@
 //! The training motion that cut-offs are compared on, in memory, to be filtered with any of them.
 
-use super::{BandwidthSettings, beginnings};
 use crate::log_set::LogFile;
-use crate::{BlockSource, Fold, IdentificationError, LogSet, Progress};
+use crate::{BlockSource, Fold, IdentificationError, Progress};
 use phiw_telemetry::filter::ParallelFilter;
-use phiw_telemetry::{Block, LogError};
+use phiw_telemetry::{Block, Conditioning, LogError, Survey};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -16,19 +15,18 @@ pub struct Stretches {
 }
 
 impl Stretches {
-    /// Reads the training logs once. `lowest_hz` is the lowest cut-off that the blocks will be filtered with.
+    /// Reads training logs once. `lowest_hz` is the lowest cut-off that the blocks will be filtered with.
     pub fn read(
-        logs: &LogSet,
+        folds: Vec<Fold>,
+        surveys: &[Survey],
+        conditioning: &Conditioning,
         lowest_hz: f64,
-        settings: &BandwidthSettings,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
-        let rates: Vec<f64> = logs.training().iter().map(|survey| survey.rate_hz()).collect();
-        let folds = beginnings(&logs.training_folds(), &rates, settings);
-        let mut conditioning = logs.conditioning().clone();
+        let mut conditioning = conditioning.clone();
         conditioning.parallel_cutoff_hz = lowest_hz;
         conditioning.options.parallel_cutoff_hz = Some(lowest_hz);
-        let read = |survey| {
+        let read = |survey: &Survey| {
             let mut blocks = Vec::new();
             LogFile::new(survey, &conditioning, progress).blocks(&mut |block| {
                 let (Some(&first), Some(&last)) = (block.t.first(), block.t.last()) else { return };
@@ -39,7 +37,7 @@ impl Stretches {
             })?;
             Ok((survey.period, blocks))
         };
-        let logs = logs.training().iter().map(read).collect::<Result<_, IdentificationError>>()?;
+        let logs = surveys.iter().map(read).collect::<Result<_, IdentificationError>>()?;
         Ok(Stretches { folds, logs })
     }
 
