@@ -1,8 +1,11 @@
 //! The command line.
 
 pub use crate::export::ExportArguments;
+use crate::fleet::{MergeArguments, PlanArguments, ReduceArguments};
 pub use crate::simulate::Backend;
-use clap::{Args, Parser, Subcommand};
+use clap::error::Error as ClapError;
+use clap::{Arg, ArgAction, ArgMatches, Args, FromArgMatches, Parser, Subcommand, value_parser};
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// What was asked for.
@@ -41,6 +44,11 @@ pub enum Command {
     /// Choose the motion that a real robot should run next, given what has been measured: one iteration of
     /// the curriculum.
     Next(NextArguments),
+    /// Decide over all logs what `phiw reduce` and `phiw identify --plan` need to work on each log by itself,
+    /// on as many machines as one likes.
+    Plan(PlanArguments),
+    /// Reduce logs of a plan to their factors, which are all that `phiw identify --plan` needs of them.
+    Reduce(ReduceArguments),
 }
 
 impl Command {
@@ -55,16 +63,79 @@ impl Command {
             Command::Check(check) => check.quiet,
             Command::Retarget(retarget) => retarget.quiet,
             Command::Next(next) => next.quiet,
+            Command::Plan(plan) => plan.quiet,
+            Command::Reduce(reduce) => reduce.quiet,
         }
     }
 }
 
-/// Arguments of `phiw identify`.
-#[derive(Debug, Args)]
+/// Arguments of `phiw identify`: a session on logs, or the plan of one and the factors of its logs.
+#[derive(Debug)]
 pub struct IdentifyArguments {
-    /// Robot, logs and declared model.
-    #[command(flatten)]
+    /// Robot, logs and declared model; with a plan, only where the results go.
     pub session: SessionArguments,
+    /// A plan and factors in the place of robot and logs.
+    pub merge: Option<MergeArguments>,
+}
+
+impl Args for IdentifyArguments {
+    fn augment_args(command: clap::Command) -> clap::Command {
+        let paths = |name: &'static str| Arg::new(name).long(name).value_parser(value_parser!(PathBuf));
+        let elsewhere = [
+            "urdf",
+            "train",
+            "validate",
+            "declare",
+            "hold",
+            "mass",
+            "total_mass",
+            "cutoff_hz",
+            "parallel_cutoff_hz",
+        ];
+        SessionArguments::augment_args(command)
+            .mut_arg("urdf", |urdf| urdf.required(false).required_unless_present("plan"))
+            .mut_arg("train", |train| train.required(false).required_unless_present("plan"))
+            .arg(
+                paths("plan")
+                    .value_name("PLAN.json")
+                    .requires("factors")
+                    .conflicts_with_all(elsewhere)
+                    .help("A plan of `phiw plan` instead of robot and logs, which it names"),
+            )
+            .arg(
+                paths("factors")
+                    .value_name("SHARD.factor")
+                    .num_args(1..)
+                    .action(ArgAction::Append)
+                    .requires("plan")
+                    .help("The factors of all logs of the plan, as `phiw reduce` has written them"),
+            )
+    }
+
+    fn augment_args_for_update(command: clap::Command) -> clap::Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for IdentifyArguments {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, ClapError> {
+        let Some(plan) = matches.get_one::<PathBuf>("plan") else {
+            return Ok(IdentifyArguments {
+                session: SessionArguments::from_arg_matches(matches)?,
+                merge: None,
+            });
+        };
+        let factors = matches.get_many("factors").map(|paths| paths.cloned().collect()).unwrap_or_default();
+        let out: PathBuf = matches.get_one("out").cloned().unwrap_or_default();
+        let session =
+            SessionArguments { out: out.clone(), quiet: matches.get_flag("quiet"), ..Default::default() };
+        Ok(IdentifyArguments { session, merge: Some(MergeArguments { plan: plan.clone(), factors, out }) })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), ClapError> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
 }
 
 /// Arguments of `phiw explain`.
@@ -291,7 +362,7 @@ pub enum Derivatives {
 }
 
 /// Robot, logs and declared model: what every command on measured logs takes.
-#[derive(Clone, Debug, Default, Args)]
+#[derive(Clone, Debug, Default, Args, Serialize, Deserialize)]
 pub struct SessionArguments {
     /// The robot's URDF.
     #[arg(long, value_name = "ROBOT.urdf")]
@@ -370,7 +441,7 @@ impl SessionArguments {
 }
 
 /// `JOINT` or `JOINT=VALUE`.
-fn held_joint(text: &str) -> Result<(String, f64), String> {
+pub(crate) fn held_joint(text: &str) -> Result<(String, f64), String> {
     let (joint, value) = text.split_once('=').unwrap_or((text, "0"));
     let joint = joint.trim();
     if joint.is_empty() {
@@ -383,7 +454,7 @@ fn held_joint(text: &str) -> Result<(String, f64), String> {
 }
 
 /// `LINK=KG`.
-fn known_mass(text: &str) -> Result<(String, f64), String> {
+pub(crate) fn known_mass(text: &str) -> Result<(String, f64), String> {
     let Some((link, mass)) = text.split_once('=') else {
         return Err(format!("write LINK=KG, for example {text}=2.5"));
     };
@@ -399,7 +470,7 @@ fn share(text: &str) -> Result<f64, String> {
 }
 
 /// A number above zero.
-fn positive(text: &str) -> Result<f64, String> {
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
         _ => Err(format!("`{text}` is not a number above zero")),
@@ -449,6 +520,25 @@ mod tests {
              --declare viscous_friction,torque_offset --hold finger,torso=-0.25 --cutoff-hz 12.5 --out out"
         );
         assert_eq!(read.session.hold, [("finger".to_owned(), 0.0), ("torso".to_owned(), -0.25)]);
+    }
+
+    #[test]
+    fn a_plan_takes_the_place_of_robot_and_logs() {
+        let plan =
+            ["phiw", "identify", "--plan", "p.json", "--factors", "a.factor", "b.factor", "--out", "o"];
+        let Command::Identify(read) = Arguments::try_parse_from(plan).unwrap().command else {
+            panic!("`identify` is read as another command");
+        };
+        let merge = read.merge.unwrap();
+        assert_eq!(merge.factors, ["a.factor", "b.factor"].map(PathBuf::from));
+        assert_eq!((merge.plan, merge.out), ("p.json".into(), "o".into()));
+        for wrong in [&["--urdf", "r.urdf"][..], &["--train", "a.csv"], &["--declare", "viscous_friction"]] {
+            assert!(Arguments::try_parse_from(plan.iter().chain(wrong)).is_err(), "{wrong:?}");
+        }
+        let without = |name: &str| plan.iter().filter(move |word| **word != name);
+        assert!(Arguments::try_parse_from(without("--factors")).is_err());
+        assert!(Arguments::try_parse_from(["phiw", "identify", "--plan", "p.json", "--out", "o"]).is_err());
+        assert!(Arguments::try_parse_from(["phiw", "identify", "--train", "a.csv", "--out", "o"]).is_err());
     }
 
     #[test]

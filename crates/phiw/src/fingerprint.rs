@@ -29,7 +29,10 @@ pub fn of_session(session: &Session) -> Result<Vec<DataFingerprint>, Error> {
 }
 
 /// The hash of a file's bytes, in hexadecimal digits.
-fn sha256(path: &Path) -> Result<String, Error> {
+///
+/// # Errors
+/// The file cannot be read.
+pub fn sha256(path: &Path) -> Result<String, Error> {
     let unreadable = |source| Error::Unreadable { path: path.to_owned(), source };
     let mut hasher = Hasher(Sha256::new());
     io::copy(&mut File::open(path).map_err(unreadable)?, &mut hasher).map_err(unreadable)?;

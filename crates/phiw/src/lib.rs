@@ -14,6 +14,7 @@ mod explain_page;
 pub mod export;
 mod exported;
 mod fingerprint;
+pub mod fleet;
 mod generated_code;
 mod held_out_reproduction;
 mod identified_mjcf;

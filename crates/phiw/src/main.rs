@@ -57,7 +57,10 @@ fn told(command: &Command, console: &Console) -> Result<Told, Error> {
     let no_failures = Vec::new();
     Ok(match command {
         Command::Identify(arguments) => {
-            let outcome = phiw::identify::identify(&arguments.session, console)?;
+            let outcome = match &arguments.merge {
+                Some(merge) => phiw::fleet::merge(merge, console)?,
+                None => phiw::identify::identify(&arguments.session, console)?,
+            };
             Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
         }
         Command::Explain(arguments) => {
@@ -84,6 +87,14 @@ fn told(command: &Command, console: &Console) -> Result<Told, Error> {
             let outcome = phiw::retarget::retarget(arguments, console)?;
             let failures = outcome.failures.iter().map(|failure| failure.reason.to_string()).collect();
             Told { summary: outcome.summary, warnings: outcome.warnings, failures }
+        }
+        Command::Plan(arguments) => {
+            let outcome = phiw::fleet::plan(arguments, console)?;
+            Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
+        }
+        Command::Reduce(arguments) => {
+            let outcome = phiw::fleet::reduce(arguments, console)?;
+            Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
         }
         Command::Next(arguments) => {
             let outcome = phiw::next::next(arguments, console)?;
