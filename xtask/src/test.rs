@@ -63,13 +63,9 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if !run_tests(&consumers, &mut tally)? {
         failed.push(named(&consumers));
     }
-    for problem in &failed {
-        println!("failed: {problem}");
-    }
+    failed.iter().for_each(|problem| println!("failed: {problem}"));
     if unchecked_dependencies {
-        println!(
-            "skipped: cargo-deny is not installed: licences, duplicates and sources of dependencies are unchecked"
-        );
+        println!("skipped: cargo-deny is not installed: licences and sources of dependencies unchecked");
     }
     println!("{tally}");
     Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })

@@ -535,8 +535,6 @@ mod tests {
         for wrong in [&["--urdf", "r.urdf"][..], &["--train", "a.csv"], &["--declare", "viscous_friction"]] {
             assert!(Arguments::try_parse_from(plan.iter().chain(wrong)).is_err(), "{wrong:?}");
         }
-        let without = |name: &str| plan.iter().filter(move |word| **word != name);
-        assert!(Arguments::try_parse_from(without("--factors")).is_err());
         assert!(Arguments::try_parse_from(["phiw", "identify", "--plan", "p.json", "--out", "o"]).is_err());
         assert!(Arguments::try_parse_from(["phiw", "identify", "--train", "a.csv", "--out", "o"]).is_err());
     }
