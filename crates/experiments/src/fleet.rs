@@ -70,7 +70,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
     for (threads, out) in [(1, "one_thread"), (threads, "one")] {
         let seconds = fleet.identify(threads, out)?;
         let same = if out == "one" { fleet.same(out, "one_thread")? } else { "" };
-        println!("| one process, {threads} threads | | | | {seconds:.1} s | {same} |");
+        println!("| one process, threads: {threads} | | | | {seconds:.1} s | {same} |");
     }
     let begin = Instant::now();
     fleet.plan()?;
@@ -79,7 +79,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
         let begin = Instant::now();
         fleet.reduce(processes)?;
         let reduced = begin.elapsed().as_secs_f64();
-        let row = format!("{processes} processes");
+        let row = format!("processes of one thread: {processes}");
         fleet.merge(&row, [planned, reduced], &fleet.factors(processes), &format!("merged_{processes}"))?;
     }
     if arguments.slurm {
@@ -91,7 +91,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
     if arguments.dask {
         let seconds = fleet.dask(&arguments.python)?;
         let same = fleet.same("dask", "one")?;
-        println!("| Dask, {threads} processes | | | | {seconds:.1} s | {same} |");
+        println!("| Dask, {threads} workers | | | | {seconds:.1} s | {same} |");
     }
     Ok(())
 }

@@ -75,14 +75,16 @@ fn check_names(files: &[PathBuf]) -> Result<(), Error> {
     Ok(())
 }
 
-/// The built-in map that names most markers of the first recording that can be read.
+/// The built-in map that names most markers of the first recording that can be read; the first of them where
+/// none can.
 fn default_map(files: &[PathBuf]) -> Result<MarkerMap, MapError> {
-    let (seated, embedded) = (MarkerMap::ue_adl()?, MarkerMap::embedded()?);
     // Only the names count here, whatever unit the numbers are in.
     let named = |file: &PathBuf| read_recording(file, Some("m")).ok();
     let recording = files.iter().find_map(named);
     let share = |map: &MarkerMap| recording.as_ref().map_or(0.0, |recording| share_named(map, recording));
-    Ok(if share(&embedded) > share(&seated) { embedded } else { seated })
+    let mut maps = MarkerMap::built_in()?.into_iter();
+    let first = maps.next().map_or_else(MarkerMap::ue_adl, Ok)?;
+    Ok(maps.fold(first, |best, map| if share(&map) > share(&best) { map } else { best }))
 }
 
 /// Share of a map's markers that a recording has.
