@@ -18,8 +18,8 @@ pub struct Array {
     pub values: Vec<f64>,
 }
 
-/// Reads an archive.
-pub(crate) struct Npz<'a> {
+/// An archive of arrays that is read.
+pub struct Npz<'a> {
     archive: ZipArchive<Cursor<&'a [u8]>>,
     /// Bytes that an array may have.
     most: u64,
@@ -27,6 +27,9 @@ pub(crate) struct Npz<'a> {
 
 impl<'a> Npz<'a> {
     /// An archive that is held in memory, whose arrays have at most `most` bytes each.
+    ///
+    /// # Errors
+    /// It is no whole archive.
     pub fn new(bytes: &'a [u8], most: u64) -> Result<Self, String> {
         let archive = ZipArchive::new(Cursor::new(bytes))
             .map_err(|error| format!("it is no whole npz ({error}); write it again with numpy.savez"))?;
@@ -40,6 +43,9 @@ impl<'a> Npz<'a> {
     }
 
     /// An array of numbers, if it is there.
+    ///
+    /// # Errors
+    /// It is damaged, too large, or does not hold numbers row by row.
     pub fn array(&mut self, name: &str) -> Result<Option<Array>, String> {
         let file = format!("{name}.npy");
         if !self.archive.file_names().flatten().any(|other| other == file) {

@@ -4,8 +4,10 @@ use crate::checks::{check_excitation, check_logs};
 use crate::{BlockSource, Fold, IdentificationError};
 use phiw_dynamics::Tree;
 use phiw_telemetry::{Block, Conditioning, ConditioningOptions, LogError, Survey, TorqueColumns};
+use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Stretches of time that the training logs are cut into: long against the residual's correlation, enough for
 /// a standard deviation.
@@ -80,12 +82,25 @@ impl LogSet {
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
         let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
-        let survey = |path: &PathBuf| {
-            let mut report = |done: u64, total: u64| progress(&reading("surveying", path), done, total);
+        let logs: Vec<&PathBuf> = train.iter().chain(validate).collect();
+        let what = match logs.as_slice() {
+            [path] => reading("surveying", path),
+            logs => format!("surveying {} logs", logs.len()),
+        };
+        // Bytes of each log: done, and in all.
+        let bytes: Vec<[AtomicU64; 2]> = logs.iter().map(|_| Default::default()).collect();
+        let sum = |which: usize| bytes.iter().map(|log| log[which].load(Ordering::Relaxed)).sum();
+        let survey = |(log, path): (usize, &&PathBuf)| {
+            let mut report = |done: u64, total: u64| {
+                bytes[log][0].store(done, Ordering::Relaxed);
+                bytes[log][1].store(total, Ordering::Relaxed);
+                progress(&what, sum(0), sum(1));
+            };
             phiw_telemetry::survey(path, &joints, torque, &mut report)
         };
-        let mut surveys =
-            train.iter().chain(validate).map(survey).collect::<Result<Vec<Survey>, LogError>>()?;
+        // Each log by itself; of several errors the first log's is told.
+        let surveys: Vec<Result<Survey, LogError>> = logs.par_iter().enumerate().map(survey).collect();
+        let mut surveys = surveys.into_iter().collect::<Result<Vec<Survey>, LogError>>()?;
         phiw_telemetry::arrange_session(&mut surveys);
         let (training, held_out) = surveys.split_at(train.len());
         check_logs(tree, training, held_out)?;

@@ -252,8 +252,8 @@ pub struct RetargetArguments {
     /// The robot's URDF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
-    /// Recordings: C3D, or CSV of named points (`t`, `<point>.x`, `<point>.y`, `<point>.z` in metres, or in
-    /// the map's `units`).
+    /// Recordings: C3D, TRC, BVH (LAFAN1), npz of AMASS or SMPL-X, or CSV of named points (`t`, `<point>.x`,
+    /// `<point>.y`, `<point>.z` in metres, or in the map's `units`).
     #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
     pub c3d: Vec<PathBuf>,
     /// Which marker sits where; by default the built-in map that names most markers of the recordings.
@@ -276,6 +276,9 @@ pub struct RetargetArguments {
     /// How velocities and accelerations come about.
     #[arg(long, value_enum, default_value_t = Derivatives::Analytic)]
     pub derivatives: Derivatives,
+    /// What a motion is written as.
+    #[arg(long, value_enum, default_value_t = MotionFormat::Csv)]
+    pub format: MotionFormat,
     /// Folder for the results; it is made if it is absent. What is done in it with the same settings is not
     /// done again.
     #[arg(long, value_name = "DIR")]
@@ -359,6 +362,26 @@ pub enum Derivatives {
     Analytic,
     /// Backward differences of the samples, as in the paper.
     BackwardDifferences,
+}
+
+/// What a motion is written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum MotionFormat {
+    /// A log without torques, as phiw reads it.
+    Csv,
+    /// NumPy arrays, as programs that learn to track motions read them: `fps`, `joint_pos`, `joint_vel`,
+    /// `body_pos_w`, `body_quat_w`, `body_lin_vel_w`, `body_ang_vel_w`, `joint_names`, `body_names`.
+    Npz,
+}
+
+impl MotionFormat {
+    /// How names of its files end.
+    pub fn extension(self) -> &'static str {
+        match self {
+            MotionFormat::Csv => "csv",
+            MotionFormat::Npz => "npz",
+        }
+    }
 }
 
 /// Robot, logs and declared model: what every command on measured logs takes.
