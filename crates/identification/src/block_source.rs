@@ -33,6 +33,25 @@ impl BlockSource for Vec<Block> {
     }
 }
 
+/// Every `n`-th block of a source: an even sample of a long log.
+pub struct EveryNth<'a> {
+    /// Where the blocks come from.
+    pub source: &'a dyn BlockSource,
+    /// One of so many is handed on, at least one.
+    pub n: usize,
+}
+
+impl BlockSource for EveryNth<'_> {
+    fn stream(&self, sink: &mut dyn FnMut(Block) -> ControlFlow<()>) -> Result<(), LogError> {
+        let mut count = 0;
+        self.source.stream(&mut |block| {
+            let is_its_turn = count % self.n.max(1) == 0;
+            count += 1;
+            if is_its_turn { sink(block) } else { ControlFlow::Continue(()) }
+        })
+    }
+}
+
 /// Hands the blocks of all sources to `take`, in order, up to the first that it fails on.
 ///
 /// # Errors

@@ -17,29 +17,27 @@ impl<'a> KeptBlocks<'a> {
     /// # Errors
     /// A log cannot be read.
     pub fn keep(sources: &[&'a dyn BlockSource], budget: usize) -> Result<Vec<Self>, IdentificationError> {
-        Self::keep_where(sources, budget, |_| true)
+        Self::keep_parts(sources, budget, |block| vec![block])
     }
 
-    /// The same for those blocks alone that are `wanted`: only they come again where they fit.
+    /// The same for `parts` of each block: only they come again where they fit.
     ///
     /// # Errors
     /// A log cannot be read.
-    pub fn keep_where(
+    pub fn keep_parts(
         sources: &[&'a dyn BlockSource],
         mut budget: usize,
-        wanted: impl Fn(&Block) -> bool,
+        parts: impl Fn(Block) -> Vec<Block>,
     ) -> Result<Vec<Self>, IdentificationError> {
         let mut all = Vec::with_capacity(sources.len());
         for &source in sources {
             let mut kept = Some(Vec::new());
             let mut used = 0;
             source.blocks(&mut |block| {
-                if !wanted(&block) {
-                    return;
-                }
-                used += size(&block);
+                let parts = parts(block);
+                used += parts.iter().map(size).sum::<usize>();
                 match &mut kept {
-                    Some(blocks) if used <= budget => blocks.push(block),
+                    Some(blocks) if used <= budget => blocks.extend(parts),
                     _ => kept = None,
                 }
             })?;

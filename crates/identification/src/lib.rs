@@ -33,7 +33,7 @@ pub mod shard;
 mod variants;
 
 pub use accumulate::Fold;
-pub use block_source::BlockSource;
+pub use block_source::{BlockSource, EveryNth};
 pub use design::Design;
 pub use effect::{Effect, EffectCatalogue, EffectSpec};
 pub use error::IdentificationError;

@@ -3,7 +3,7 @@
 use crate::analysis::Analysis;
 use crate::{Error, page as identified_page, possible_bodies};
 use phiw_effects::Signal;
-use phiw_identification::{Data, Design, predict};
+use phiw_identification::{BlockSource, Data, Design, EveryNth, predict};
 use phiw_report::IdentificationPage;
 use phiw_report::json::{UnidentifiableJson, Verdict};
 use phiw_report::number::percent;
@@ -15,6 +15,8 @@ use phiw_residual::trace::{self, FoundEffect, Ranked, Tracing};
 
 /// Points of a scatter; more would only blacken it.
 const POINTS: usize = 3000;
+/// Rows of the logs that scatters are drawn from, about; of longer ones an even sample.
+const SCATTERED_ROWS: u64 = 60_000;
 
 /// The page. `declared` is the model before anything was added, with its parameters.
 ///
@@ -41,9 +43,13 @@ pub fn page(
     page.errors.pooled.before = Some(tracing.before.1.relative);
     let declared = (declared.0.with_rest_speeds(data.rest_speeds.clone()), declared.1);
     let mut scatters = Scatters::new(analysis, tracing);
-    predict(&declared.0, &declared.1, &data.sources, &mut |prediction| scatters.add(0, prediction))?;
+    let rows: u64 = analysis.session.logs.surveys().iter().map(|survey| survey.rows).sum();
+    let n = (rows / SCATTERED_ROWS).max(1) as usize;
+    let sample: Vec<EveryNth<'_>> = data.sources.iter().map(|&source| EveryNth { source, n }).collect();
+    let sample: Vec<&dyn BlockSource> = sample.iter().map(|source| source as &dyn BlockSource).collect();
+    predict(&declared.0, &declared.1, &sample, &mut |prediction| scatters.add(0, prediction))?;
     let fitted = &tracing.model.fit.parameters;
-    predict(&tracing.model.design, fitted, &data.sources, &mut |prediction| scatters.add(1, prediction))?;
+    predict(&tracing.model.design, fitted, &sample, &mut |prediction| scatters.add(1, prediction))?;
     page.effects = tracing
         .effects
         .iter()

@@ -136,6 +136,37 @@ impl Block {
         Block { outputs, filter: filter.clone(), ..self.clone() }
     }
 
+    /// Blocks of those outputs alone whose time is `wanted`, one for each run of them, with no more samples
+    /// than they need: what the filter covers, and up to `warm_up` samples before. Filtered they are the same
+    /// as here.
+    pub fn narrowed(&self, warm_up: usize, wanted: impl Fn(f64) -> bool) -> Vec<Self> {
+        let is_wanted = |output: &usize| wanted(self.t[*output]);
+        let runs = self.outputs.chunk_by(|a, b| is_wanted(a) == is_wanted(b));
+        let runs = runs.filter(|run| run.first().is_some_and(is_wanted));
+        runs.filter_map(|run| self.cut(run, warm_up)).collect()
+    }
+
+    /// The samples that these of its outputs need.
+    fn cut(&self, outputs: &[usize], warm_up: usize) -> Option<Self> {
+        let reach = self.filter.half_length();
+        let covered = outputs.first()?.saturating_sub(reach).max(self.warm_up);
+        let start = covered.saturating_sub(warm_up);
+        let end = (outputs.last()? + reach + 1).min(self.len());
+        let of_joints = |values: &[f64]| values[start * self.joints..end * self.joints].to_vec();
+        Some(Block {
+            t: self.t[start..end].to_vec(),
+            q: of_joints(&self.q),
+            qd: of_joints(&self.qd),
+            qdd: of_joints(&self.qdd),
+            tau: if self.tau.is_empty() { Vec::new() } else { of_joints(&self.tau) },
+            temp: self.temp.as_deref().map(of_joints),
+            warm_up: covered - start,
+            outputs: outputs.iter().map(|output| output - start).collect(),
+            filter: Arc::clone(&self.filter),
+            ..*self
+        })
+    }
+
     /// The filter that goes over columns and torque.
     pub fn parallel_filter(&self) -> &ParallelFilter {
         &self.filter

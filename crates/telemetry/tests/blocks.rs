@@ -115,6 +115,35 @@ proptest! {
         }
     }
 
+    /// Long logs were searched in pieces of 5 s, but every block that a piece touched was worked on whole.
+    #[test]
+    fn parts_of_blocks_give_what_the_whole_gives_there_and_are_no_longer_than_they_need(
+        rows in 200usize..900,
+        gaps in prop::collection::vec(0usize..900, 0..4),
+        block_samples in 1usize..400,
+        warm_up in 0usize..20,
+        pieces in prop::collection::vec((0.0f64..1.0, 0.0f64..0.3), 1..4),
+    ) {
+        let recording = recording(rows, &gaps);
+        let options = ConditioningOptions {
+            cutoff_hz: Some(20.0), parallel_cutoff_hz: Some(8.0), block_samples, ..Default::default()
+        };
+        let Ok(blocks) = recording.blocks(&conditioning(&recording, options).0) else { return Ok(()) };
+        let times: Vec<f64> = blocks.iter().flat_map(|block| block.t.clone()).collect();
+        let (first, length) = (times[0], times[times.len() - 1] - times[0]);
+        let wanted = |t: f64| {
+            pieces.iter().any(|(start, part)| (start..&(start + part)).contains(&&((t - first) / length)))
+        };
+        let parts: Vec<Block> = blocks.iter().flat_map(|block| block.narrowed(warm_up, wanted)).collect();
+        let all = outputs(&blocks).into_iter().filter(|output| wanted(output.t)).collect::<Vec<_>>();
+        assert_same(&outputs(&parts), &all);
+        for part in &parts {
+            let reach = part.parallel_filter().half_length();
+            let span = part.outputs[part.outputs.len() - 1] - part.outputs[0];
+            prop_assert!(part.len() <= span + 2 * reach + 1 + warm_up);
+        }
+    }
+
     #[test]
     fn another_filter_gives_what_conditioning_with_it_gives(
         rows in 200usize..900,

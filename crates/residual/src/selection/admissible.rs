@@ -45,7 +45,7 @@ impl Search<'_> {
             let mut members = std::mem::take(&mut model.members);
             let present = |member: &Member| self.model.members.iter().position(|other| other == member);
             members.sort_by_key(|member| present(member).unwrap_or(place));
-            *model = self.within_bounds(members, start);
+            *model = self.within_bounds(members, &model.fit);
         });
         models.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
         models

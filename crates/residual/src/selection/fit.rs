@@ -1,5 +1,6 @@
 //! A weighted fit of some parameters, from products.
 
+use super::cholesky::{factor_rows, substitute};
 use super::problem::{Problem, Torque};
 use std::ops::Range;
 
@@ -10,8 +11,8 @@ const DEPENDENT: f64 = 1e-10;
 pub(super) const ABSORBED: f64 = 4e-6;
 /// Times that the weights are renewed from the residual.
 const ITERATIONS: usize = 4;
-/// Weights that change by less are settled.
-const SETTLED: f64 = 1e-3;
+/// Weights that change by less are settled: the criterion changes by the square of that for each parameter.
+const SETTLED: f64 = 1e-2;
 
 /// The least-squares fit with each torque weighted by its effective rows over its residual: the smallest Σ
 /// n_e·log(rss).
@@ -250,7 +251,10 @@ impl Fit {
                 }
             }
         }
-        self.factor(system, kept, problem.model.len());
+        let model = problem.model.len();
+        let least = |row: usize| if row < model { DEPENDENT } else { ABSORBED };
+        factor_rows(&mut system, kept, &mut self.determined, least);
+        self.triangle = system;
         self.half = self.forward(&right);
         let solution = self.backward(self.half.clone());
         self.values.clone_from(&problem.absent);
@@ -259,57 +263,11 @@ impl Fit {
         }
     }
 
-    /// Cholesky's factor of the system, whose first `kept` rows have it already; columns of which nothing is
-    /// left are passed over.
-    fn factor(&mut self, mut system: Vec<f64>, kept: usize, model: usize) {
-        pulp::Arch::new().dispatch(|| self.factor_rows(&mut system, kept, model));
-        self.triangle = system;
-    }
-
-    #[inline(always)]
-    fn factor_rows(&mut self, system: &mut [f64], kept: usize, model: usize) {
-        let size = self.active.len();
-        for row in kept..size {
-            let (before, rest) = system.split_at_mut(row * size);
-            let own = &mut rest[..size];
-            let norm = own[row];
-            for column in 0..row {
-                own[column] = match self.determined[column] {
-                    true => {
-                        let other = &before[column * size..column * size + column + 1];
-                        (own[column] - dot(&own[..column], &other[..column])) / other[column]
-                    }
-                    false => 0.0,
-                };
-            }
-            let left = norm - dot(&own[..row], &own[..row]);
-            let least = if row < model { DEPENDENT } else { ABSORBED };
-            self.determined[row] = left > least * norm && left > 0.0;
-            if self.determined[row] {
-                own[row] = left.sqrt();
-            } else {
-                own[..row].fill(0.0);
-                own[row] = 1.0;
-            }
-        }
-    }
-
     /// L⁻¹·x.
     pub fn forward(&self, x: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; self.active.len()];
-        pulp::Arch::new().dispatch(|| self.forward_rows(x, &mut y));
+        substitute(&self.triangle, &self.determined, x, &mut y);
         y
-    }
-
-    #[inline(always)]
-    fn forward_rows(&self, x: &[f64], y: &mut [f64]) {
-        let size = self.active.len();
-        for row in 0..size {
-            if self.determined[row] {
-                let own = &self.triangle[row * size..row * size + row + 1];
-                y[row] = (x[row] - dot(&own[..row], &y[..row])) / own[row];
-            }
-        }
     }
 
     /// L⁻ᵀ·y.
@@ -352,7 +310,13 @@ pub(super) fn dot(left: &[f64], right: &[f64]) -> f64 {
             sums[lane] += a[lane] * b[lane];
         }
     }
-    sums.iter().sum::<f64>() + rest
+    // Halved and halved again: as one chain the sixteen additions would take longer than all before them.
+    for half in [8, 4, 2, 1] {
+        for lane in 0..half {
+            sums[lane] += sums[lane + half];
+        }
+    }
+    sums[0] + rest
 }
 
 /// (Z_oo)⁻¹·x for some places o, from their columns of Z, by Cholesky's factor of the small block.

@@ -10,6 +10,7 @@
 
 mod admissible;
 mod anew;
+mod cholesky;
 mod criterion;
 mod cross_validation;
 mod design_effect;
@@ -29,5 +30,5 @@ pub(crate) use distribution::students_tail;
 pub(crate) use fit::Fit;
 pub(crate) use problem::{Hypothesis, Member, Prior, Problem, Torque, Variant};
 pub(crate) use products::Products;
-pub(crate) use search::{Policy, choose_variants, select, value};
+pub(crate) use search::{LEAST_STEP, Policy, choose_variants, select, value};
 pub(crate) use wald::certainty;

@@ -46,6 +46,8 @@ pub(crate) struct Outcome {
 pub(crate) struct Variants {
     pub members: Vec<Member>,
     pub fit: Fit,
+    /// By how much the criterion is smaller than with those of the start.
+    pub gained: f64,
 }
 
 /// A model on its way.
@@ -68,6 +70,8 @@ pub(super) struct Search<'a> {
     pub model: Model,
 }
 
+/// Members whose replacements are looked at together.
+const LOOKED_AT_TOGETHER: usize = 8;
 /// Sweeps of swaps; each accepts whatever is better.
 const SWEEPS: usize = 4;
 /// Times that the effective rows are renewed while effects are added: the more is explained, the less
@@ -76,7 +80,7 @@ const FORWARD_PHASES: usize = 4;
 /// Times that forward, prune and swap follow each other.
 const ROUNDS: usize = 6;
 /// The criterion must fall by this much for a step: less says nothing.
-pub(super) const LEAST_STEP: f64 = 0.5;
+pub(crate) const LEAST_STEP: f64 = 0.5;
 /// By how much, and by which share, a hypothesis may gain less than the member whose place it would take, to
 /// first order, and still be fitted in full.
 pub(super) const NEAR: (f64, f64) = (20.0, 0.03);
@@ -99,8 +103,9 @@ pub(crate) fn value(problem: &Problem, members: &[Member], rows: &[f64]) -> f64 
 /// The variants of the members of `start` at which the criterion is smallest.
 pub(crate) fn choose_variants(problem: &Problem, start: Vec<Member>, policy: Policy) -> Variants {
     let mut search = Search::new(problem, start, policy);
+    let before = search.model.value;
     search.sweep();
-    Variants { members: search.model.members, fit: search.model.fit }
+    Variants { gained: before - search.model.value, members: search.model.members, fit: search.model.fit }
 }
 
 impl<'a> Search<'a> {
@@ -252,25 +257,36 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Puts in the place of each member what the criterion is smaller with.
+    /// Puts in the place of each member what the criterion is smaller with, one after the other. The next few
+    /// places are looked at together; what was looked at beyond one that is taken is looked at again.
     fn swap(&mut self) -> bool {
         let mut swapped = false;
         let mut place = 0;
         while place < self.model.members.len() {
-            let best = self.in_place_of(place).into_iter().find(|(model, _)| model.settled);
-            let better = best.filter(|(model, _)| model.value < self.model.value - LEAST_STEP);
-            let better = better.and_then(|(model, entering)| match entering.len() {
-                1 => Some(model),
-                // More in the place of one must foretell more, as whatever is added.
-                _ => self.first_that_foretells(vec![model]),
-            });
-            if let Some(model) = better {
-                self.model = model;
-                swapped = true;
+            let ahead = self.model.members.len().min(place + LOOKED_AT_TOGETHER);
+            let better: Vec<Option<Model>> =
+                (place..ahead).into_par_iter().map(|place| self.better_in_place_of(place)).collect();
+            match better.into_iter().enumerate().find_map(|(at, model)| Some((at, model?))) {
+                Some((at, model)) => {
+                    self.model = model;
+                    swapped = true;
+                    place += at + 1;
+                }
+                None => place = ahead,
             }
-            place += 1;
         }
         swapped
+    }
+
+    /// The best model with something else in the place of a member, if the criterion is smaller with it.
+    fn better_in_place_of(&self, place: usize) -> Option<Model> {
+        let best = self.in_place_of(place).into_iter().find(|(model, _)| model.settled);
+        let (model, entering) = best.filter(|(model, _)| model.value < self.model.value - LEAST_STEP)?;
+        match entering.len() {
+            1 => Some(model),
+            // More in the place of one must foretell more, as whatever is added.
+            _ => self.first_that_foretells(vec![model]),
+        }
     }
 
     /// Models with something else in the place of a member, best first.
@@ -341,6 +357,7 @@ impl<'a> Search<'a> {
 
     fn outcome(self) -> Outcome {
         let alternatives = (0..self.model.members.len())
+            .into_par_iter()
             .map(|place| {
                 let models = self.in_place_of(place).into_iter();
                 let own = self.model.members[place].hypothesis;

@@ -2,7 +2,7 @@
 
 use super::hypotheses::{Candidates, Present};
 use super::search::Search;
-use crate::selection::choose_variants;
+use crate::selection::{LEAST_STEP, choose_variants};
 use phiw_identification::{EffectSpec, IdentificationError};
 
 /// Passes to refine constants.
@@ -24,10 +24,10 @@ impl Search<'_> {
             let mut problem = self.fixed.problem(&stage, &mut candidates)?;
             problem.hypotheses.iter_mut().for_each(|hypothesis| hypothesis.declared = true);
             let outcome = choose_variants(&problem, candidates.present.clone(), self.policy());
-            let before = self.specs.clone();
             self.take(&problem, &candidates, &outcome.members, &outcome.fit.values);
             let relinearised = self.relinearise()?;
-            if self.specs == before && !relinearised && step > 0 {
+            // What is linearised is looked at twice: the second time where it has moved to.
+            if outcome.gained < LEAST_STEP && (step > 0 || !relinearised) {
                 break;
             }
         }

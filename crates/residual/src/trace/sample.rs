@@ -4,10 +4,12 @@
 use phiw_identification::{BlockSource, Data, Fold, IdentificationError, KeptBlocks};
 use phiw_telemetry::Block;
 
-/// Samples that the search looks at, at most: some minutes of motion.
-const SEARCHED_SAMPLES: f64 = 60_000.0;
+/// Samples that the search looks at, at most: a minute or two of motion.
+const SEARCHED_SAMPLES: f64 = 30_000.0;
 /// Length of a piece \[s\]: long against a residual's correlation and against the filters' reach.
 const PIECE_S: f64 = 5.0;
+/// What comes before a piece, for effects with memory \[s\].
+const WARM_UP_S: f64 = 2.0;
 /// Conditioned samples that are kept between passes; what does not fit is read again \[bytes\].
 const KEPT_BYTES: usize = 64 << 20;
 /// The same for pieces of long logs, which are as many as they are.
@@ -37,14 +39,12 @@ impl<'a> Sample<'a> {
         }
         let share = SEARCHED_SAMPLES / samples;
         let (train, held_out) = (pieces(&data.train, share), pieces(&data.held_out, share));
-        let within = |block: &Block| {
-            let time = |output: &usize| block.t[*output];
-            let (first, last) = (block.outputs.first().map(time), block.outputs.last().map(time));
-            let (Some(first), Some(last)) = (first, last) else { return false };
-            let overlaps = |fold: &Fold| fold.log == block.log && fold.start <= last && first < fold.end;
-            train.iter().chain(&held_out).any(overlaps)
+        let warm_up = (WARM_UP_S / period_s).round() as usize;
+        let within = |block: Block| {
+            let log = block.log;
+            block.narrowed(warm_up, |t| train.iter().chain(&held_out).any(|fold| fold.contains(log, t)))
         };
-        let kept = KeptBlocks::keep_where(&data.sources, KEPT_BYTES_OF_PIECES, within)?;
+        let kept = KeptBlocks::keep_parts(&data.sources, KEPT_BYTES_OF_PIECES, within)?;
         Ok(Sample { train, held_out, kept })
     }
 

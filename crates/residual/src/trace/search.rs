@@ -19,6 +19,8 @@ const FOLDS: usize = 20;
 const LEAST_FOLD_S: f64 = 0.5;
 /// Effects that are put into force to see what they explain, at most.
 const CONTESTS: usize = 4;
+/// What the criterion may lose with an effect that leaves, if the constants of the others can make up for it.
+const MADE_UP_BY_CONSTANTS: f64 = 50.0;
 /// Candidates that are fitted in full at each step.
 const FINALISTS: usize = 12;
 
@@ -159,16 +161,25 @@ impl Search<'_> {
     /// criterion no smaller than it is without it: noise that moves a robot looks like a delay, until the
     /// signals are shifted.
     fn leave_out_what_is_not_realised(&mut self) -> Result<(), IdentificationError> {
+        let mut own = None;
         for place in (self.declared..self.specs.len()).rev() {
             if self.fixed.absent(&self.specs[place])?.is_none() {
                 continue;
             }
+            let value = match own {
+                Some(own) => own,
+                None => *own.insert(self.value()?),
+            };
             let mut branch = self.clone();
             branch.remove(place)?;
+            if branch.value()? > value + MADE_UP_BY_CONSTANTS {
+                continue;
+            }
             branch.refine()?;
-            if branch.value()? <= self.value()? {
+            if branch.value()? <= value {
                 branch.refuted.push(EffectSpec { constants: Constants::new(), ..self.specs[place].clone() });
                 *self = branch;
+                own = None;
             }
         }
         Ok(())
