@@ -5,6 +5,7 @@ use phiw_bspline_retarget::markers::{MarkerRecording, RecordingError, read_recor
 use phiw_bspline_retarget::npz::{Array, NpzWriter};
 use phiw_bspline_retarget::{RetargetOptions, Retargeted, Retargeter};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
+use proptest::prelude::*;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -148,4 +149,105 @@ fn each_format_says_what_is_wrong_with_its_file() {
     check("cut.npz", &npz[..npz.len() / 2], "no whole npz");
     check("bytes.bvh", b"HIERARCHY\n\xff\xfe", "byte 11 is no text");
     check("cut.trc", b"PathFileType\t4\n", "cut short");
+}
+
+/// A quaternion w, x, y, z: an oracle beside the reader's matrices.
+#[derive(Clone, Copy)]
+struct Quaternion([f64; 4]);
+
+impl Quaternion {
+    fn about(axis: usize, degrees: f64) -> Self {
+        let (sine, cosine) = (0.5 * degrees.to_radians()).sin_cos();
+        let mut all = [cosine, 0.0, 0.0, 0.0];
+        all[1 + axis] = sine;
+        Quaternion(all)
+    }
+
+    fn after(self, Quaternion([d, x, y, z]): Self) -> Self {
+        let Quaternion([w, a, b, c]) = self;
+        Quaternion([
+            w * d - a * x - b * y - c * z,
+            w * x + a * d + b * z - c * y,
+            w * y - a * z + b * d + c * x,
+            w * z + a * y - b * x + c * d,
+        ])
+    }
+
+    fn turn(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        let Quaternion([w, a, b, c]) = self;
+        let Quaternion([_, x, y, z]) =
+            self.after(Quaternion([0.0, x, y, z])).after(Quaternion([w, -a, -b, -c]));
+        [x, y, z]
+    }
+}
+
+/// A joint: the one it hangs on (before it), its offset, the order of its rotations, and their angles in two
+/// frames.
+type AnyJoint = (usize, [f64; 3], usize, [[f64; 3]; 2]);
+
+const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+
+/// The file of a skeleton, and the order in which its joints stand there.
+fn any_bvh(joints: &[AnyJoint]) -> (String, Vec<usize>) {
+    fn put(text: &mut String, order: &mut Vec<usize>, joints: &[AnyJoint], joint: usize) {
+        let (_, [x, y, z], rotations, _) = joints[joint];
+        let kind = if joint == 0 { "ROOT" } else { "JOINT" };
+        let names = ORDERS[rotations].map(|axis| format!("{}rotation", ["X", "Y", "Z"][axis])).join(" ");
+        let (count, slides) = if joint == 0 { (6, "Xposition Yposition Zposition ") } else { (3, "") };
+        write!(text, "{kind} j{joint}\n{{ OFFSET {x} {y} {z}\nCHANNELS {count} {slides}{names}\n").unwrap();
+        order.push(joint);
+        for child in (joint + 1..joints.len()).filter(|&child| joints[child].0 % child == joint) {
+            put(text, order, joints, child);
+        }
+        *text += "}\n";
+    }
+    let (mut text, mut order) = ("HIERARCHY\n".to_owned(), Vec::new());
+    put(&mut text, &mut order, joints, 0);
+    text += "MOTION\nFrames: 2\nFrame Time: 0.01\n";
+    for frame in 0..2 {
+        text += "1 2 3";
+        for &joint in &order {
+            let (_, _, rotations, angles) = joints[joint];
+            let angles = ORDERS[rotations].map(|axis| angles[frame][axis]);
+            angles.iter().for_each(|angle| write!(text, " {angle}").unwrap());
+        }
+        text.push('\n');
+    }
+    (text, order)
+}
+
+proptest! {
+    #[test]
+    fn any_skeleton_stands_where_quaternions_put_it(
+        joints in prop::collection::vec(
+            (any::<usize>(), prop::array::uniform3(-40.0..40.0), 0_usize..6,
+                prop::array::uniform2(prop::array::uniform3(-180.0..180.0))), 1..9),
+    ) {
+        let (text, order) = any_bvh(&joints);
+        let folder = tempfile::tempdir().unwrap();
+        let recording = read_recording(&write(&folder, "any.bvh", text.as_bytes()), None).unwrap();
+        prop_assert_eq!(&recording.labels, &order.iter().map(|joint| format!("j{joint}")).collect::<Vec<_>>());
+        for frame in 0..2 {
+            let mut frames: Vec<(Quaternion, [f64; 3])> = Vec::new();
+            for (joint, (parent, offset, rotations, angles)) in joints.iter().enumerate() {
+                let own = ORDERS[*rotations].iter().fold(Quaternion([1.0, 0.0, 0.0, 0.0]), |turned, &axis| {
+                    turned.after(Quaternion::about(axis, angles[frame][axis]))
+                });
+                frames.push(match joint {
+                    0 => (own, [1.0, 2.0, 3.0]),
+                    _ => {
+                        let (turned, from) = frames[parent % joint];
+                        let at = turned.turn(*offset);
+                        (turned.after(own), std::array::from_fn(|axis| from[axis] + at[axis]))
+                    }
+                });
+                // Centimetres with y up become metres with z up.
+                let [x, y, z] = frames[joint].1.map(|value| 0.01 * value);
+                let place = order.iter().position(|&other| other == joint).unwrap();
+                let found = recording.position_m(frame, place);
+                let far = found.iter().zip([z, x, y]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                prop_assert!(far < 1e-9, "joint {joint} of frame {frame} is {far} m off");
+            }
+        }
+    }
 }

@@ -3,6 +3,7 @@
 mod synthetic;
 
 use assert_cmd::Command;
+use phiw_telemetry::Recording;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -16,14 +17,20 @@ const TRAIN: [&str; 3] = ["a.csv", "b.csv", "c.csv"];
 const VALIDATE: &str = "d.csv";
 
 impl Fleet {
+    /// Each log has a stretch at rest: the rows of it count for no fit, but for the error with rests included.
     fn new() -> Self {
+        Self::with_logs(12.0, |recording| {
+            let still: Vec<f64> = recording.q[3 * 1000..3 * 1001].to_vec();
+            recording.q[3 * 1000..3 * 1400].copy_from_slice(&still.repeat(400));
+        })
+    }
+
+    fn with_logs(seconds: f64, change: impl Fn(&mut Recording)) -> Self {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("robot.urdf"), synthetic::URDF).unwrap();
         for (seed, name) in TRAIN.iter().chain([&VALIDATE]).enumerate() {
-            let mut recording = synthetic::recording(seed as u64 + 1, 12.0 + 2.0 * seed as f64);
-            // A stretch at rest: the rows of it count for no fit, but for the error with rests included.
-            let still: Vec<f64> = recording.q[3 * 1000..3 * 1001].to_vec();
-            recording.q[3 * 1000..3 * 1400].copy_from_slice(&still.repeat(400));
+            let mut recording = synthetic::recording(seed as u64 + 1, seconds + 2.0 * seed as f64);
+            change(&mut recording);
             recording.write_csv(&folder.path().join(name)).unwrap();
         }
         Fleet { folder }
@@ -159,4 +166,34 @@ fn an_effect_that_needs_the_model_is_not_reduced_apart() {
     let words = ["--declare", "load_dependent_friction", "--out", "plan.json"];
     let plan = [&["plan", "--urdf", "robot.urdf"], &TRAIN[..], &words].concat();
     Fleet::new().refused(&plan, &["load_dependent_friction cannot be reduced apart", "phiw identify"]);
+}
+
+/// One type of robot, one model: what a single robot has more is told by its logs and the shared model.
+#[test]
+fn a_robot_of_the_fleet_whose_elbow_rubs_more_is_told_by_the_shared_model() {
+    let fleet = Fleet::with_logs(40.0, |_| ());
+    fleet.plan(&["--validate", VALIDATE, "--declare", "viscous_friction"]);
+    fleet.reduce(&["a.csv", "b.csv", "c.csv", VALIDATE], "all.factor");
+    fleet.done(&["identify", "--plan", "plan.json", "--factors", "all.factor", "--out", "shared"]);
+    for (seed, name) in [(21, "train_7.csv"), (22, "validate_7.csv")] {
+        let mut recording = synthetic::recording(seed, 40.0);
+        // 1.5 N·m·s/rad more on joint_2 of robot 7.
+        let rows = recording.t.len();
+        for row in 1..rows - 1 {
+            let speed = (recording.q[3 * (row + 1) + 1] - recording.q[3 * (row - 1) + 1])
+                / (recording.t[row + 1] - recording.t[row - 1]);
+            recording.tau[3 * row + 1] += 1.5 * speed;
+        }
+        recording.write_csv(&fleet.path(name)).unwrap();
+    }
+    let words = ["explain", "--urdf", "robot.urdf", "--model", "shared/model.json", "--out", "robot_7"];
+    fleet.done(&[&words[..], &["--train", "train_7.csv", "--validate", "validate_7.csv"]].concat());
+    let report: Value = serde_json::from_str(&read(&fleet.path("robot_7/report.json"))).unwrap();
+    let [found] = report["effects"].as_array().unwrap().as_slice() else { panic!("{report}") };
+    assert_eq!(
+        (found["kind"].as_str(), &found["joints"]),
+        (Some("viscous_friction"), &Value::from(vec!["joint_2"]))
+    );
+    let more = found["parameters"]["joint_2"]["fv"]["value"].as_f64().unwrap();
+    assert!((more - 1.5).abs() < 0.2, "{report}");
 }

@@ -104,7 +104,7 @@ fn read_joint(words: &mut Words<'_>, hierarchy: &mut Hierarchy, unit_m: f64) -> 
                 words.expect("{")?;
                 let offset = read_offset(words, unit_m)?;
                 words.expect("}")?;
-                let name = format!("{}_end", hierarchy.skeleton.names[joint]);
+                let name = end_of(&hierarchy.skeleton.names[joint]);
                 push_joint(&mut hierarchy.skeleton, name, Some(joint), offset, line)?;
             }
             "CHANNELS" => read_channels(words, hierarchy, joint)?,
@@ -182,13 +182,18 @@ fn read_channels(words: &mut Words<'_>, hierarchy: &mut Hierarchy, joint: usize)
     Ok(())
 }
 
+/// Name of the end of a joint's bone.
+fn end_of(joint: &str) -> String {
+    format!("{joint}_end")
+}
+
 /// An end that is where its joint is, as LAFAN1 has it, continues the bone before it.
 fn continue_ends(skeleton: &mut Skeleton) {
     let length = |offset: [f64; 3]| offset.iter().map(|x| x * x).sum::<f64>().sqrt();
     for joint in 0..skeleton.names.len() {
-        let is_end = !skeleton.parents.contains(&Some(joint));
-        let Some(parent) = skeleton.parents[joint].filter(|_| is_end) else { continue };
-        if length(skeleton.offsets_m[joint]) < NO_LENGTH_M {
+        let Some(parent) = skeleton.parents[joint] else { continue };
+        let is_end = skeleton.names[joint] == end_of(&skeleton.names[parent]);
+        if is_end && length(skeleton.offsets_m[joint]) < NO_LENGTH_M {
             skeleton.offsets_m[joint] = skeleton.offsets_m[parent].map(|x| CONTINUED * x);
         }
     }
