@@ -15,7 +15,8 @@
 //!
 //! # What it prints
 //!
-//! A table of times, and for each way whether its files are those of one process. It fails where they are not.
+//! A table of times by the clock, behind them in brackets the processors' time of the process that takes most, and
+//! for each way whether its files are those of one process. It fails where they are not.
 //!
 //! # Where results go
 //!
@@ -68,32 +69,42 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     println!("| way | plan | reduce | fit | in all | files of one process |\n|---|--:|--:|--:|--:|---|");
     for (threads, out) in [(1, "one_thread"), (threads, "one")] {
-        let seconds = fleet.identify(threads, out)?;
+        let time = fleet.identify(threads, out)?;
         let same = if out == "one" { fleet.same(out, "one_thread")? } else { "" };
-        println!("| one process, threads: {threads} | | | | {seconds:.1} s | {same} |");
+        println!("| one process, threads: {threads} | | | | {time} | {same} |");
     }
-    let begin = Instant::now();
-    fleet.plan()?;
-    let planned = begin.elapsed().as_secs_f64();
+    let planned = fleet.plan()?;
     for processes in PROCESSES {
-        let begin = Instant::now();
-        fleet.reduce(processes)?;
-        let reduced = begin.elapsed().as_secs_f64();
-        let row = format!("processes of one thread: {processes}");
-        fleet.merge(&row, [planned, reduced], &fleet.factors(processes), &format!("merged_{processes}"))?;
+        let reduced = fleet.reduce(processes)?;
+        let way = format!("processes of one thread: {processes}");
+        fleet.merge(&way, [planned, reduced], &fleet.factors(processes), &format!("merged_{processes}"))?;
     }
     if arguments.slurm {
-        let begin = Instant::now();
-        let factors = fleet.slurm()?;
-        let reduced = begin.elapsed().as_secs_f64();
+        let (factors, reduced) = fleet.slurm()?;
         fleet.merge("Slurm, 8 tasks", [planned, reduced], &factors, "slurm")?;
     }
     if arguments.dask {
-        let seconds = fleet.dask(&arguments.python)?;
+        let time = fleet.dask(&arguments.python)?;
         let same = fleet.same("dask", "one")?;
-        println!("| Dask, {threads} workers | | | | {seconds:.1} s | {same} |");
+        println!("| Dask, {threads} workers | | | | {time} | {same} |");
     }
     Ok(())
+}
+
+/// What a step takes.
+#[derive(Clone, Copy, Default)]
+struct Time {
+    /// By the clock \[s\].
+    clock: f64,
+    /// Of the processors, of that process which takes most \[s\]; not a number where the system does not tell.
+    processor: f64,
+}
+
+impl std::fmt::Display for Time {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{:.1} s", self.clock)?;
+        if self.processor.is_finite() { write!(f, " ({:.1} s)", self.processor) } else { Ok(()) }
+    }
 }
 
 /// Logs of one robot, and the folder that all happens in.
@@ -128,20 +139,18 @@ impl Fleet {
         phiw
     }
 
-    /// Seconds that one process takes.
-    fn identify(&self, threads: usize, out: &str) -> anyhow::Result<f64> {
-        let begin = Instant::now();
+    /// Identifies in one process.
+    fn identify(&self, threads: usize, out: &str) -> anyhow::Result<Time> {
         let mut phiw = self.phiw("identify", threads);
         phiw.arg("--urdf").arg(&self.urdf).args(["--declare", &self.declare, "--out", out]);
-        finished([phiw.arg("--train").args(&self.logs).spawn()?])?;
-        Ok(begin.elapsed().as_secs_f64())
+        timed(|| Ok(vec![phiw.arg("--train").args(&self.logs).spawn()?]))
     }
 
-    fn plan(&self) -> anyhow::Result<()> {
+    fn plan(&self) -> anyhow::Result<Time> {
         let mut phiw = Command::new(&self.phiw);
         phiw.args(["plan", "--quiet", "--urdf"]).arg(&self.urdf).current_dir(&self.folder);
         let declare = ["--declare", &self.declare, "--out", "plan.json"];
-        finished([phiw.args(&self.logs).args(declare).spawn()?])
+        timed(|| Ok(vec![phiw.args(&self.logs).args(declare).spawn()?]))
     }
 
     fn factors(&self, processes: usize) -> Vec<PathBuf> {
@@ -149,48 +158,46 @@ impl Fleet {
     }
 
     /// Reduces all logs, each process its share with one thread.
-    fn reduce(&self, processes: usize) -> anyhow::Result<()> {
+    fn reduce(&self, processes: usize) -> anyhow::Result<Time> {
         let factors = self.factors(processes);
         let reduce = |(process, factor): (usize, &PathBuf)| {
             let own = self.logs.iter().skip(process).step_by(processes);
             let mut phiw = self.phiw("reduce", 1);
             phiw.args(["--plan", "plan.json"]).args(own).arg("--out").arg(factor).spawn()
         };
-        let running = factors.iter().enumerate().map(reduce).collect::<Result<Vec<Child>, _>>()?;
-        finished(running)
+        timed(|| Ok(factors.iter().enumerate().map(reduce).collect::<Result<Vec<Child>, _>>()?))
     }
 
     /// Fits the factors and prints a row of the table.
-    fn merge(&self, way: &str, before: [f64; 2], factors: &[PathBuf], out: &str) -> anyhow::Result<()> {
-        let begin = Instant::now();
+    fn merge(&self, way: &str, before: [Time; 2], factors: &[PathBuf], out: &str) -> anyhow::Result<()> {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let mut phiw = self.phiw("identify", threads);
         phiw.args(["--plan", "plan.json", "--out", out]).arg("--factors").args(factors);
-        finished([phiw.spawn()?])?;
+        let fit = timed(|| Ok(vec![phiw.spawn()?]))?;
         let [plan, reduce] = before;
-        let fit = begin.elapsed().as_secs_f64();
-        let (all, same) = (plan + reduce + fit, self.same(out, "one")?);
-        println!("| {way} | {plan:.1} s | {reduce:.1} s | {fit:.1} s | {all:.1} s | {same} |");
+        let (all, same) = (plan.clock + reduce.clock + fit.clock, self.same(out, "one")?);
+        println!("| {way} | {plan} | {reduce} | {fit} | {all:.1} s | {same} |");
         Ok(())
     }
 
     /// The factors that an array of Slurm makes.
-    fn slurm(&self) -> anyhow::Result<Vec<PathBuf>> {
+    fn slurm(&self) -> anyhow::Result<(Vec<PathBuf>, Time)> {
         let script = environment::workspace_root()?.join("examples/fleet/slurm_array.sbatch");
         let paths: Vec<String> = self.logs.iter().map(|log| log.display().to_string()).collect();
         std::fs::write(self.folder.join("logs.txt"), paths.join("\n") + "\n")?;
         let mut sbatch = Command::new("sbatch");
         sbatch.env("PHIW", &self.phiw).current_dir(&self.folder).stdout(Stdio::null());
         sbatch.arg("--wait").arg(script).args(["plan.json", "logs.txt", "shards"]);
-        finished([sbatch
-            .spawn()
-            .context("sbatch cannot be started; install Slurm, or leave out --slurm")?])?;
+        let absent = "sbatch cannot be started; install Slurm, or leave out --slurm";
+        let time = timed(|| Ok(vec![sbatch.spawn().context(absent)?]))?;
         let files = std::fs::read_dir(self.folder.join("shards"))?;
-        Ok(files.map(|file| file.map(|file| file.path())).collect::<Result<_, _>>()?)
+        let factors = files.map(|file| file.map(|file| file.path())).collect::<Result<_, _>>()?;
+        // The tasks are the cluster's, not this program's.
+        Ok((factors, Time { processor: f64::NAN, ..time }))
     }
 
-    /// Seconds that a Dask cluster takes for all.
-    fn dask(&self, python: &str) -> anyhow::Result<f64> {
+    /// All by a Dask cluster.
+    fn dask(&self, python: &str) -> anyhow::Result<Time> {
         let python = Python::install(python, "dask", DASK)?;
         let script = environment::workspace_root()?.join("examples/fleet/fleet.py");
         let script = std::fs::read_to_string(&script).with_context(|| script.display().to_string())?;
@@ -200,7 +207,7 @@ impl Fleet {
         words.extend(["--declare".into(), PathBuf::from(&self.declare)]);
         words.extend(["--out".into(), self.folder.join("dask")]);
         python.run(&script, words)?;
-        Ok(begin.elapsed().as_secs_f64())
+        Ok(Time { clock: begin.elapsed().as_secs_f64(), processor: f64::NAN })
     }
 
     /// `yes` where two folders hold the same results.
@@ -219,13 +226,32 @@ impl Fleet {
 /// What the Dask cluster needs.
 const DASK: &str = "dask[distributed]==2025.5.1\n";
 
-/// Waits for processes, all of which must succeed.
-fn finished(running: impl IntoIterator<Item = Child>) -> anyhow::Result<()> {
+/// Starts processes, waits for all of them, and says what that takes. All must succeed.
+fn timed(start: impl FnOnce() -> anyhow::Result<Vec<Child>>) -> anyhow::Result<Time> {
+    let begin = Instant::now();
+    let mut processor: f64 = f64::NAN;
+    let mut before = processor_time();
+    let mut ends = Vec::new();
     // All are waited for before any failure is told, so that none is left running.
-    let ends: Vec<_> = running.into_iter().map(|mut child| child.wait()).collect();
+    for mut child in start()? {
+        ends.push(child.wait());
+        let now = processor_time();
+        processor = processor.max(now - before);
+        before = now;
+    }
     for end in ends {
         let end = end?;
         ensure!(end.success(), "a process has failed ({end})");
     }
-    Ok(())
+    Ok(Time { clock: begin.elapsed().as_secs_f64(), processor })
+}
+
+/// Processors' time of all processes that were waited for \[s\], as Linux counts it in hundredths; elsewhere not a
+/// number.
+fn processor_time() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
+    let field = |place: usize| fields.get(place).and_then(|text| text.parse().ok()).unwrap_or(f64::NAN);
+    // Fields 16 and 17 of proc(5), of which the first two are before the last bracket.
+    0.01 * (field(13) + field(14))
 }

@@ -254,7 +254,7 @@ pub struct RetargetArguments {
     pub urdf: PathBuf,
     /// Recordings: C3D, TRC, BVH (LAFAN1), npz of AMASS or SMPL-X, or CSV of named points (`t`, `<point>.x`,
     /// `<point>.y`, `<point>.z` in metres, or in the map's `units`).
-    #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
+    #[arg(long, visible_alias = "recordings", value_name = "FILE", required = true, num_args = 1..)]
     pub c3d: Vec<PathBuf>,
     /// Which marker sits where; by default the built-in map that names most markers of the recordings.
     #[arg(long, value_name = "MAP.toml")]

@@ -150,6 +150,10 @@ fn wrong_plans_and_factors_are_refused() {
     let version = format!("\"phiw\": \"{}\"", env!("CARGO_PKG_VERSION"));
     std::fs::write(fleet.path("later.json"), text.replacen(&version, "\"phiw\": \"99.0\"", 1)).unwrap();
     reduce("later.json", &["a.csv"], &["later.json: phiw 99.0 has written it"]);
+    let train = text.replacen("\"period\": 0.00", "\"period\": 0.01", 1);
+    assert_ne!(train, text);
+    std::fs::write(fleet.path("edited.json"), train).unwrap();
+    reduce("edited.json", &["a.csv"], &["edited.json: it has been changed since phiw plan wrote it"]);
 
     let log = read(&fleet.path("c.csv"));
     std::fs::write(fleet.path("c.csv"), log.replacen("0.0", "0.5", 1)).unwrap();

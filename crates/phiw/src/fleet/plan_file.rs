@@ -31,6 +31,9 @@ pub enum PlanError {
         /// The version that has written it.
         theirs: String,
     },
+    /// A plan that somebody has edited, or of which bytes have changed.
+    #[error("it has been changed since phiw plan wrote it (its checksum does not match); plan again")]
+    Changed,
     /// Its parts do not fit each other.
     #[error("its {0} do not fit its logs; plan again")]
     Inconsistent(&'static str),
@@ -50,6 +53,8 @@ pub struct PlanFile {
     schema: u32,
     /// Version of the phiw that has written it.
     phiw: String,
+    /// SHA-256 of the rest, as [`PlanFile::checksum`] has it.
+    sha256: String,
     /// What was asked for.
     arguments: SessionArguments,
     /// Text of the URDF.
@@ -93,9 +98,10 @@ impl PlanFile {
         let mut surveys = session.logs.surveys().to_vec();
         // Cut-offs are chosen; the page shows the first log's spectra only.
         surveys.iter_mut().skip(1).for_each(|survey| survey.spectrum = Default::default());
-        Ok(PlanFile {
+        let mut file = PlanFile {
             schema: SCHEMA,
             phiw: env!("CARGO_PKG_VERSION").to_owned(),
+            sha256: String::new(),
             arguments: session.arguments.clone(),
             urdf: session.xml.clone(),
             declared: session.declared.clone(),
@@ -104,7 +110,17 @@ impl PlanFile {
             conditioning: session.logs.conditioning().clone(),
             effects: specs,
             compared: compared.collect(),
-        })
+        };
+        file.sha256 = file.checksum()?;
+        Ok(file)
+    }
+
+    /// SHA-256 of the content with an empty checksum, written without spaces.
+    fn checksum(&mut self) -> Result<String, Error> {
+        let written = std::mem::take(&mut self.sha256);
+        let json = serde_json::to_vec(self).map_err(|source| Error::Json { file: "the plan", source });
+        self.sha256 = written;
+        Ok(Sha256::digest(json?).iter().map(|byte| format!("{byte:02x}")).collect())
     }
 
     /// The file's text.
@@ -150,8 +166,11 @@ impl Plan {
         if (head.schema, head.phiw.as_str()) != (SCHEMA, env!("CARGO_PKG_VERSION")) {
             return Err(wrong(PlanError::OtherVersion { theirs: head.phiw }));
         }
-        let file: PlanFile =
+        let mut file: PlanFile =
             serde_json::from_str(&text).map_err(|error| wrong(PlanError::NotAPlan(error)))?;
+        if file.checksum()? != file.sha256 {
+            return Err(wrong(PlanError::Changed));
+        }
         let hash = Sha256::digest(text.as_bytes()).into();
         Self::of_file(file, hash, path)
     }
