@@ -136,6 +136,26 @@ fn an_npz_of_amass_moves_the_robot() {
 }
 
 #[test]
+fn the_humanoids_at_hand_follow_amass() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = read_recording(&write(&folder, "poses.npz", &amass()), None).unwrap();
+    let robots = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/robots");
+    for name in ["torobo20/torobo20.urdf", "talos/talos_reduced.urdf", "g1/g1_29dof_rev_1_0.urdf"] {
+        let path = robots.join(name);
+        if !path.is_file() {
+            println!("skipped: {} is absent", path.display());
+            continue;
+        }
+        let tree = read_urdf_file(path, &UrdfOptions::default()).unwrap().tree;
+        let retargeter =
+            Retargeter::new(tree, MarkerMap::smpl().unwrap(), RetargetOptions::default()).unwrap();
+        let quality = retargeter.retarget(&recording, None).unwrap().quality;
+        assert!(quality.marker_rms_m < 0.005 && quality.hand_share() < 0.01, "{name}: {quality:?}");
+        assert_eq!(quality.limit_excess, 0.0, "{name}");
+    }
+}
+
+#[test]
 fn each_format_says_what_is_wrong_with_its_file() {
     let folder = tempfile::tempdir().unwrap();
     let check = |name: &str, content: &[u8], said: &str| {
