@@ -50,6 +50,8 @@ struct Judged {
     folds: f64,
     /// RMS of what it takes over the RMS of a torque that it acts on, the largest.
     size: f64,
+    /// Whether its certainty is that of a name.
+    certain: bool,
     named: bool,
 }
 
@@ -72,6 +74,7 @@ impl Search<'_> {
         };
         let mut judged = self.judge(&trial)?;
         self.judge_small(&trial, &mut judged)?;
+        self.name_families(&mut judged);
         self.in_order(&trial, judged)
     }
 
@@ -187,6 +190,20 @@ impl Search<'_> {
         Ok(())
     }
 
+    /// Names with a kind of the textbook what is as certain of it on other joints, however small, where it has
+    /// a name on most of them: where joints rub, all do that are seen to.
+    fn name_families(&self, judged: &mut [Judged]) {
+        for kind in self.fixed.catalogue.kinds().filter(|kind| kind.joint_property().is_some()) {
+            let is_member =
+                |judged: &&mut Judged| judged.certain && self.specs[judged.place].kind == kind.name();
+            let members: Vec<&mut Judged> = judged.iter_mut().filter(is_member).collect();
+            let named = members.iter().filter(|member| member.named).count();
+            if 2 * named >= members.len() {
+                members.into_iter().for_each(|member| member.named = true);
+            }
+        }
+    }
+
     pub(super) fn remove(&mut self, place: usize) -> Result<(), IdentificationError> {
         let design = self.design()?;
         self.parameters.drain(design.effect_parameters(place));
@@ -237,6 +254,7 @@ impl Search<'_> {
                 significance: certainty.significance,
                 gain: whole.gain(&whole.held_out_squares(&without), &all),
                 folds: whole.better_folds(&without),
+                certain: certainty.tail <= limit,
                 named: certainty.tail <= limit && material,
             });
         }
