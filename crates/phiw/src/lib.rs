@@ -20,6 +20,7 @@ mod held_out_reproduction;
 mod identified_mjcf;
 mod identified_urdf;
 pub mod identify;
+mod identify_arguments;
 mod input;
 mod model_file;
 mod model_use;
