@@ -1,9 +1,10 @@
 //! What effects declare of themselves, held against their columns.
 
-use phiw_dynamics::Tree;
 use phiw_dynamics::random_tree::{RandomNumbers, RandomTreeOptions, random_state, random_tree};
+use phiw_dynamics::{AnalyticBackend, Tree, Workspace};
 use phiw_effects::{Catalogue, JointRange, SignalRanges};
 use phiw_identification::effect::{EffectParameter, ReferenceModel};
+use phiw_identification::reproduction::Plant;
 use phiw_identification::{Design, Effect, EffectCatalogue, EffectSpec};
 use phiw_regressor::BaseParameters;
 use phiw_telemetry::Block;
@@ -249,4 +250,27 @@ fn the_magnitude_of_a_speed_is_linear_on_no_joint() {
         .collect();
     assert!(parameters.len() >= 16, "{}", parameters.len());
     assert!(!parameters.contains(&true));
+}
+
+/// A joint whose elasticity had been found ended `phiw explain` with a panic while the model was moved: a
+/// simulation has no derivatives of the torque by position.
+#[test]
+fn a_model_with_any_effect_can_be_moved() {
+    let zoo = Zoo::new(3, 3);
+    let joints = zoo.tree.joint_count();
+    let base = BaseParameters::of_tree(&zoo.tree, Default::default()).unwrap();
+    let mut parameters = base.from_standard(&zoo.tree.inertial_parameters()).unwrap();
+    parameters.resize(zoo.design.parameter_count(), 0.0);
+    let backend = Box::new(AnalyticBackend::new(zoo.tree.clone()));
+    let mut plant = Plant::new(backend).with_effects(&zoo.design, &parameters).unwrap();
+    let state = random_state(&zoo.tree, &mut RandomNumbers::new(5));
+    let mut torque = vec![0.0; joints];
+    zoo.tree
+        .inverse_dynamics(&state.q, &state.v, &state.a, &mut Workspace::new(&zoo.tree), &mut torque)
+        .unwrap();
+    let mut acceleration = vec![0.0; joints];
+    plant.accelerate(0.0, [&state.q, &state.v, &torque, &state.a], &mut acceleration).unwrap();
+    for (own, asked) in acceleration.iter().zip(&state.a) {
+        assert!((own - asked).abs() < 1e-6 * (1.0 + asked.abs()), "{own} {asked}");
+    }
 }

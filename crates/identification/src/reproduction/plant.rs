@@ -265,7 +265,13 @@ impl Effects<'_> {
         self.set(t, state);
         let both = [rigid, rigid].concat();
         let none = vec![0.0; both.len()];
+        // What needs the torques' derivatives is not simulated, but its columns are asked for all the same.
+        let matrices = vec![0.0; both.len() * rigid.len()];
         self.other.set_reference(BlockReference {
+            by_position: matrices.clone(),
+            by_velocity: matrices.clone(),
+            by_acceleration: matrices,
+            gravity: [none.as_slice(); 3].concat(),
             total_torque: both.clone(),
             torque: both,
             torque_rate: none.clone(),
