@@ -1,7 +1,7 @@
 //! NumPy's files: arrays (npy), and zip archives of them (npz).
 //!
-//! The form is that of NumPy Enhancement Proposal 1: `\x93NUMPY`, version, length of the header, a header that
-//! is a Python dictionary, the numbers.
+//! The form is that of NumPy Enhancement Proposal 1: `\x93NUMPY`, version, length of the header, a header
+//! that is a Python dictionary, the numbers.
 
 use std::io::{Cursor, Read, Write};
 use zip::write::SimpleFileOptions;

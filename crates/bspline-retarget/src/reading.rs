@@ -8,8 +8,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// Reads a recording as it is. The format is told by the content: C3D, BVH, TRC, the npz of AMASS and SMPL-X; a
-/// CSV of named points by its name. `units` replaces what the file says of its unit; a CSV says nothing and
+/// Reads a recording as it is. The format is told by the content: C3D, BVH, TRC, the npz of AMASS and SMPL-X;
+/// a CSV of named points by its name. `units` replaces what the file says of its unit; a CSV says nothing and
 /// is in metres, a BVH says nothing and is in centimetres, AMASS is in metres always.
 ///
 /// [`crate::Retargeter::read`] looks at the numbers, too.

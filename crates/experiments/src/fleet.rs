@@ -15,8 +15,8 @@
 //!
 //! # What it prints
 //!
-//! A table of times by the clock, behind them in brackets the processors' time of the process that takes most, and
-//! for each way whether its files are those of one process. It fails where they are not.
+//! A table of times by the clock, behind them in brackets the processors' time of the process that takes
+//! most, and for each way whether its files are those of one process. It fails where they are not.
 //!
 //! # Where results go
 //!
@@ -96,7 +96,8 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
 struct Time {
     /// By the clock \[s\].
     clock: f64,
-    /// Of the processors, of that process which takes most \[s\]; not a number where the system does not tell.
+    /// Of the processors, of that process which takes most \[s\]; not a number where the system does not
+    /// tell.
     processor: f64,
 }
 
@@ -246,8 +247,8 @@ fn timed(start: impl FnOnce() -> anyhow::Result<Vec<Child>>) -> anyhow::Result<T
     Ok(Time { clock: begin.elapsed().as_secs_f64(), processor })
 }
 
-/// Processors' time of all processes that were waited for \[s\], as Linux counts it in hundredths; elsewhere not a
-/// number.
+/// Processors' time of all processes that were waited for \[s\], as Linux counts it in hundredths; elsewhere
+/// not a number.
 fn processor_time() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
     let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();

@@ -17,7 +17,8 @@ const TRAIN: [&str; 3] = ["a.csv", "b.csv", "c.csv"];
 const VALIDATE: &str = "d.csv";
 
 impl Fleet {
-    /// Each log has a stretch at rest: the rows of it count for no fit, but for the error with rests included.
+    /// Each log has a stretch at rest: the rows of it count for no fit, but for the error with rests
+    /// included.
     fn new() -> Self {
         Self::with_logs(12.0, |recording| {
             let still: Vec<f64> = recording.q[3 * 1000..3 * 1001].to_vec();

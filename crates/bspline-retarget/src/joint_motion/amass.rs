@@ -1,9 +1,9 @@
-//! The npz files of AMASS and of SMPL-X (Mahmood et al., "AMASS: Archive of Motion Capture as Surface Shapes",
-//! ICCV 2019): joint rotations `poses` \[rad, axis times angle\], `trans` \[m\], and the frame rate. The world's z is
-//! up.
+//! The npz files of AMASS and of SMPL-X (Mahmood et al., "AMASS: Archive of Motion Capture as Surface
+//! Shapes", ICCV 2019): joint rotations `poses` \[rad, axis times angle\], `trans` \[m\], and the frame rate.
+//! The world's z is up.
 //!
-//! The files hold no lengths: those follow from `betas` by a body model that has to be asked for. The joints are
-//! put together with the lengths of the mean person instead, and `betas` is not looked at. Retargeting
+//! The files hold no lengths: those follow from `betas` by a body model that has to be asked for. The joints
+//! are put together with the lengths of the mean person instead, and `betas` is not looked at. Retargeting
 //! estimates the person's lengths from the points anyway, and gives the robot angles, not lengths.
 
 use super::bvh::check_size;

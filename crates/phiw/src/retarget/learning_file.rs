@@ -1,10 +1,10 @@
 //! A motion as programs that learn to track motions read it: a npz with the joints and all bodies over time.
 //!
 //! The names are those of the motion files of BeyondMimic, Isaac Lab and mjlab: `fps` \[Hz\], `joint_pos`,
-//! `joint_vel` `[frame, joint]` \[rad, m, /s\], `body_pos_w` `[frame, body, 3]` \[m\], `body_quat_w` `[frame, body, 4]`
-//! (w, x, y, z), `body_lin_vel_w`, `body_ang_vel_w` \[m/s, rad/s\], along the world's axes and at the body's
-//! origin. `joint_names` and `body_names` say what they are of: the robot's moving joints, and the links that
-//! they carry. The base stands at the origin.
+//! `joint_vel` `[frame, joint]` \[rad, m, /s\], `body_pos_w` `[frame, body, 3]` \[m\], `body_quat_w` `[frame,
+//! body, 4]` (w, x, y, z), `body_lin_vel_w`, `body_ang_vel_w` \[m/s, rad/s\], along the world's axes and at
+//! the body's origin. `joint_names` and `body_names` say what they are of: the robot's moving joints, and the
+//! links that they carry. The base stands at the origin.
 
 use phiw_bspline_retarget::npz::{Array, NpzWriter};
 use phiw_dynamics::{DimensionError, Mat3, Placement, Tree, Vec3};

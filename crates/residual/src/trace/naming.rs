@@ -190,8 +190,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Names with a kind of the textbook what is as certain of it on other joints, however small, where it has
-    /// a name on most of them: where joints rub, all do that are seen to.
+    /// Names with a kind of the textbook what is as certain of it on other joints, however small, where it
+    /// has a name on most of them: where joints rub, all do that are seen to.
     fn name_families(&self, judged: &mut [Judged]) {
         for kind in self.fixed.catalogue.kinds().filter(|kind| kind.joint_property().is_some()) {
             let is_member =
