@@ -19,6 +19,7 @@ pub mod held_joints;
 mod identify;
 mod jackknife;
 mod kept_blocks;
+mod known_payload;
 mod log_set;
 mod model_sources;
 mod predict;

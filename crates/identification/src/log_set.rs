@@ -1,12 +1,13 @@
 //! The logs of a session: which train, which are held out, and how they are conditioned.
 
 use crate::checks::{check_excitation, check_logs};
+use crate::known_payload::KnownPayload;
 use crate::{BlockSource, Fold, IdentificationError};
 use phiw_dynamics::Tree;
-use phiw_telemetry::{Block, Conditioning, ConditioningOptions, LogError, Survey, TorqueColumns};
+use phiw_telemetry::{Block, Conditioning, ConditioningOptions, LogError, LogSource, Survey, TorqueColumns};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Stretches of time that the training logs are cut into: long against the residual's correlation, enough for
@@ -24,6 +25,8 @@ pub struct LogSet {
     surveys: Vec<Survey>,
     train: usize,
     conditioning: Conditioning,
+    /// What the robot held in each log.
+    payloads: Vec<Option<KnownPayload>>,
 }
 
 impl LogSet {
@@ -35,10 +38,10 @@ impl LogSet {
     ///
     /// # Errors
     /// A log that cannot be read or does not fit the robot, or a joint that moves in none.
-    pub fn open(
+    pub fn open<S: Clone + Into<LogSource>>(
         tree: &Tree,
-        train: &[PathBuf],
-        validate: &[PathBuf],
+        train: &[S],
+        validate: &[S],
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
@@ -51,52 +54,54 @@ impl LogSet {
     ///
     /// # Errors
     /// A log that cannot be read or does not fit the robot.
-    pub fn open_unexcited(
+    pub fn open_unexcited<S: Clone + Into<LogSource>>(
         tree: &Tree,
-        train: &[PathBuf],
-        validate: &[PathBuf],
+        train: &[S],
+        validate: &[S],
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
-        Self::surveyed(tree, [train, validate], TorqueColumns::Required, options, progress)
+        Self::surveyed(tree, [sources(train), sources(validate)], TorqueColumns::Required, options, progress)
     }
 
     /// The same of logs that a model is used on: they need no torques.
     ///
     /// # Errors
     /// A log that cannot be read or does not fit the robot.
-    pub fn open_for_prediction(
+    pub fn open_for_prediction<S: Clone + Into<LogSource>>(
         tree: &Tree,
-        logs: &[PathBuf],
+        logs: &[S],
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
-        Self::surveyed(tree, [logs, &[]], TorqueColumns::Optional, options, progress)
+        Self::surveyed(tree, [sources(logs), Vec::new()], TorqueColumns::Optional, options, progress)
     }
 
     fn surveyed(
         tree: &Tree,
-        [train, validate]: [&[PathBuf]; 2],
+        [train, validate]: [Vec<LogSource>; 2],
         torque: TorqueColumns,
         options: &ConditioningOptions,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
         let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
-        let logs: Vec<&PathBuf> = train.iter().chain(validate).collect();
+        let payloads = train.iter().chain(&validate).map(|source| KnownPayload::of(tree, source));
+        let payloads = payloads.collect::<Result<Vec<_>, LogError>>()?;
+        let logs: Vec<&LogSource> = train.iter().chain(&validate).collect();
         let what = match logs.as_slice() {
-            [path] => reading("surveying", path),
+            [source] => reading("surveying", &source.path),
             logs => format!("surveying {} logs", logs.len()),
         };
         // Bytes of each log: done, and in all.
         let bytes: Vec<[AtomicU64; 2]> = logs.iter().map(|_| Default::default()).collect();
         let sum = |which: usize| bytes.iter().map(|log| log[which].load(Ordering::Relaxed)).sum();
-        let survey = |(log, path): (usize, &&PathBuf)| {
+        let survey = |(log, source): (usize, &&LogSource)| {
             let mut report = |done: u64, total: u64| {
                 bytes[log][0].store(done, Ordering::Relaxed);
                 bytes[log][1].store(total, Ordering::Relaxed);
                 progress(&what, sum(0), sum(1));
             };
-            phiw_telemetry::survey(path, &joints, torque, &mut report)
+            phiw_telemetry::survey(*source, &joints, torque, &mut report)
         };
         // Each log by itself; of several errors the first log's is told.
         let surveys: Vec<Result<Survey, LogError>> = logs.par_iter().enumerate().map(survey).collect();
@@ -107,18 +112,21 @@ impl LogSet {
         let conditioning = Conditioning::choose(training, options)?;
         // Cut-offs that were told must fit the logs held out, too.
         held_out.iter().try_for_each(|survey| conditioning.plan(survey).map(drop))?;
-        Ok(LogSet { train: train.len(), conditioning, surveys })
+        Ok(LogSet { train: train.len(), conditioning, surveys, payloads })
     }
 
-    /// Logs that were surveyed and conditioned before, the first `train` of them to fit.
-    pub fn of_surveys(surveys: Vec<Survey>, train: usize, conditioning: Conditioning) -> Self {
-        LogSet { train: train.min(surveys.len()), surveys, conditioning }
+    /// Logs without maps that were surveyed and conditioned before, the first `train` of them to fit.
+    pub fn of_surveys(mut surveys: Vec<Survey>, train: usize, conditioning: Conditioning) -> Self {
+        surveys.iter_mut().for_each(|survey| survey.source = LogSource::from(&survey.path));
+        let payloads = vec![None; surveys.len()];
+        LogSet { train: train.min(surveys.len()), surveys, conditioning, payloads }
     }
 
     /// Reads a log from another place from now on; its content must be the same.
     pub fn set_path(&mut self, log: usize, path: &Path) {
         if let Some(survey) = self.surveys.get_mut(log) {
             survey.path = path.to_owned();
+            survey.source.path = path.to_owned();
         }
     }
 
@@ -126,7 +134,12 @@ impl LogSet {
     pub fn with_every_row(&self) -> Self {
         let mut conditioning = self.conditioning.clone();
         conditioning.options.decimation = Some(1);
-        LogSet { surveys: self.surveys.clone(), train: self.train, conditioning }
+        LogSet {
+            surveys: self.surveys.clone(),
+            train: self.train,
+            conditioning,
+            payloads: self.payloads.clone(),
+        }
     }
 
     /// All surveys: training logs, then those for validation.
@@ -206,8 +219,23 @@ impl LogSet {
 
     /// The logs as sources of blocks.
     pub fn sources<'a>(&'a self, progress: Progress<'a>) -> Vec<LogFile<'a>> {
-        self.surveys.iter().map(|survey| LogFile::new(survey, &self.conditioning, progress)).collect()
+        let source = |log| self.source_conditioned(log, &self.conditioning, progress);
+        (0..self.surveys.len()).map(source).collect()
     }
+
+    /// One log, conditioned in another way.
+    pub(crate) fn source_conditioned<'a>(
+        &'a self,
+        log: usize,
+        conditioning: &'a Conditioning,
+        progress: Progress<'a>,
+    ) -> LogFile<'a> {
+        LogFile { survey: &self.surveys[log], conditioning, payload: self.payloads[log].as_ref(), progress }
+    }
+}
+
+fn sources<S: Clone + Into<LogSource>>(logs: &[S]) -> Vec<LogSource> {
+    logs.iter().cloned().map(Into::into).collect()
 }
 
 fn reading(what: &str, path: &Path) -> String {
@@ -240,20 +268,30 @@ fn cut<'a>(parts: impl Iterator<Item = (usize, &'a Survey, f64, f64)>, count: us
 pub struct LogFile<'a> {
     survey: &'a Survey,
     conditioning: &'a Conditioning,
+    payload: Option<&'a KnownPayload>,
     progress: Progress<'a>,
-}
-
-impl<'a> LogFile<'a> {
-    pub(crate) fn new(survey: &'a Survey, conditioning: &'a Conditioning, progress: Progress<'a>) -> Self {
-        LogFile { survey, conditioning, progress }
-    }
 }
 
 impl BlockSource for LogFile<'_> {
     fn stream(&self, sink: &mut dyn FnMut(Block) -> ControlFlow<()>) -> Result<(), LogError> {
         let what = reading("reading", &self.survey.path);
         let mut report = |done: u64, total: u64| (self.progress)(&what, done, total);
-        phiw_telemetry::stream(self.survey, self.conditioning, &mut report, sink)?;
-        Ok(())
+        let Some(payload) = self.payload else {
+            phiw_telemetry::stream(self.survey, self.conditioning, &mut report, sink)?;
+            return Ok(());
+        };
+        let (mut workspace, mut wrong) = (payload.workspace(), None);
+        let mut without = |block: Block| match payload.taken_off(block, &mut workspace) {
+            Ok(block) => sink(block),
+            Err(error) => {
+                wrong = Some(error);
+                ControlFlow::Break(())
+            }
+        };
+        phiw_telemetry::stream(self.survey, self.conditioning, &mut report, &mut without)?;
+        match (wrong, &self.survey.source.map) {
+            (Some(error), Some(map)) => Err(map.payload_error(error.to_string()).into()),
+            _ => Ok(()),
+        }
     }
 }

@@ -25,6 +25,8 @@ pub struct Limits {
     pub log_line_bytes: usize,
     /// Columns of a log.
     pub log_columns: usize,
+    /// Bytes of one message of a recording, unpacked: a picture of 8k x 4k pixels.
+    pub message_bytes: usize,
     /// Bytes of a marker recording, which is held in memory.
     pub recording_bytes: u64,
     /// Control points of the splines of one recording: 20 minutes at one every 0.2 s. A robot of 18 joints
@@ -54,6 +56,7 @@ impl Default for Limits {
             moving_joints: 200,
             log_line_bytes: 256 << 10,
             log_columns: 10_000,
+            message_bytes: 128 << 20,
             recording_bytes: 256 << 20,
             control_points: 6_000,
             toml_bytes: 1 << 20,

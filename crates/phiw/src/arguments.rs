@@ -1,7 +1,9 @@
 //! The command line.
 
+use crate::argument_values::{held_joint, known_mass, positive, quoted, share};
 pub use crate::export::ExportArguments;
 pub use crate::identify_arguments::IdentifyArguments;
+pub use crate::map::MapArguments;
 pub use crate::simulate::Backend;
 
 use crate::fleet::{PlanArguments, ReduceArguments};
@@ -39,6 +41,9 @@ pub enum Command {
     /// Say what is in logs before anything is fitted: late velocities, torques that are missing or clipped,
     /// units, clocks, and what to do about it.
     Check(CheckArguments),
+    /// Write a first map of a log's columns: which is which signal of which joint, in what unit, guessed by
+    /// names and ranges.
+    Map(MapArguments),
     /// Turn marker recordings of people into motions of the robot: for each a log without torques, and what
     /// it is worth.
     Retarget(RetargetArguments),
@@ -62,6 +67,7 @@ impl Command {
             Command::Simulate(simulate) => simulate.quiet,
             Command::Export(export) => export.quiet,
             Command::Check(check) => check.quiet,
+            Command::Map(map) => map.quiet,
             Command::Retarget(retarget) => retarget.quiet,
             Command::Next(next) => next.quiet,
             Command::Plan(plan) => plan.quiet,
@@ -99,9 +105,13 @@ pub struct PredictArguments {
     /// A model.json of `phiw identify` or `phiw explain`; it holds the robot, too.
     #[arg(long, value_name = "MODEL.json")]
     pub model: PathBuf,
-    /// Logs (CSV); torques are compared where a log has them.
+    /// Logs; torques are compared where a log has them.
     #[arg(value_name = "LOG", required = true)]
     pub logs: Vec<PathBuf>,
+    /// What the columns of the logs mean: topics, units, gears, currents (docs/log-maps.md). Without it they
+    /// are named as in a log of phiw.
+    #[arg(long, value_name = "MAP.toml")]
+    pub map: Option<PathBuf>,
     /// Joints that stand still in the logs, at 0 or at a value (rad, m); they need no column. What the model
     /// holds need not be named. In a name, * stands for any letters and ? for one: --hold 'left_*'.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
@@ -126,9 +136,13 @@ pub struct SimulateArguments {
     /// A model.json of `phiw identify` or `phiw explain`; it holds the robot, too.
     #[arg(long, value_name = "MODEL.json")]
     pub model: PathBuf,
-    /// Logs (CSV) with measured torques.
+    /// Logs with measured torques.
     #[arg(value_name = "LOG", required = true)]
     pub logs: Vec<PathBuf>,
+    /// What the columns of the logs mean: topics, units, gears, currents (docs/log-maps.md). Without it they
+    /// are named as in a log of phiw.
+    #[arg(long, value_name = "MAP.toml")]
+    pub map: Option<PathBuf>,
     /// Joints that stand still, as the model was made with; they need not be named. In a name, * stands for
     /// any letters and ? for one: --hold 'left_*'.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
@@ -150,9 +164,13 @@ pub struct CheckArguments {
     /// The robot's URDF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
-    /// Logs (CSV).
+    /// Logs: CSV, MCAP, ROS bags, LeRobot folders, npz.
     #[arg(value_name = "LOG", required = true)]
     pub logs: Vec<PathBuf>,
+    /// What the columns of the logs mean: topics, units, gears, currents (docs/log-maps.md). Without it they
+    /// are named as in a log of phiw.
+    #[arg(long, value_name = "MAP.toml")]
+    pub map: Option<PathBuf>,
     /// Joints of the URDF that do not move, at 0 or at a value (rad, m); they need no column in the log. In a
     /// name, * stands for any letters and ? for one: --hold 'left_*'.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
@@ -171,6 +189,7 @@ impl CheckArguments {
         SessionArguments {
             urdf: self.urdf.clone(),
             train: self.logs.clone(),
+            map: self.map.clone(),
             hold: self.hold.clone(),
             quiet: self.quiet,
             ..SessionArguments::default()
@@ -229,9 +248,13 @@ pub struct NextArguments {
     /// Folder of motions to choose from, as `phiw retarget` writes them: logs with q, qd and qdd.
     #[arg(long, value_name = "DIR")]
     pub motions: PathBuf,
-    /// Logs (CSV) of what the robot has run so far.
+    /// Logs of what the robot has run so far.
     #[arg(long, value_name = "LOG", num_args = 1..)]
     pub measured: Vec<PathBuf>,
+    /// What the columns of the logs mean: topics, units, gears, currents (docs/log-maps.md). Without it they
+    /// are named as in a log of phiw.
+    #[arg(long, value_name = "MAP.toml")]
+    pub map: Option<PathBuf>,
     /// What the robot stands on (soles of links); without it the robot is taken as bolted down.
     #[arg(long, value_name = "SUPPORT.toml")]
     pub support: Option<PathBuf>,
@@ -277,6 +300,7 @@ impl NextArguments {
         SessionArguments {
             urdf: self.urdf.clone(),
             train: self.measured.clone(),
+            map: self.map.clone(),
             declare: self.declare.clone(),
             hold: self.hold.clone(),
             cutoff_hz: self.cutoff_hz,
@@ -322,12 +346,16 @@ pub struct SessionArguments {
     /// The robot's URDF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
-    /// Logs (CSV) that the model is fitted to.
+    /// Logs that the model is fitted to: CSV, MCAP, ROS bags, LeRobot folders, npz.
     #[arg(long, value_name = "LOG", required = true, num_args = 1..)]
     pub train: Vec<PathBuf>,
     /// Logs that its error is measured on; without any, the last 30 % of each training log are held out.
     #[arg(long, value_name = "LOG", num_args = 1..)]
     pub validate: Vec<PathBuf>,
+    /// What the columns of the logs mean: topics, units, gears, currents (docs/log-maps.md). Without it they
+    /// are named as in a log of phiw.
+    #[arg(long, value_name = "MAP.toml")]
+    pub map: Option<PathBuf>,
     /// Effects beside the rigid body, wherever they can act or on the joints named: viscous_friction,
     /// coulomb_friction:j1+j2, transmission_coupling:j5+j6, …
     #[arg(long, value_name = "KIND[:JOINT[+JOINT…]],…", value_delimiter = ',')]
@@ -361,7 +389,8 @@ pub struct SessionArguments {
 impl SessionArguments {
     /// The files that are read.
     pub fn inputs(&self) -> Vec<PathBuf> {
-        std::iter::once(&self.urdf).chain(&self.train).chain(&self.validate).cloned().collect()
+        let logs = self.train.iter().chain(&self.validate);
+        std::iter::once(&self.urdf).chain(logs).chain(&self.map).cloned().collect()
     }
 
     /// The command line that gives these arguments to `phiw` and `command`, quoted for a shell.
@@ -384,6 +413,7 @@ impl SessionArguments {
         option("--urdf", paths(std::slice::from_ref(&self.urdf)));
         option("--train", paths(&self.train));
         option("--validate", paths(&self.validate));
+        option("--map", paths(self.map.as_slice()));
         option("--declare", list(self.declare.clone()));
         option("--hold", list(self.hold.iter().map(held).collect()));
         option("--mass", list(self.mass.iter().map(|(link, mass)| format!("{link}={mass}")).collect()));
@@ -393,52 +423,6 @@ impl SessionArguments {
         option("--out", paths(std::slice::from_ref(&self.out)));
         words.join(" ")
     }
-}
-
-/// `JOINT` or `JOINT=VALUE`.
-pub(crate) fn held_joint(text: &str) -> Result<(String, f64), String> {
-    let (joint, value) = text.split_once('=').unwrap_or((text, "0"));
-    let joint = joint.trim();
-    if joint.is_empty() {
-        return Err("write JOINT or JOINT=VALUE".to_owned());
-    }
-    match value.trim().parse::<f64>() {
-        Ok(number) if number.is_finite() => Ok((joint.to_owned(), number)),
-        _ => Err(format!("`{value}` is not a position; write {joint} or {joint}=0.5 (rad or m)")),
-    }
-}
-
-/// `LINK=KG`.
-pub(crate) fn known_mass(text: &str) -> Result<(String, f64), String> {
-    let Some((link, mass)) = text.split_once('=') else {
-        return Err(format!("write LINK=KG, for example {text}=2.5"));
-    };
-    Ok((link.trim().to_owned(), positive(mass.trim())?))
-}
-
-/// A number from 0 to 1.
-fn share(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(number) if (0.0..=1.0).contains(&number) => Ok(number),
-        _ => Err(format!("`{text}` is not a number from 0 to 1")),
-    }
-}
-
-/// A number above zero.
-pub(crate) fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
-        _ => Err(format!("`{text}` is not a number above zero")),
-    }
-}
-
-/// A word as a shell reads it back.
-pub(crate) fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "_-./,=:+@%".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', r"'\''"))
 }
 
 #[cfg(test)]

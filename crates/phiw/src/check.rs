@@ -2,6 +2,7 @@
 
 use crate::arguments::CheckArguments;
 use crate::console::Console;
+use crate::log_inputs::{read_map, said_of_logs, sources};
 use crate::output::check_folder;
 use crate::warnings::{file_name, of_log, snapped};
 use crate::{Error, session};
@@ -33,7 +34,11 @@ pub fn check(arguments: &CheckArguments, console: &Console) -> Result<CheckOutco
     let place = match &arguments.out {
         Some(folder) => {
             check_folder(folder)?;
-            let inputs: Vec<_> = std::iter::once(&arguments.urdf).chain(&arguments.logs).cloned().collect();
+            let inputs: Vec<_> = std::iter::once(&arguments.urdf)
+                .chain(&arguments.logs)
+                .chain(&arguments.map)
+                .cloned()
+                .collect();
             check_inputs(&inputs, &[folder.join(RESULT_FILE)])?;
             Some((folder, Lock::acquire(&folder.join(RESULT_FILE), "phiw check")?))
         }
@@ -42,16 +47,18 @@ pub fn check(arguments: &CheckArguments, console: &Console) -> Result<CheckOutco
     let robot = session::read_robot(&arguments.session())?;
     let tree = &robot.tree;
     let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
+    let map = read_map(arguments.map.as_deref(), &robot.all_joints())?;
     let mut surveys = Vec::new();
-    for path in &arguments.logs {
+    for source in sources(&arguments.logs, map.as_ref()) {
         let mut progress = |done, total| console.progress("surveying", done, total);
-        surveys.push(phiw_telemetry::survey(path, &joints, TorqueColumns::Optional, &mut progress)?);
+        surveys.push(phiw_telemetry::survey(source, &joints, TorqueColumns::Optional, &mut progress)?);
     }
     console.finish();
     let findings = robot_findings(tree, &surveys, &CheckSettings::default());
     let refused = [check_logs(tree, &surveys, &[]).err(), check_excitation(tree, &surveys).err()];
     let refused: Vec<String> = refused.iter().flatten().map(InputError::to_string).collect();
-    let notes = Vec::from_iter(snapped(robot.snapped));
+    let mut notes = Vec::from_iter(snapped(robot.snapped));
+    notes.extend(map.iter().flat_map(|map| said_of_logs(map, &arguments.logs)));
     let report = report(tree, &surveys, &findings, (&notes, &refused));
     if let Some((folder, _lock)) = &place {
         let text = serde_json::to_string_pretty(&report)

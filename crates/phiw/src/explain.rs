@@ -1,7 +1,8 @@
 //! `phiw explain`: the declared model, what it lacks, and the error before and after.
 
 use crate::analysis::{Analysis, Rows, noise_floor};
-use crate::arguments::{ExplainArguments, quoted};
+use crate::argument_values::quoted;
+use crate::arguments::ExplainArguments;
 use crate::console::Console;
 use crate::draws::Draws;
 use crate::explain_page;

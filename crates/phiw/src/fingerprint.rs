@@ -8,7 +8,7 @@ use phiw_telemetry::Survey;
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A fingerprint of each log of a session.
 ///
@@ -28,15 +28,28 @@ pub fn of_session(session: &Session) -> Result<Vec<DataFingerprint>, Error> {
     session.logs.surveys().iter().enumerate().map(of_log).collect()
 }
 
-/// The hash of a file's bytes, in hexadecimal digits.
+/// The hash of the bytes of a file or folder, in hexadecimal digits.
 ///
 /// # Errors
-/// The file cannot be read.
+/// It cannot be read.
 pub fn sha256(path: &Path) -> Result<String, Error> {
     let unreadable = |source| Error::Unreadable { path: path.to_owned(), source };
     let mut hasher = Hasher(Sha256::new());
-    io::copy(&mut File::open(path).map_err(unreadable)?, &mut hasher).map_err(unreadable)?;
+    for file in files(path).map_err(unreadable)? {
+        io::copy(&mut File::open(file).map_err(unreadable)?, &mut hasher).map_err(unreadable)?;
+    }
     Ok(hasher.0.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// The file, or all files in the folder and below it, by name.
+fn files(path: &Path) -> io::Result<Vec<PathBuf>> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_owned()]);
+    }
+    let mut entries = path.read_dir()?.map(|entry| Ok(entry?.path())).collect::<io::Result<Vec<_>>>()?;
+    entries.sort();
+    let below = entries.iter().map(|entry| files(entry)).collect::<io::Result<Vec<_>>>()?;
+    Ok(below.into_iter().flatten().collect())
 }
 
 /// What is written is hashed.

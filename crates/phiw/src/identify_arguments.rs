@@ -27,6 +27,7 @@ impl Args for IdentifyArguments {
             "mass",
             "total_mass",
             "cutoff_hz",
+            "map",
             "parallel_cutoff_hz",
         ];
         SessionArguments::augment_args(command)

@@ -2,6 +2,7 @@
 
 mod actuator_table;
 pub mod analysis;
+mod argument_values;
 pub mod arguments;
 pub mod bandwidth;
 pub mod check;
@@ -22,6 +23,8 @@ mod identified_urdf;
 pub mod identify;
 mod identify_arguments;
 mod input;
+mod log_inputs;
+pub mod map;
 mod model_file;
 mod model_use;
 pub mod next;

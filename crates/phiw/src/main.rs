@@ -11,6 +11,9 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     // A fault of ours is one message and status 1, like any other failure that is not the input's.
     std::panic::set_hook(Box::new(|fault| {
+        if phiw_telemetry::is_guarded() {
+            return;
+        }
         // A library's way of saying that the system gave no memory.
         match fault.to_string().contains("AllocError") {
             true => console::say(
@@ -82,6 +85,10 @@ fn told(command: &Command, console: &Console) -> Result<Told, Error> {
         Command::Check(arguments) => {
             let outcome = phiw::check::check(arguments, console)?;
             Told { summary: outcome.summary, warnings: Vec::new(), failures: no_failures }
+        }
+        Command::Map(arguments) => {
+            let outcome = phiw::map::map(arguments)?;
+            Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
         }
         Command::Retarget(arguments) => {
             let outcome = phiw::retarget::retarget(arguments, console)?;

@@ -1,6 +1,7 @@
 //! A `model.json` used by itself, on new logs: its robot, its columns, and the logs.
 
 use crate::Error;
+use crate::log_inputs::{read_map, sources, without_payload};
 use crate::model_file::ModelFile;
 use phiw_dynamics::Tree;
 use phiw_dynamics::urdf::{UrdfOptions, held_joints, read_urdf};
@@ -17,6 +18,8 @@ const SAME_POSITION: f64 = 1e-9;
 pub struct Reading<'a> {
     /// The logs.
     pub logs: &'a [PathBuf],
+    /// What their columns mean.
+    pub map: Option<&'a Path>,
     /// Joints that stand still in the logs, and where \[rad, m\].
     pub hold: &'a [(String, f64)],
     /// Whether the logs must have torques, and move all joints that the model moves.
@@ -70,9 +73,14 @@ impl ModelUse {
             ..ConditioningOptions::default()
         };
         let every_row = ConditioningOptions { decimation: Some(1), ..thinned.clone() };
+        let held_before = model.held.iter().map(|(joint, _)| joint.as_str());
+        let joints: Vec<String> = tree.joint_names().chain(held_before).map(str::to_owned).collect();
+        let map = read_map(reading.map, &joints)?;
+        without_payload(reading.logs, map.as_ref())?;
+        let sources = sources(reading.logs, map.as_ref());
         let logs = match reading.complete {
-            true => LogSet::open_unexcited(&logged, reading.logs, &[], &every_row, progress)?,
-            false => LogSet::open_for_prediction(&logged, reading.logs, &every_row, progress)?,
+            true => LogSet::open_unexcited(&logged, &sources, &[], &every_row, progress)?,
+            false => LogSet::open_for_prediction(&logged, &sources, &every_row, progress)?,
         };
         let thinned = phiw_telemetry::Conditioning::choose(logs.surveys(), &thinned)?;
         let stride = |survey: &Survey| Ok(thinned.plan(survey)?.decimation());

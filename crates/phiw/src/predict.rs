@@ -43,6 +43,7 @@ pub fn predict(arguments: &PredictArguments, console: &Console) -> Result<Predic
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
     let reading = Reading {
         logs: &arguments.logs,
+        map: arguments.map.as_deref(),
         hold: &arguments.hold,
         complete: false,
         cutoff_hz: arguments.cutoff_hz,

@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::arguments::SessionArguments;
 use crate::input::read_text;
+use crate::log_inputs::{read_map, train_and_validate};
 use phiw_dynamics::urdf::{Finding, UrdfOptions, UrdfReading, read_urdf};
 use phiw_dynamics::{DimensionError, JointType, Tree};
 use phiw_effects::{Catalogue, SignalRanges};
@@ -64,8 +65,9 @@ impl Session {
             parallel_cutoff_hz: arguments.parallel_cutoff_hz,
             ..ConditioningOptions::default()
         };
-        let logs =
-            LogSet::open_unexcited(&robot.tree, &arguments.train, &arguments.validate, &options, progress)?;
+        let map = read_map(arguments.map.as_deref(), &robot.all_joints())?;
+        let [train, validate] = train_and_validate(&arguments.train, &arguments.validate, map.as_ref());
+        let logs = LogSet::open_unexcited(&robot.tree, &train, &validate, &options, progress)?;
         Ok(Session::of(robot, declared, logs, arguments.clone()))
     }
 
@@ -191,6 +193,14 @@ pub(crate) struct RobotOfUrdf {
     pub held: Vec<(String, f64)>,
     /// Number of angles and axes that were made exact.
     pub snapped: usize,
+}
+
+impl RobotOfUrdf {
+    /// Joints that move and joints that are held, by name.
+    pub fn all_joints(&self) -> Vec<String> {
+        let held = self.held.iter().map(|(joint, _)| joint.as_str());
+        self.tree.joint_names().chain(held).map(str::to_owned).collect()
+    }
 }
 
 /// The robot of a session.

@@ -113,6 +113,7 @@ pub fn simulate(arguments: &SimulateArguments, console: &Console) -> Result<Simu
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
     let reading = Reading {
         logs: &arguments.logs,
+        map: arguments.map.as_deref(),
         hold: &arguments.hold,
         complete: true,
         cutoff_hz: None,

@@ -2,8 +2,8 @@
 
 use crate::session::Session;
 use phiw_identification::Identified;
-use phiw_telemetry::Survey;
 use phiw_telemetry::segments::GapReason;
+use phiw_telemetry::{Payload, Survey};
 use std::path::Path;
 
 /// All warnings: about the logs and the URDF, then about the fit.
@@ -84,23 +84,28 @@ const COLUMNS_NAMED: usize = 10;
 
 /// Skipped rows, jumps, short stretches, unknown columns.
 pub fn of_log(survey: &Survey) -> Vec<String> {
-    let name = file_name(&survey.path);
+    let (name, rows_are) = (file_name(&survey.path), survey.rows_are);
     let gap = |gap: &phiw_telemetry::segments::GapCount| {
         let (count, line) = (gap.count, gap.first_line);
         let rows = if count == 1 { "row" } else { "rows" };
         match gap.reason {
             GapReason::TimeJump if count == 1 => {
-                format!("{name}: time jumps at line {line}; the log is split there")
+                format!("{name}: time jumps at {rows_are} {line}; the log is split there")
             }
             GapReason::TimeJump => {
-                format!("{name}: time jumps {count} times, first at line {line}; the log is split there")
+                format!(
+                    "{name}: time jumps {count} times, first at {rows_are} {line}; the log is split there"
+                )
             }
             GapReason::Spike => {
                 let columns: Vec<String> = survey
                     .spikes
                     .iter()
                     .map(|spike| {
-                        format!("{} ({} first at line {})", spike.column, spike.samples, spike.first_line)
+                        format!(
+                            "{} ({} first at {rows_are} {})",
+                            spike.column, spike.samples, spike.first_line
+                        )
                     })
                     .collect();
                 format!(
@@ -108,12 +113,21 @@ pub fn of_log(survey: &Survey) -> Vec<String> {
                     columns.join(", ")
                 )
             }
+            GapReason::LeftOut => format!("{name}: {count} {rows} left out by the map"),
             reason => format!(
-                "{name}: {count} {rows} skipped ({reason}), first at line {line}; the log is split there"
+                "{name}: {count} {rows} skipped ({reason}), first at {rows_are} {line}; the log is split there"
             ),
         }
     };
-    let mut warnings: Vec<String> = survey.gaps.iter().map(gap).collect();
+    let mut warnings: Vec<String> = survey.notes.iter().map(|note| format!("{name}: {note}")).collect();
+    if let Some(map) = &survey.source.map
+        && let Some(Payload::Known { link, mass_kg, .. }) = map.facts(&survey.path).payload
+    {
+        warnings.push(format!(
+            "{name}: the torques of a payload of {mass_kg} kg at `{link}`, a point mass, are taken off those that were measured"
+        ));
+    }
+    warnings.extend(survey.gaps.iter().map(gap));
     if survey.short_segments > 0 {
         warnings
             .push(format!("{name}: {} stretches between gaps are too short to use", survey.short_segments));

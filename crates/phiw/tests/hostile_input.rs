@@ -83,8 +83,8 @@ fn what_a_fit_does_not_need_does_not_stop_it() {
 
 #[test]
 fn files_that_are_no_text_are_called_what_they_are() {
-    refused(identify(None, Some(b"\xff\xfet\0,\0q\0")), "train.csv: this is not text but UTF-16");
-    refused(identify(None, Some(b"\x1f\x8b\x08\0\0\0")), "gzip: unpack it");
+    refused(identify(None, Some(b"\xff\xfet\0,\0q\0")), "train.csv: this is no log but UTF-16");
+    refused(identify(None, Some(b"\x1f\x8b\x08\0\0\0")), "train.csv: the gzip is damaged or cut short");
     refused(identify(None, Some(b"t,q\0\0\0\0")), "train.csv");
     refused(identify(Some(b"\xff\xfe<\0r\0"), None), "robot.urdf: this is not text but UTF-16");
     refused(identify(Some(b"\x7fELF\xff\xff"), None), "a program");

@@ -87,7 +87,7 @@ fn check(spoil: impl FnOnce(&mut Scene), expected: &[&str]) {
 fn files_that_are_not_there_or_not_what_they_should_be() {
     check(|scene| scene.command_line[2] = "DIR/absent.urdf".into(), &["absent.urdf: no such file"]);
     check(|scene| scene.command_line[4] = "DIR/absent.csv".into(), &["absent.csv: no such file"]);
-    check(|scene| scene.command_line[4] = "DIR".into(), &["can't be read"]);
+    check(|scene| scene.command_line[4] = "DIR".into(), &["this is a folder", "a LeRobot dataset"]);
     check(|scene| scene.more("--validate DIR/absent.csv"), &["absent.csv: no such file"]);
     check(|scene| scene.urdf = "t,q.joint_1\n0,0\n".into(), &["robot.urdf: not a URDF", "not XML"]);
     check(|scene| scene.urdf = "<html/>".into(), &["robot.urdf: not a URDF", "<html>"]);

@@ -1,6 +1,8 @@
 //! From a header line to the columns that are used.
 
 use crate::LogError;
+use crate::map::{Expression, LogMap, Lookup, Signal};
+use phiw_log_formats::Table;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -97,6 +99,14 @@ pub(crate) enum Optional {
 }
 
 impl Optional {
+    fn signal(self) -> Signal {
+        match self {
+            Optional::Velocity => Signal::Velocity,
+            Optional::Acceleration => Signal::Acceleration,
+            Optional::Temperature => Signal::Temperature,
+        }
+    }
+
     pub fn prefix(self) -> &'static str {
         match self {
             Optional::Velocity => "qd.",
@@ -106,67 +116,79 @@ impl Optional {
     }
 }
 
-/// The used columns of one file.
+/// The used columns of one log.
 #[derive(Debug, Clone)]
 pub(crate) struct Columns {
     pub layout: Layout,
-    /// Column of each place of the layout.
-    pub of_place: Vec<usize>,
-    /// All names in the header, in order.
-    pub names: Vec<String>,
+    /// How each place of the layout is computed from the log's columns.
+    pub of_place: Vec<Expression>,
     /// Names of columns that are not used.
     pub ignored: Vec<String>,
+    /// What was taken for what without being told.
+    pub notes: Vec<String>,
 }
 
 impl Columns {
     /// # Errors
-    /// A column that is missing or there twice.
-    pub fn from_header(
+    /// A column that is missing or there twice, or a map that does not fit.
+    pub fn find(
         path: &Path,
-        names: Vec<String>,
+        table: &dyn Table,
+        map: Option<&LogMap>,
         joints: &[String],
         torque: TorqueColumns,
     ) -> Result<Self, LogError> {
-        let find = |name: &str| names.iter().position(|candidate| candidate == name);
-        let Some(t) = find("t") else {
-            return Err(LogError::NoTimeColumn { path: path.into(), hint: time_hint(&names) });
+        let header = table.header();
+        let lookup = Lookup { path, header: &header, columns: table.columns(), map, joints };
+        let names: Vec<String> = table.columns().iter().map(|column| column.name.clone()).collect();
+        let Some(t) = lookup.time()? else {
+            return Err(LogError::NoTimeColumn { path: path.into(), header, hint: time_hint(&names) });
         };
-        let has_torque = match torque {
-            TorqueColumns::Required => true,
-            TorqueColumns::Optional => joints.iter().any(|joint| find(&format!("tau.{joint}")).is_some()),
-            TorqueColumns::Absent => false,
+        let all = |signal: Signal| {
+            joints.iter().map(|joint| lookup.signal(signal, joint)).collect::<Result<Vec<_>, _>>()
         };
+        let torques = match torque {
+            TorqueColumns::Absent => vec![None; joints.len()],
+            _ => all(Signal::Torque)?,
+        };
+        let has_torque = torque == TorqueColumns::Required || torques.iter().any(Option::is_some);
         let mut of_place = vec![t];
         let mut missing = Vec::new();
-        for prefix in ["q.", "tau."].iter().take(1 + usize::from(has_torque)) {
-            for joint in joints {
-                let name = format!("{prefix}{joint}");
-                match find(&name) {
-                    Some(column) => of_place.push(column),
-                    None => missing.push(name),
+        let required = [(Signal::Position, all(Signal::Position)?), (Signal::Torque, torques)];
+        for (signal, found) in required.into_iter().take(1 + usize::from(has_torque)) {
+            for (joint, found) in joints.iter().zip(found) {
+                match found {
+                    Some(expression) => of_place.push(expression),
+                    None => missing.push(format!("{}.{joint}", signal.name())),
                 }
             }
         }
         if !missing.is_empty() {
             let nearest = nearest(&missing[0], &names);
-            return Err(LogError::MissingColumn { path: path.into(), missing, nearest });
+            return Err(LogError::MissingColumn { path: path.into(), header, missing, nearest });
         }
-        let optional =
-            |signal: Optional, joint: usize| find(&format!("{}{}", signal.prefix(), joints[joint]));
-        let layout = Layout::new(joints.len(), has_torque, |signal, joint| optional(signal, joint).is_some());
-        for signal in [Optional::Velocity, Optional::Acceleration, Optional::Temperature] {
-            of_place.extend((0..joints.len()).filter_map(|joint| optional(signal, joint)));
+        let optional = [Optional::Velocity, Optional::Acceleration, Optional::Temperature];
+        let optional: Vec<(Optional, Vec<Option<Expression>>)> = optional
+            .into_iter()
+            .map(|signal| Ok((signal, all(signal.signal())?)))
+            .collect::<Result<_, LogError>>()?;
+        let layout = Layout::new(joints.len(), has_torque, |signal, joint| {
+            optional.iter().any(|(other, found)| *other == signal && found[joint].is_some())
+        });
+        of_place.extend(optional.into_iter().flat_map(|(_, found)| found).flatten());
+        let mut used = vec![false; names.len()];
+        for expression in &mut of_place {
+            expression.visit_columns(&mut |column| used[*column] = true);
         }
-        for &column in &of_place {
-            if names.iter().filter(|name| **name == names[column]).count() > 1 {
-                return Err(LogError::DuplicateColumn { path: path.into(), column: names[column].clone() });
-            }
-        }
-        let ignored = (0..names.len())
-            .filter(|column| !of_place.contains(column))
-            .map(|column| names[column].clone())
-            .collect();
-        Ok(Columns { layout, of_place, names, ignored })
+        let ignored = names.into_iter().zip(used).filter(|(_, used)| !used).map(|(name, _)| name).collect();
+        let by_order = map.is_none() && lookup.is_array_of_joints(Signal::Position);
+        let notes = by_order.then(|| {
+            format!(
+                "the entries of `q` were taken for the joints in the robot's order: {}",
+                joints.join(", ")
+            )
+        });
+        Ok(Columns { layout, of_place, ignored, notes: notes.into_iter().collect() })
     }
 }
 
@@ -175,22 +197,19 @@ fn time_hint(names: &[String]) -> String {
         let plain = name.to_lowercase();
         ["t", "time", "timestamp", "stamp", "time_s", "t_s", "time [s]", "t [s]"].contains(&plain.as_str())
     };
-    if let [only] = names
-        && let Some(separator) = [';', '\t'].into_iter().find(|&separator| only.contains(separator))
-    {
-        return format!("the header is separated by {separator:?}; separate the columns by commas");
-    }
     if names.iter().any(|name| name.parse::<f64>().is_ok()) {
         return "the first line must be a header with the columns' names".into();
     }
     match names.iter().find(spelled) {
-        Some(name) => format!("rename `{name}` if that is it, in seconds"),
+        Some(name) => {
+            format!("rename `{name}` if that is it, in seconds, or name it in a map: time = \"{name}\"")
+        }
         None => "add one".into(),
     }
 }
 
 /// Up to three names like `wanted`, best first.
-fn nearest(wanted: &str, names: &[String]) -> Vec<String> {
+pub(crate) fn nearest(wanted: &str, names: &[String]) -> Vec<String> {
     let mut scored: Vec<(f64, &String)> = names
         .iter()
         .map(|name| (strsim::jaro_winkler(&wanted.to_lowercase(), &name.to_lowercase()), name))

@@ -1,25 +1,19 @@
 //! What can be wrong with a log.
 
+use crate::MapError;
+use phiw_log_formats::FormatError;
 use std::io;
 use std::path::PathBuf;
 
 /// What is wrong with a log, where, and how to mend it.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
-    /// There is no such file.
-    #[error("{}: no such file; check the path", path.display())]
-    NotFound {
-        /// The path as it was given.
-        path: PathBuf,
-    },
-    /// The file exists but can't be read.
-    #[error("{}: can't be read: {source}", path.display())]
-    Unreadable {
-        /// The path as it was given.
-        path: PathBuf,
-        /// What the operating system said.
-        source: io::Error,
-    },
+    /// The file can't be read, or is no log.
+    #[error(transparent)]
+    Format(#[from] FormatError),
+    /// The map of the log's columns is wrong.
+    #[error(transparent)]
+    Map(#[from] MapError),
     /// The file can't be written.
     #[error("{}: can't be written: {source}", path.display())]
     Unwritable {
@@ -28,22 +22,6 @@ pub enum LogError {
         /// What the operating system said.
         source: io::Error,
     },
-    /// The file is something else than text.
-    #[error("{}: this is not text but {kind}; a log is a CSV in UTF-8", path.display())]
-    NotText {
-        /// The path as it was given.
-        path: PathBuf,
-        /// What its first bytes look like, and the mend where there is one.
-        kind: &'static str,
-    },
-    /// More columns than a log has.
-    #[error("{}, line 1: {columns} columns are more than a log has; check the path", path.display())]
-    TooManyColumns {
-        /// The path as it was given.
-        path: PathBuf,
-        /// Columns in the header.
-        columns: usize,
-    },
     /// The file holds nothing, or a header only.
     #[error("{}: the log is empty; expected a header line such as `t,q.joint_1,tau.joint_1` and rows of numbers", path.display())]
     Empty {
@@ -51,63 +29,47 @@ pub enum LogError {
         path: PathBuf,
     },
     /// The header has no column `t`.
-    #[error("{}, line 1: no column `t` (time in seconds); {hint}", path.display())]
+    #[error("{}{header}: no column `t` (time in seconds); {hint}", path.display())]
     NoTimeColumn {
         /// The log.
         path: PathBuf,
+        /// Where the columns' names stand; starts with a separator or is empty.
+        header: String,
         /// What the header looks like instead.
         hint: String,
     },
     /// Columns that the joints need are missing.
-    #[error("{}, line 1: no column `{}`{}; {}", path.display(), missing[0], others(missing), nearest_hint(nearest))]
+    #[error("{}{header}: no column `{}`{}; {}", path.display(), missing[0], others(missing), nearest_hint(nearest))]
     MissingColumn {
         /// The log.
         path: PathBuf,
+        /// Where the columns' names stand; starts with a separator or is empty.
+        header: String,
         /// The columns looked for and not found; at least one.
         missing: Vec<String>,
         /// The header's columns nearest in name to the first missing one, best first.
         nearest: Vec<String>,
     },
     /// Two columns have the same name.
-    #[error("{}, line 1: two columns are named `{column}`; rename or remove one", path.display())]
+    #[error("{}{header}: two columns are named `{column}`; rename or remove one", path.display())]
     DuplicateColumn {
         /// The log.
         path: PathBuf,
+        /// Where the columns' names stand; starts with a separator or is empty.
+        header: String,
         /// Their name.
         column: String,
     },
-    /// A cell of a used column is not a number.
-    #[error("{}, line {line}, column `{column}`: `{cell}` is not a number; leave the cell empty to mark a gap", path.display())]
-    NotANumber {
-        /// The log.
-        path: PathBuf,
-        /// Line in the file, counted from 1.
-        line: u64,
-        /// Name of the column.
-        column: String,
-        /// The cell's text.
-        cell: String,
-    },
-    /// A row, not the last, has too few or too many cells.
-    #[error("{}, line {line}: {found} cells, but the header has {expected}; mend or delete the line", path.display())]
-    WrongCellCount {
-        /// The log.
-        path: PathBuf,
-        /// Line in the file, counted from 1.
-        line: u64,
-        /// Cells in the header.
-        expected: usize,
-        /// Cells in the row.
-        found: usize,
-    },
     /// A time stamp is earlier than the one before it.
     #[error(
-        "{}, line {line}, column `t`: time runs backwards, from {previous} s to {stamp} s; sort the rows, or split the file into one log a run",
+        "{}, {rows_are} {line}, column `t`: time runs backwards, from {previous} s to {stamp} s; sort the rows, or split the file into one log a run",
         path.display()
     )]
     TimeBackwards {
         /// The log.
         path: PathBuf,
+        /// What is counted: `line`, `message` or `row`.
+        rows_are: &'static str,
         /// Line in the file, counted from 1.
         line: u64,
         /// The last stamp before, in seconds.
@@ -185,16 +147,6 @@ pub enum LogError {
         /// Values that the array holds.
         found: usize,
     },
-}
-
-impl LogError {
-    /// An [`io::Error`] met while reading `path`.
-    pub(crate) fn reading(path: PathBuf, source: io::Error) -> Self {
-        match source.kind() {
-            io::ErrorKind::NotFound => LogError::NotFound { path },
-            _ => LogError::Unreadable { path, source },
-        }
-    }
 }
 
 fn others(missing: &[String]) -> String {

@@ -20,12 +20,14 @@ pub enum GapReason {
     DuplicateStamp,
     /// The last row is cut short, or may be since its line feed is missing.
     TruncatedLastRow,
+    /// A stretch that the map of the log leaves out.
+    LeftOut,
     /// Time jumps: samples are missing, though no row is.
     TimeJump,
 }
 
 impl GapReason {
-    pub(crate) const ALL: [GapReason; 8] = [
+    pub(crate) const ALL: [GapReason; 9] = [
         GapReason::EmptyCell,
         GapReason::NotFinite,
         GapReason::Huge,
@@ -33,6 +35,7 @@ impl GapReason {
         GapReason::StillTorques,
         GapReason::DuplicateStamp,
         GapReason::TruncatedLastRow,
+        GapReason::LeftOut,
         GapReason::TimeJump,
     ];
 }
@@ -47,6 +50,7 @@ impl fmt::Display for GapReason {
             GapReason::StillTorques => "no torque changes while the robot moves",
             GapReason::DuplicateStamp => "duplicate time stamp",
             GapReason::TruncatedLastRow => "truncated last row",
+            GapReason::LeftOut => "left out by the map",
             GapReason::TimeJump => "jump in time",
         })
     }

@@ -32,6 +32,11 @@ pub(crate) trait Rows {
 
     /// Name in error messages.
     fn path(&self) -> &Path;
+
+    /// What the lines of [`Row`] count: `line`, `message` or `row`.
+    fn rows_are(&self) -> &'static str {
+        "line"
+    }
 }
 
 impl<R: Rows + ?Sized> Rows for &mut R {
@@ -49,6 +54,10 @@ impl<R: Rows + ?Sized> Rows for &mut R {
 
     fn path(&self) -> &Path {
         (**self).path()
+    }
+
+    fn rows_are(&self) -> &'static str {
+        (**self).rows_are()
     }
 }
 
@@ -68,16 +77,10 @@ impl<R: Rows + ?Sized> Rows for Box<R> {
     fn path(&self) -> &Path {
         (**self).path()
     }
-}
 
-/// Rows of a file, whatever its format. Files are read again for every pass, so a file says whether it is
-/// still the same.
-pub(crate) trait LogFile: Rows {
-    /// Columns that are not used.
-    fn ignored_columns(&self) -> &[String];
-
-    /// A hash of all bytes read so far: of the whole file once the rows are at their end.
-    fn content_hash(&self) -> u64;
+    fn rows_are(&self) -> &'static str {
+        (**self).rows_are()
+    }
 }
 
 /// Why a number can't be a measurement.

@@ -1,11 +1,11 @@
 //! A log in memory: for simulators and small files.
 
 use crate::columns::{Layout, Optional};
-use crate::log_file::open_log;
+use crate::log_rows::open_log;
 use crate::reader::{Row, Rows, unusable};
 use crate::stream::stream_rows;
 use crate::survey::survey_rows;
-use crate::{Block, Conditioning, LogColumns, LogError, LogWriter, Survey, TorqueColumns};
+use crate::{Block, Conditioning, LogColumns, LogError, LogSource, LogWriter, Survey, TorqueColumns};
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -36,8 +36,12 @@ impl Recording {
     /// # Errors
     /// What [`survey`](crate::survey()) finds but for time running backwards, which is seen when the
     /// recording is used.
-    pub fn from_csv(path: &Path, joints: &[String], torque: TorqueColumns) -> Result<Self, LogError> {
-        let mut reader = open_log(path, joints, torque)?;
+    pub fn read(
+        source: impl Into<LogSource>,
+        joints: &[String],
+        torque: TorqueColumns,
+    ) -> Result<Self, LogError> {
+        let mut reader = open_log(&source.into(), joints, torque)?;
         let layout = reader.layout().clone();
         let n = joints.len();
         let mut values = vec![0.0; layout.width];
@@ -74,6 +78,14 @@ impl Recording {
                 }
             }
         }
+    }
+
+    /// [`Recording::read`] of a file.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn from_csv(path: &Path, joints: &[String], torque: TorqueColumns) -> Result<Self, LogError> {
+        Self::read(path, joints, torque)
     }
 
     /// Rows.

@@ -70,11 +70,11 @@ impl RowCounts {
     }
 
     /// The reasons in words, starting with a separator; empty where there are none.
-    pub fn reasons(&self) -> String {
+    pub fn reasons(&self, rows_are: &str) -> String {
         let words: Vec<_> = GapReason::ALL
             .iter()
             .filter_map(|reason| self.gaps.iter().find(|gap| gap.reason == *reason))
-            .map(|gap| format!("{} × {} (first in line {})", gap.count, gap.reason, gap.first_line))
+            .map(|gap| format!("{} × {} (first in {rows_are} {})", gap.count, gap.reason, gap.first_line))
             .collect();
         if words.is_empty() { String::new() } else { format!(": {}", words.join(", ")) }
     }
@@ -114,7 +114,13 @@ pub(crate) fn split(
         };
         if let (Some(t), Some(previous)) = (t, previous) {
             if t < previous {
-                return Err(LogError::TimeBackwards { path: rows.path().into(), line, previous, stamp: t });
+                return Err(LogError::TimeBackwards {
+                    path: rows.path().into(),
+                    rows_are: rows.rows_are(),
+                    line,
+                    previous,
+                    stamp: t,
+                });
             }
             if t == previous && reason.is_none() {
                 reason = Some(GapReason::DuplicateStamp);

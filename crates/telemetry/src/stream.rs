@@ -2,7 +2,7 @@
 
 use crate::blocks::BlockMaker;
 use crate::clock::Resampler;
-use crate::log_file::open_log;
+use crate::log_rows::open_log;
 use crate::reader::Rows;
 use crate::segments::Segment;
 use crate::segments::{SegmentSink, split};
@@ -43,7 +43,7 @@ pub fn stream(
     sink: &mut dyn FnMut(Block) -> ControlFlow<()>,
 ) -> Result<StreamSummary, LogError> {
     let joints: Vec<String> = survey.joints.iter().map(|joint| joint.name.clone()).collect();
-    let mut rows = open_log(&survey.path, &joints, survey.torque)?;
+    let mut rows = open_log(&survey.source, &joints, survey.torque)?;
     let summary = stream_rows(&mut rows, survey, conditioning, progress, sink)?;
     if !summary.stopped && rows.content_hash() != survey.content_hash {
         return Err(LogError::Changed { path: survey.path.clone() });

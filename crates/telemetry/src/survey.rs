@@ -8,7 +8,8 @@ use crate::gap::GapReason;
 use crate::histogram::Histogram;
 use crate::joint_survey::JointSurvey;
 use crate::joint_survey::{Five, JointCollector};
-use crate::log_file::open_log;
+use crate::log_rows::open_log;
+use crate::log_source::LogSource;
 use crate::reader::{Row, Rows};
 use crate::segments::{GapCount, Segment};
 use crate::segments::{RowCounts, SegmentSink, SpikeCount, split};
@@ -17,7 +18,8 @@ use crate::spectrum::SpectrumEstimator;
 use crate::spike::{SpikeFinder, WithoutSpikes};
 use crate::still::{StillFinder, WithoutStill};
 use phiw_spikes::{SpikeSettings, WINDOW};
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 use std::path::{Path, PathBuf};
 
 /// What is in a log: the result of [`survey`], and what [`stream`](crate::stream) needs to read it again.
@@ -25,6 +27,14 @@ use std::path::{Path, PathBuf};
 pub struct Survey {
     /// The log.
     pub path: PathBuf,
+    /// How it is read.
+    #[serde(skip, default = "LogSource::nowhere")]
+    pub source: LogSource,
+    /// What lines are counted in: `line`, `message` or `row`.
+    #[serde(deserialize_with = "known_rows")]
+    pub rows_are: RowsAre,
+    /// How the rows came about, where the log does not say it plainly.
+    pub notes: Vec<String>,
     /// Place in the session, see [`arrange_session`].
     pub session: Session,
     /// What was asked for when it was surveyed.
@@ -77,6 +87,18 @@ pub struct Survey {
     pub content_hash: u64,
     /// Power spectra.
     pub spectrum: Spectrum,
+}
+
+/// A name that is known beforehand, under a name of its own: a reference would be read from the text.
+type RowsAre = &'static str;
+
+/// What lines can be counted in.
+const ROWS_ARE: [&str; 3] = ["line", "message", "row"];
+
+fn known_rows<'de, D: Deserializer<'de>>(deserializer: D) -> Result<&'static str, D::Error> {
+    let written = String::deserialize(deserializer)?;
+    let known = ROWS_ARE.into_iter().find(|known| *known == written);
+    known.ok_or_else(|| D::Error::custom(format!("rows are `{written}`; known are {}", ROWS_ARE.join(", "))))
 }
 
 /// Where a log lies in its session.
@@ -140,16 +162,19 @@ pub fn arrange_session(surveys: &mut [Survey]) {
 /// A file that can't be read, columns that are missing, cells that are not numbers, time that runs backwards,
 /// no usable row.
 pub fn survey(
-    path: &Path,
+    source: impl Into<LogSource>,
     joints: &[String],
     torque: TorqueColumns,
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<Survey, LogError> {
-    let mut open = || open_log(path, joints, torque);
+    let source = source.into();
+    let mut open = || open_log(&source, joints, torque);
     let (mut survey, reader) = survey_rows(&mut open, joints, progress)?;
     survey.torque = torque;
     survey.ignored_columns = reader.ignored_columns().to_vec();
     survey.content_hash = reader.content_hash();
+    survey.notes = reader.notes();
+    survey.source = source;
     Ok(survey)
 }
 
@@ -205,10 +230,14 @@ pub(crate) fn survey_rows<R: Rows>(
     if counts.used == 0 {
         return Err(match counts.rows {
             0 => LogError::Empty { path: rows.path().into() },
-            n => LogError::NoUsableRows { path: rows.path().into(), rows: n, reasons: counts.reasons() },
+            n => LogError::NoUsableRows {
+                path: rows.path().into(),
+                rows: n,
+                reasons: counts.reasons(rows.rows_are()),
+            },
         });
     }
-    let survey = collector.finish(rows.path(), joints, counts);
+    let survey = collector.finish(rows.path(), rows.rows_are(), joints, counts);
     Ok((Survey { spikes, spike_bounds, still, ..survey }, rows))
 }
 
@@ -330,7 +359,7 @@ impl<'a> Collector<'a> {
         std::array::from_fn(|i| self.recent[i * self.layout.width + place])
     }
 
-    fn finish(self, path: &Path, joints: &[String], counts: RowCounts) -> Survey {
+    fn finish(self, path: &Path, rows_are: &'static str, joints: &[String], counts: RowCounts) -> Survey {
         let votes: Vec<f64> = self.joints.iter().filter_map(JointCollector::smoother_when_uniform).collect();
         let mean = votes.iter().sum::<f64>() / votes.len().max(1) as f64;
         let jitter = (self.step_square / self.step_count.max(1.0)).sqrt();
@@ -339,6 +368,9 @@ impl<'a> Collector<'a> {
         let period = if self.step_count > 0.0 { self.step_sum / self.step_count } else { self.steps.median };
         Survey {
             path: path.into(),
+            source: LogSource::from(path),
+            rows_are,
+            notes: Vec::new(),
             session: Session::default(),
             torque: if self.layout.torque { TorqueColumns::Required } else { TorqueColumns::Absent },
             rows: counts.rows,

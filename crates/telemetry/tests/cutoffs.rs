@@ -143,7 +143,7 @@ fn real_logs() {
     let check = |names: &[&str], joints: &[&str], range: std::ops::Range<f64>| {
         let joints: Vec<String> = joints.iter().map(|joint| (*joint).into()).collect();
         let survey = |name: &&str| {
-            survey(&folder.join(name), &joints, TorqueColumns::Required, &mut |_, _| {}).unwrap()
+            survey(folder.join(name), &joints, TorqueColumns::Required, &mut |_, _| {}).unwrap()
         };
         let surveys: Vec<_> = names.iter().map(survey).collect();
         let conditioning = Conditioning::choose(&surveys, &ConditioningOptions::default()).unwrap();

@@ -52,7 +52,7 @@ fn a_file_that_is_not_there() {
     let message = run(&folder.path().join("none.csv")).unwrap_err().to_string();
     assert!(message.contains("none.csv: no such file"), "{message}");
     let message = run(folder.path()).unwrap_err().to_string();
-    assert!(message.contains("can't be read"), "{message}");
+    assert!(message.contains("this is a folder"), "{message}");
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn empty_logs() {
 fn wrong_headers() {
     check("q.a,q.b\n1,2\n", &["line 1", "no column `t`", "add one"]);
     check("time,q.a\n1,2\n", &["no column `t`", "rename `time`"]);
-    check("t;q.a;q.b\n1;2;3\n", &["no column `t`", "separated by ';'"]);
+    check("t;q.a;q.b\n1;2;3\n", &["no column `tau.a`", "(nor `tau.b`)"]);
     check("0.0,1.5,2\n0.1,1,2\n", &["first line must be a header"]);
     check("t,q.a,q.B,tau.a,tau.b\n", &["no column `q.b`", "nearest: `q.B`", "hold the joint"]);
     check("t,q.a,q.b,tau.b\n", &["no column `tau.a`", "`tau.b`"]);

@@ -8,12 +8,14 @@
 //! and centre of mass are compared at random states of every robot at hand and of random ones, on fixed and
 //! floating bases; C3D files coordinate by coordinate; the optimum over possible bodies on random problems of
 //! real robots; the torques and mass matrices of identified.urdf and identified.xml in MuJoCo (pinned, and
-//! the newest), Pinocchio and Rapier.
+//! the newest), Pinocchio and Rapier; the report on a log in every format that is read against that on the
+//! CSV, on files that the formats' own packages wrote.
 //!
 //! # How it is run
 //!
 //! `cargo xtask oracle`, or one part of it: `cargo xtask oracle dynamics`, `cargo xtask oracle c3d`,
-//! `cargo xtask oracle consistency`, `cargo xtask oracle export`. It needs
+//! `cargo xtask oracle consistency`, `cargo xtask oracle export`, `cargo xtask oracle formats` (or one part of
+//! it: `--formats same`, `damage`, `memory`; the last writes 5 GB). It needs
 //! Python 3.10 or later, and a network the first time: Pinocchio, ezc3d, CVXPY, Clarabel and MuJoCo are
 //! installed from PyPI, pinned. Robots whose logs are absent are skipped.
 //! For this reason it is not part of `cargo xtask test`.
@@ -34,6 +36,7 @@ mod case;
 mod comparison;
 mod consistency;
 mod export;
+mod formats;
 mod generated;
 mod pinocchio;
 pub(crate) mod python;
@@ -67,6 +70,9 @@ pub struct Arguments {
     /// The Python that the private environment is made with.
     #[arg(long, default_value = "python3")]
     python: String,
+    /// What of the formats is looked at; everything by default.
+    #[arg(long, value_enum)]
+    formats: Option<formats::FormatsPart>,
     /// What is compared; everything by default.
     #[arg(value_enum)]
     part: Option<Part>,
@@ -81,6 +87,8 @@ enum Part {
     C3d,
     /// Possible bodies that fit best, against CVXPY and Clarabel.
     Consistency,
+    /// Logs in other formats, written by their own Python packages.
+    Formats,
     /// Files of identified robots, in MuJoCo, Pinocchio and Rapier.
     Export,
 }
@@ -96,13 +104,18 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     if arguments.part == Some(Part::Export) {
         return Ok(if files_agree { ExitCode::SUCCESS } else { ExitCode::FAILURE });
     }
+    let formats_agree = !asked(Part::Formats)
+        || formats::compare(&arguments.python, &environment::workspace_root()?, arguments.formats)?;
+    if arguments.part == Some(Part::Formats) {
+        return Ok(if formats_agree { ExitCode::SUCCESS } else { ExitCode::FAILURE });
+    }
     let python = Python::install(&arguments.python, "oracle-python", REQUIREMENTS)?;
     let recordings_agree = !asked(Part::C3d) || c3d::compare(&python)?;
     let workspace = environment::workspace_root()?;
     let optima_agree = !asked(Part::Consistency)
         || consistency::compare(&python, &workspace, arguments.problems, arguments.seed)?;
     let dynamics_agree = !asked(Part::Dynamics) || dynamics(python, arguments)?;
-    Ok(if files_agree && recordings_agree && optima_agree && dynamics_agree {
+    Ok(if files_agree && formats_agree && recordings_agree && optima_agree && dynamics_agree {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE

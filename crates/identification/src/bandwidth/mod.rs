@@ -21,7 +21,7 @@ use crate::{BlockSource, Design, Fold, IdentificationError, LogSet, Progress, Va
 use phiw_dynamics::Tree;
 use phiw_regressor::least_squares::{GroupedFactor, weighted_least_squares};
 use phiw_regressor::{BaseParameters, BaseParametersOptions, RegressorError, fewest_base_parameters};
-use phiw_telemetry::{Conditioning, Survey};
+use phiw_telemetry::Survey;
 use stretches::Stretches;
 
 /// How cut-offs are compared.
@@ -122,7 +122,7 @@ pub fn bandwidth(
     progress: Progress<'_>,
 ) -> Result<Option<Bandwidth>, IdentificationError> {
     let Some(contest) = Contest::new(tree, effects, logs, settings)? else { return Ok(None) };
-    let stretches = contest.stretches(logs.training(), logs.conditioning(), progress)?;
+    let stretches = contest.stretches(logs.training(), logs, progress)?;
     contest.judged(|rung| contest.factors_of(&stretches, rung))
 }
 
@@ -184,22 +184,22 @@ impl Contest {
     pub fn factors(
         &self,
         surveys: &[Survey],
-        conditioning: &Conditioning,
+        logs: &LogSet,
         progress: Progress<'_>,
     ) -> Result<Vec<Vec<GroupedFactor>>, IdentificationError> {
-        let stretches = self.stretches(surveys, conditioning, progress)?;
+        let stretches = self.stretches(surveys, logs, progress)?;
         (0..self.rungs()).map(|rung| self.factors_of(&stretches, rung)).collect()
     }
 
     fn stretches(
         &self,
         surveys: &[Survey],
-        conditioning: &Conditioning,
+        logs: &LogSet,
         progress: Progress<'_>,
     ) -> Result<Stretches, IdentificationError> {
         let of_logs = |fold: &&Fold| surveys.iter().any(|survey| survey.session.log == fold.log);
         let folds = self.folds.iter().filter(of_logs).copied().collect();
-        Stretches::read(folds, surveys, conditioning, self.cutoffs[0], progress)
+        Stretches::read(folds, surveys, logs, self.cutoffs[0], progress)
     }
 
     fn factors_of(

@@ -1,9 +1,8 @@
 //! The training motion that cut-offs are compared on, in memory, to be filtered with any of them.
 
-use crate::log_set::LogFile;
-use crate::{BlockSource, Fold, IdentificationError, Progress};
+use crate::{BlockSource, Fold, IdentificationError, LogSet, Progress};
 use phiw_telemetry::filter::ParallelFilter;
-use phiw_telemetry::{Block, Conditioning, LogError, Survey};
+use phiw_telemetry::{Block, LogError, Survey};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -19,16 +18,17 @@ impl Stretches {
     pub fn read(
         folds: Vec<Fold>,
         surveys: &[Survey],
-        conditioning: &Conditioning,
+        logs: &LogSet,
         lowest_hz: f64,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
-        let mut conditioning = conditioning.clone();
+        let mut conditioning = logs.conditioning().clone();
         conditioning.parallel_cutoff_hz = lowest_hz;
         conditioning.options.parallel_cutoff_hz = Some(lowest_hz);
         let read = |survey: &Survey| {
+            let source = logs.source_conditioned(survey.session.log, &conditioning, progress);
             let mut blocks = Vec::new();
-            LogFile::new(survey, &conditioning, progress).blocks(&mut |block| {
+            source.blocks(&mut |block| {
                 let (Some(&first), Some(&last)) = (block.t.first(), block.t.last()) else { return };
                 let touched = |fold: &Fold| fold.log == block.log && fold.start <= last && first < fold.end;
                 if folds.iter().any(touched) {

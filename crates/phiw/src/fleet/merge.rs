@@ -2,7 +2,7 @@
 
 use super::plan_file::Plan;
 use crate::analysis::{Analysis, Rows};
-use crate::arguments::quoted;
+use crate::argument_values::quoted;
 use crate::console::Console;
 use crate::identify::{Outcome, outputs};
 use crate::output::take_folder;

@@ -3,7 +3,8 @@
 use super::FleetOutcome;
 use super::plan_file::PlanFile;
 use crate::Error;
-use crate::arguments::{SessionArguments, held_joint, known_mass, positive};
+use crate::argument_values::{held_joint, known_mass, positive};
+use crate::arguments::SessionArguments;
 use crate::console::Console;
 use crate::output::check_file;
 use crate::page::counted;

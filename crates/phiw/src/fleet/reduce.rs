@@ -101,7 +101,7 @@ fn factors(plan: &Plan, log: usize, progress: Progress<'_>) -> Result<LogFactors
     let folds = accumulate_folds(plan.declared.design(), &folds, &source, Rests::Kept)?;
     let rungs = match &plan.contest {
         Some(contest) if !plan.compared_of(log).is_empty() => {
-            contest.factors(&logs.surveys()[log..=log], logs.conditioning(), progress)?
+            contest.factors(&logs.surveys()[log..=log], logs, progress)?
         }
         _ => Vec::new(),
     };

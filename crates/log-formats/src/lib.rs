@@ -1,0 +1,21 @@
+#![doc = include_str!("../README.md")]
+
+mod arrays;
+mod content_hash;
+mod csv;
+mod error;
+mod guarded;
+#[cfg(feature = "hdf5")]
+mod hdf5;
+#[cfg(feature = "lerobot")]
+mod lerobot;
+mod messages;
+mod number;
+mod open;
+mod table;
+mod text_stream;
+
+pub use error::FormatError;
+pub use guarded::is_guarded;
+pub use open::{OpenOptions, looks_like, open};
+pub use table::{Column, MISSING, Step, Table, is_missing};

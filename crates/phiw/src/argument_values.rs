@@ -1,0 +1,47 @@
+//! Values of options, from their text.
+
+/// `JOINT` or `JOINT=VALUE`.
+pub fn held_joint(text: &str) -> Result<(String, f64), String> {
+    let (joint, value) = text.split_once('=').unwrap_or((text, "0"));
+    let joint = joint.trim();
+    if joint.is_empty() {
+        return Err("write JOINT or JOINT=VALUE".to_owned());
+    }
+    match value.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok((joint.to_owned(), number)),
+        _ => Err(format!("`{value}` is not a position; write {joint} or {joint}=0.5 (rad or m)")),
+    }
+}
+
+/// `LINK=KG`.
+pub fn known_mass(text: &str) -> Result<(String, f64), String> {
+    let Some((link, mass)) = text.split_once('=') else {
+        return Err(format!("write LINK=KG, for example {text}=2.5"));
+    };
+    Ok((link.trim().to_owned(), positive(mass.trim())?))
+}
+
+/// A number from 0 to 1.
+pub fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if (0.0..=1.0).contains(&number) => Ok(number),
+        _ => Err(format!("`{text}` is not a number from 0 to 1")),
+    }
+}
+
+/// A number above zero.
+pub fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
+        _ => Err(format!("`{text}` is not a number above zero")),
+    }
+}
+
+/// A word as a shell reads it back.
+pub fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "_-./,=:+@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
