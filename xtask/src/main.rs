@@ -45,6 +45,8 @@ enum Task {
     Paper(paper::Arguments),
     /// The curriculum on a robot whose noise nobody knows: estimators, sensors and noises compared.
     Noise(noise::Arguments),
+    /// Logs reduced by many processes, against one.
+    Fleet(fleet::Arguments),
     /// Robots in physics engines with one secret each, tracked poorly: log, trace with `phiw explain`, score.
     Plant(plant::Arguments),
 }
@@ -53,22 +55,24 @@ fn main() -> anyhow::Result<ExitCode> {
     let task = Arguments::parse().task;
     let wanted = matches!(&task, Task::Paper(paper) if paper.needs_mujoco());
     mujoco::fetch_if(wanted || matches!(task, Task::Run(_) | Task::Noise(_)));
-    match task {
-        Task::Run(arguments) => run::command(&arguments).map(|()| ExitCode::SUCCESS),
-        Task::SyntheticLog(arguments) => synthetic_log::command(&arguments).map(|()| ExitCode::SUCCESS),
-        Task::Retarget(arguments) => retarget::command(&arguments).map(|()| ExitCode::SUCCESS),
-        Task::Test(arguments) => test::command(&arguments),
-        Task::Python(arguments) => python::command(&arguments),
-        Task::Torture(arguments) => torture::command(&arguments),
-        Task::Mujoco(arguments) => mujoco::command(&arguments),
-        Task::Oracle(arguments) => oracle::command(&arguments),
-        Task::Paper(arguments) => paper::command(&arguments).map(|()| ExitCode::SUCCESS),
-        Task::Noise(arguments) => noise::command(&arguments).map(|()| ExitCode::SUCCESS),
-        Task::Plant(arguments) => plant::command(&arguments).map(|()| ExitCode::SUCCESS),
-        Task::Consistent(arguments) => consistent::command(&arguments).map(|()| ExitCode::SUCCESS),
-        Task::Coverage(arguments) => coverage::command(&arguments).map(|()| ExitCode::SUCCESS),
-        Task::Undeclared(arguments) => undeclared::command(&arguments).map(|()| ExitCode::SUCCESS),
-    }
+    let done = match task {
+        Task::Test(arguments) => return test::command(&arguments),
+        Task::Python(arguments) => return python::command(&arguments),
+        Task::Torture(arguments) => return torture::command(&arguments),
+        Task::Mujoco(arguments) => return mujoco::command(&arguments),
+        Task::Oracle(arguments) => return oracle::command(&arguments),
+        Task::Run(arguments) => run::command(&arguments),
+        Task::SyntheticLog(arguments) => synthetic_log::command(&arguments),
+        Task::Retarget(arguments) => retarget::command(&arguments),
+        Task::Paper(arguments) => paper::command(&arguments),
+        Task::Noise(arguments) => noise::command(&arguments),
+        Task::Plant(arguments) => plant::command(&arguments),
+        Task::Fleet(arguments) => fleet::command(&arguments),
+        Task::Consistent(arguments) => consistent::command(&arguments),
+        Task::Coverage(arguments) => coverage::command(&arguments),
+        Task::Undeclared(arguments) => undeclared::command(&arguments),
+    };
+    done.map(|()| ExitCode::SUCCESS)
 }
 
 #[cfg(test)]

@@ -64,13 +64,9 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         failed.push(named(&consumers));
     }
     failed.extend(python::test(&mut tally)?);
-    for problem in &failed {
-        println!("failed: {problem}");
-    }
+    failed.iter().for_each(|problem| println!("failed: {problem}"));
     if unchecked_dependencies {
-        println!(
-            "skipped: cargo-deny is not installed: licences, duplicates and sources of dependencies are unchecked"
-        );
+        println!("skipped: cargo-deny is not installed: licences and sources of dependencies unchecked");
     }
     println!("{tally}");
     Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })

@@ -9,7 +9,9 @@ pub mod embedded;
 mod finite_difference;
 pub mod human;
 mod human_start;
+mod joint_motion;
 mod marker_settings;
+pub mod npz;
 mod point_csv;
 mod pose_search;
 mod problem;
@@ -23,6 +25,7 @@ pub mod robot;
 mod robot_start;
 pub mod solver;
 mod start;
+mod trc;
 mod weights;
 
 pub use calibration::Calibration;

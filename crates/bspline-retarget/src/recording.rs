@@ -110,6 +110,14 @@ pub enum RecordingError {
         /// A person's \[m\].
         person_m: RangeInclusive<f64>,
     },
+    /// It is no sound BVH, TRC or npz.
+    #[error("{}: {what}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, where, and the mend.
+        what: String,
+    },
     /// It is no table of points.
     #[error("{}: {what}", path.display())]
     Csv {

@@ -16,6 +16,7 @@
 //! | [`oracle`] | do dynamics, C3D reader and exported files agree with Pinocchio, ezc3d and MuJoCo? |
 //! | [`consistent`] | what does it cost that identified bodies can exist? |
 //! | [`coverage`] | how often do 95 % intervals and bands hold the truth? |
+//! | [`fleet`] | do logs that are reduced apart give the files of one process, and what is gained? |
 //! | [`synthetic_log`] | does memory grow with the length of a log? It makes the log. |
 //!
 //! Unlike the library crates, experiments print, and write where they are told.
@@ -23,6 +24,7 @@
 pub mod consistent;
 pub mod coverage;
 pub mod environment;
+pub mod fleet;
 pub mod noise;
 pub mod oracle;
 pub mod paper;

@@ -113,6 +113,14 @@ pub fn point_csv(bytes: &[u8]) {
     }
 }
 
+/// A recording whose format its content tells: BVH, TRC, npz of AMASS.
+pub fn motion(bytes: &[u8]) {
+    let Some(file) = file(bytes, "") else { return };
+    if let Ok(recording) = read_recording(file.path(), None) {
+        check_recording(recording);
+    }
+}
+
 /// A marker map.
 pub fn marker_map(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };

@@ -41,6 +41,50 @@ pub fn accumulate(
     folds: &[Fold],
     sources: &[&dyn BlockSource],
 ) -> Result<Vec<GroupedFactor>, IdentificationError> {
+    Ok(accumulate_folds(design, folds, sources, Rests::Dropped)?.moving)
+}
+
+/// The factors of some folds.
+#[derive(Clone, Debug, Default)]
+pub struct FoldFactors {
+    /// For each fold the rows that count: of each torque those in which its joint moves.
+    pub moving: Vec<GroupedFactor>,
+    /// For each fold the others, in which the joint rests; empty where they were not asked for. No fit takes
+    /// them; they say what the error is with rests included.
+    pub at_rest: Vec<GroupedFactor>,
+}
+
+impl FoldFactors {
+    /// All restricted to `kept` parameters (see [`GroupedFactor::select`]).
+    ///
+    /// # Errors
+    /// A parameter does not exist.
+    pub fn select(&self, kept: &[usize]) -> Result<Self, RegressorError> {
+        let select = |folds: &[GroupedFactor]| folds.iter().map(|fold| fold.select(kept)).collect();
+        let (moving, at_rest): (Result<_, _>, Result<_, _>) = (select(&self.moving), select(&self.at_rest));
+        Ok(FoldFactors { moving: moving?, at_rest: at_rest? })
+    }
+}
+
+/// What becomes of rows at which a joint rests.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rests {
+    /// They are left out.
+    Dropped,
+    /// They have factors of their own.
+    Kept,
+}
+
+/// [`accumulate`] with the rows that do not count beside those that do.
+///
+/// # Errors
+/// The same.
+pub fn accumulate_folds(
+    design: &Design,
+    folds: &[Fold],
+    sources: &[&dyn BlockSource],
+    rests: Rests,
+) -> Result<FoldFactors, IdentificationError> {
     let named = folds;
     let mut folds: Vec<Fold> = Vec::with_capacity(named.len());
     named.iter().for_each(|fold| {
@@ -48,37 +92,50 @@ pub fn accumulate(
             folds.push(*fold);
         }
     });
-    let mut merged: Vec<Vec<Option<Factor>>> = vec![vec![None; design.rows().len()]; folds.len()];
-    try_for_each_batch(sources, |batch| reduce(design, &folds, batch, &mut merged))?;
-    let grouped = |rows: Vec<Option<Factor>>| {
-        let groups = rows
-            .into_iter()
-            .zip(design.rows())
-            .map(|(factor, layout)| Group {
-                factor: factor.unwrap_or_else(|| Factor::empty(layout.range.len())),
-                parameters: layout.parameters.clone(),
-            })
-            .collect();
-        Ok(GroupedFactor::new(design.parameter_count(), groups)?)
+    let torques = design.rows().len();
+    let kinds = if rests == Rests::Kept { 2 } else { 1 };
+    let mut merged: Vec<Vec<Option<Factor>>> = vec![vec![None; kinds * torques]; folds.len()];
+    try_for_each_batch(sources, |batch| reduce(design, rests, &folds, batch, &mut merged))?;
+    let mut read = FoldFactors::default();
+    for mut moving in merged {
+        let at_rest = moving.split_off(torques);
+        read.moving.push(grouped(design, moving)?);
+        if rests == Rests::Kept {
+            read.at_rest.push(grouped(design, at_rest)?);
+        }
+    }
+    let places: Vec<usize> =
+        named.iter().filter_map(|fold| folds.iter().position(|other| other == fold)).collect();
+    let named = |read: Vec<GroupedFactor>| match read.is_empty() {
+        true => read,
+        false => places.iter().map(|&place| read[place].clone()).collect(),
     };
-    let read: Vec<GroupedFactor> =
-        merged.into_iter().map(grouped).collect::<Result<_, IdentificationError>>()?;
-    Ok(named
-        .iter()
-        .filter_map(|fold| folds.iter().position(|other| other == fold))
-        .map(|place| read[place].clone())
-        .collect())
+    // Mostly each fold is named once: then nothing is copied.
+    match places.iter().copied().eq(0..folds.len()) {
+        true => Ok(read),
+        false => Ok(FoldFactors { moving: named(read.moving), at_rest: named(read.at_rest) }),
+    }
+}
+
+/// One factor for each torque; none where there were no rows.
+fn grouped(design: &Design, factors: Vec<Option<Factor>>) -> Result<GroupedFactor, RegressorError> {
+    let groups = factors.into_iter().zip(design.rows()).map(|(factor, layout)| Group {
+        factor: factor.unwrap_or_else(|| Factor::empty(layout.range.len())),
+        parameters: layout.parameters.clone(),
+    });
+    GroupedFactor::new(design.parameter_count(), groups.collect())
 }
 
 fn reduce(
     design: &Design,
+    rests: Rests,
     folds: &[Fold],
     batch: Vec<Block>,
     merged: &mut [Vec<Option<Factor>>],
 ) -> Result<(), IdentificationError> {
     let reduced: Result<Vec<Vec<Piece>>, RegressorError> = batch
         .into_par_iter()
-        .map_init(|| Worker::new(design), |worker, block| worker.reduce(folds, block))
+        .map_init(|| Worker::new(design, rests), |worker, block| worker.reduce(folds, block))
         .collect();
     for piece in reduced?.into_iter().flatten() {
         let targets = merged[piece.fold].par_iter_mut().zip(piece.factors);
@@ -93,7 +150,8 @@ fn reduce(
     Ok(())
 }
 
-/// What one block adds to one fold: a factor for each torque.
+/// What one block adds to one fold: a factor for each torque, then one for its rows at rest where they are
+/// kept.
 struct Piece {
     fold: usize,
     factors: Vec<Factor>,
@@ -107,12 +165,14 @@ struct Worker<'a> {
 }
 
 impl<'a> Worker<'a> {
-    fn new(design: &'a Design) -> Self {
+    fn new(design: &'a Design, rests: Rests) -> Self {
+        let widths = design.rows().iter().map(|layout| layout.range.len());
+        let at_rest = widths.clone().filter(|_| rests == Rests::Kept);
         Worker {
             design,
             scratch: design.scratch(),
             filter: FilterScratch::default(),
-            builders: design.rows().iter().map(|layout| FactorBuilder::new(layout.range.len())).collect(),
+            builders: widths.chain(at_rest).map(FactorBuilder::new).collect(),
         }
     }
 
@@ -134,8 +194,9 @@ impl<'a> Worker<'a> {
                     current = fold;
                 }
                 if fold.is_some() {
-                    for (joint, (builder, layout)) in builders.iter_mut().zip(rows).enumerate() {
-                        if design.counts(row, joint) {
+                    for (joint, layout) in rows.iter().enumerate() {
+                        let place = if design.counts(row, joint) { joint } else { rows.len() + joint };
+                        if let Some(builder) = builders.get_mut(place) {
                             builder.push_row(&row[layout.range.clone()])?;
                         }
                     }

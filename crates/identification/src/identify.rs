@@ -1,15 +1,15 @@
 //! The declared model, identified: constants chosen, parameters fitted, error held out.
 
-use crate::accumulate::accumulate;
+use crate::accumulate::{FoldFactors, Rests, accumulate_folds};
 use crate::fit::{Fit, TorqueError, fit, merge, torque_error};
 use crate::reference::ReferenceModel;
+use crate::variants::{Choice, Rivals, choose, undetermined_with};
 use crate::{BlockSource, Design, Effect, Fold, IdentificationError};
 use phiw_dynamics::Tree;
+use phiw_dynamics::check::check_size;
 use phiw_limits::Limits;
-use phiw_regressor::factor::{Factor, FactorBuilder};
-use phiw_regressor::least_squares::{GroupedFactor, WeightedSolution, weighted_least_squares};
+use phiw_regressor::least_squares::{Group, GroupedFactor, weighted_least_squares};
 use phiw_regressor::{BaseParameters, BaseParametersOptions, RegressorError};
-use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// The same effect with several values of its constants, one of which the data will choose; the first is the
@@ -57,57 +57,197 @@ pub fn identify(
     effects: Vec<Variants>,
     data: &Data<'_>,
 ) -> Result<Identified, IdentificationError> {
+    let (fitted, folds) = identify_rows(tree, effects, data, Rests::Dropped)?;
+    fitted.identified(folds.moving)
+}
+
+/// [`identify`], and what the error is with rests included.
+///
+/// # Errors
+/// The same.
+pub fn identify_with_rests(
+    tree: &Tree,
+    effects: Vec<Variants>,
+    data: &Data<'_>,
+) -> Result<(Identified, WithRests), IdentificationError> {
+    let (fitted, folds) = identify_rows(tree, effects, data, Rests::Kept)?;
+    let with_rests = fitted.with_rests(&folds)?;
+    Ok((fitted.identified(folds.moving)?, with_rests))
+}
+
+fn identify_rows(
+    tree: &Tree,
+    effects: Vec<Variants>,
+    data: &Data<'_>,
+    rests: Rests,
+) -> Result<(Fitted, FoldFactors), IdentificationError> {
     let Data { train, held_out, sources, rest_speeds } = data;
-    let folds = train.len() + held_out.len();
-    let of_variants = effects.iter().flatten().map(|effect| effect.as_ref());
-    crate::checks::check_size_of_robot(tree, of_variants, folds, &Limits::default())?;
-    let base = BaseParameters::of_tree(tree, BaseParametersOptions::default())?;
-    let mut slots = Vec::with_capacity(effects.len());
-    let mut all = Vec::new();
-    for variants in effects {
-        slots.push(all.len()..all.len() + variants.len());
-        all.extend(variants);
-    }
-    let mut design = Design::new(tree.clone(), base.clone(), all).with_rest_speeds(rest_speeds.clone());
     let all_folds = [train.as_slice(), held_out].concat();
-    crate::checks::check_size_of_factors(&design, all_folds.len(), &Limits::default())?;
-    let mut folds = accumulate(&design, &all_folds, sources)?;
-    if design.needs().of_reference() {
+    let mut declared = Declared::new(tree, effects, all_folds.len(), rest_speeds.clone())?;
+    let needs_reference = declared.needs_reference();
+    let mut folds = accumulate_folds(&declared.design, &all_folds, sources, rests)?;
+    if needs_reference {
         // Columns that need the model's torque take the URDF's model in the first pass (zero without
         // inertials).
         for _ in 0..REFERENCE_PASSES {
-            let reference = fitted_reference(&design, &slots, &folds[..train.len()])?;
-            design = design.with_reference(reference);
-            folds = accumulate(&design, &all_folds, sources)?;
+            let reference =
+                fitted_reference(&declared.design, &declared.slots, &folds.moving[..train.len()])?;
+            declared.design = declared.design.with_reference(reference);
+            folds = accumulate_folds(&declared.design, &all_folds, sources, rests)?;
         }
     }
-    let needs_reference = design.needs().of_reference();
-    let Choice { chosen, rivals } = choose(&design, &slots, &merge(&folds[..train.len()])?)?;
-    let with_rivals = Rivals::of(&design, &chosen, &rivals, &folds[..train.len()])?;
-    let kept: Vec<usize> =
-        (0..base.count()).chain(chosen.iter().flat_map(|&effect| design.effect_parameters(effect))).collect();
-    for fold in &mut folds {
-        *fold = fold.select(&kept)?;
-    }
-    let design = design.keep(&chosen);
-    let mut fitted = fit(&design, &folds[..train.len()])?;
-    if let Some(Rivals { folds, stands_for }) = &with_rivals {
-        crate::rivals::widen(&mut fitted, folds, stands_for)?;
-    }
-    let design = design.with_own_reference(&fitted.parameters)?;
+    let (fitted, mut folds) = declared.fitted(folds, train.len())?;
     if needs_reference {
         // The error is that of the model as it is used: with its own torque in the columns that need one.
-        folds = accumulate(&design, &all_folds, sources)?;
+        folds = accumulate_folds(&fitted.design, &all_folds, sources, rests)?;
     }
-    let held_out_folds = folds.split_off(train.len());
-    Ok(Identified {
-        train: torque_error(&folds, &fitted.parameters)?,
-        held_out: torque_error(&held_out_folds, &fitted.parameters)?,
-        fit: fitted,
-        design,
-        train_folds: folds,
-        held_out_folds,
-    })
+    Ok((fitted, folds))
+}
+
+/// A rigid body with all variants of its declared effects: the columns of the first pass.
+pub struct Declared {
+    design: Design,
+    /// The variants of each effect.
+    slots: Vec<Range<usize>>,
+}
+
+impl Declared {
+    /// Of a robot, over so many folds; `rest_speeds` as in [`Data`].
+    ///
+    /// # Errors
+    /// It has too many columns.
+    pub fn new(
+        tree: &Tree,
+        effects: Vec<Variants>,
+        folds: usize,
+        rest_speeds: Vec<f64>,
+    ) -> Result<Self, IdentificationError> {
+        let of_variants = effects.iter().flatten().map(|effect| effect.as_ref());
+        crate::checks::check_size_of_robot(tree, of_variants, folds, &Limits::default())?;
+        let base = BaseParameters::of_tree(tree, BaseParametersOptions::default())?;
+        let mut slots = Vec::with_capacity(effects.len());
+        let mut all = Vec::new();
+        for variants in effects {
+            slots.push(all.len()..all.len() + variants.len());
+            all.extend(variants);
+        }
+        let design = Design::new(tree.clone(), base, all).with_rest_speeds(rest_speeds);
+        crate::checks::check_size_of_factors(&design, folds, &Limits::default())?;
+        Ok(Declared { design, slots })
+    }
+
+    /// The columns of all variants.
+    pub fn design(&self) -> &Design {
+        &self.design
+    }
+
+    /// Whether columns need the model's own torque: then one pass over the rows is not enough.
+    pub fn needs_reference(&self) -> bool {
+        self.design.needs().of_reference()
+    }
+
+    /// The model that the factors of one pass tell, those of `train` folds first. What needs the model's own
+    /// torque takes it as it is in these factors.
+    ///
+    /// # Errors
+    /// The factors are of other columns, of too few rows, or lack those at rest.
+    pub fn identified(
+        self,
+        folds: FoldFactors,
+        train: usize,
+    ) -> Result<(Identified, WithRests), IdentificationError> {
+        check_size("folds at rest", folds.at_rest.len(), folds.moving.len())?;
+        check_size("training folds", train.min(folds.moving.len()), train)?;
+        let (fitted, folds) = self.fitted(folds, train)?;
+        let with_rests = fitted.with_rests(&folds)?;
+        Ok((fitted.identified(folds.moving)?, with_rests))
+    }
+
+    /// The variants chosen and fitted, and the folds' factors with their columns alone.
+    fn fitted(self, folds: FoldFactors, train: usize) -> Result<(Fitted, FoldFactors), IdentificationError> {
+        let Declared { design, slots } = self;
+        let training = &folds.moving[..train];
+        let Choice { chosen, rivals } = choose(&design, &slots, &merge(training)?)?;
+        let with_rivals = Rivals::of(&design, &chosen, &rivals, training)?;
+        let effects = chosen.iter().flat_map(|&effect| design.effect_parameters(effect));
+        let kept: Vec<usize> = (0..design.base().count()).chain(effects).collect();
+        let folds = folds.select(&kept)?;
+        let design = design.keep(&chosen);
+        let mut fit = fit(&design, &folds.moving[..train])?;
+        if let Some(Rivals { folds, stands_for }) = &with_rivals {
+            crate::rivals::widen(&mut fit, folds, stands_for)?;
+        }
+        let design = design.with_own_reference(&fit.parameters)?;
+        Ok((Fitted { design, fit, train }, folds))
+    }
+}
+
+/// A model before its error is known.
+struct Fitted {
+    design: Design,
+    fit: Fit,
+    /// Number of folds that it was fitted to.
+    train: usize,
+}
+
+impl Fitted {
+    /// With its error on the folds, of which those that it was fitted to come first.
+    fn identified(self, mut train_folds: Vec<GroupedFactor>) -> Result<Identified, IdentificationError> {
+        let held_out_folds = train_folds.split_off(self.train);
+        Ok(Identified {
+            train: torque_error(&train_folds, &self.fit.parameters)?,
+            held_out: torque_error(&held_out_folds, &self.fit.parameters)?,
+            fit: self.fit,
+            design: self.design,
+            train_folds,
+            held_out_folds,
+        })
+    }
+
+    fn with_rests(&self, folds: &FoldFactors) -> Result<WithRests, IdentificationError> {
+        let relative = |range: Range<usize>| {
+            let both = folds.moving[range.clone()].iter().chain(&folds.at_rest[range]);
+            relative_error(both, &self.fit.parameters)
+        };
+        let rows = |folds: &[GroupedFactor], torque: usize| -> u64 {
+            folds.iter().map(|fold| fold.groups()[torque].factor.rows()).sum()
+        };
+        let share = |torque: usize| {
+            let (moving, at_rest) = (rows(&folds.moving, torque), rows(&folds.at_rest, torque));
+            at_rest as f64 / (moving + at_rest).max(1) as f64
+        };
+        Ok(WithRests {
+            train_relative: relative(0..self.train)?,
+            held_out_relative: relative(self.train..folds.moving.len())?,
+            share: (0..self.design.rows().len()).map(share).collect(),
+        })
+    }
+}
+
+/// What rows at which joints rest add: no fit takes them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WithRests {
+    /// RMS of the error over RMS of the torque on the training folds, all torques and rows pooled, rests
+    /// included.
+    pub train_relative: f64,
+    /// The same on the folds held out.
+    pub held_out_relative: f64,
+    /// For each torque the share of all rows in which its joint rests.
+    pub share: Vec<f64>,
+}
+
+/// RMS of the error over RMS of the torque, all torques and rows pooled.
+fn relative_error<'a>(
+    folds: impl Iterator<Item = &'a GroupedFactor>,
+    parameters: &[f64],
+) -> Result<f64, RegressorError> {
+    let (mut error, mut torque) = (0.0, 0.0);
+    for fold in folds {
+        error += fold.residual_sums_of_squares(parameters)?.iter().sum::<f64>();
+        let of_group = |group: &Group| group.factor.right_hand_side_sum_of_squares();
+        torque += fold.groups().iter().map(of_group).sum::<f64>();
+    }
+    Ok((error / torque).sqrt())
 }
 
 /// Passes over the logs that bring the model's torque into the columns that need it; a third changes nothing
@@ -132,245 +272,4 @@ fn fitted_reference(
     let mut parameters = vec![0.0; design.parameter_count()];
     determined.iter().zip(&solution.parameters).for_each(|(&column, value)| parameters[column] = *value);
     Ok(design.reference_of(&parameters, &chosen)?)
-}
-
-/// Share of a torque's residual variance that a variant of a declared effect must save over a simpler one.
-const WORTH_A_VARIANT: f64 = 0.1;
-/// Sweeps over the effects; more have never changed a choice.
-const SWEEPS: usize = 2;
-
-/// For each slot the variant with the smallest sum of the torques' log errors, found slot by slot.
-///
-/// The pooled error would let the torque that fits worst decide for all.
-fn choose(
-    design: &Design,
-    slots: &[Range<usize>],
-    factors: &GroupedFactor,
-) -> Result<Choice, RegressorError> {
-    let mut chosen: Vec<usize> = slots.iter().map(|slot| slot.start).collect();
-    let mut rivals = vec![None; slots.len()];
-    if slots.iter().all(|slot| slot.len() <= 1) {
-        return Ok(Choice { chosen, rivals });
-    }
-    let undetermined = undetermined_with(design, &chosen, factors)?;
-    // The columns of the slot that is being chosen are kept even where undetermined, so that all its variants
-    // have equally many columns.
-    let columns = |chosen: &[usize], open: Option<usize>| -> Vec<usize> {
-        let base = (0..design.base().count()).filter(|parameter| !undetermined.contains(parameter));
-        base.chain(chosen.iter().enumerate().flat_map(|(slot, &effect)| {
-            let stays = open == Some(slot);
-            let parameters = design.effect_parameters(effect);
-            parameters.filter(|parameter| stays || !undetermined.contains(parameter)).collect::<Vec<_>>()
-        }))
-        .collect()
-    };
-    for _ in 0..SWEEPS {
-        let before = chosen.clone();
-        let solution = solve_determined(&factors.select(&columns(&chosen, None))?)?;
-        for (slot, variants) in slots.iter().enumerate() {
-            if variants.len() <= 1 {
-                continue;
-            }
-            let with = |variant: usize| {
-                let mut trial = chosen.clone();
-                trial[slot] = variant;
-                Columns::new(columns(&trial, Some(slot)), design.effect_parameters(variant))
-            };
-            let rest = Rest::new(design, factors, &solution, &with(chosen[slot]), variants.clone())?;
-            let merits: Result<Vec<f64>, RegressorError> =
-                variants.clone().map(|variant| rest.log_error(factors, &with(variant))).collect();
-            let merits = merits?;
-            let best = merits.iter().copied().fold(f64::INFINITY, f64::min);
-            let margin = 0.5 * rest.own_rows(factors) * WORTH_A_VARIANT;
-            let simplest = merits.iter().position(|merit| *merit <= best + margin).unwrap_or_default();
-            chosen[slot] = variants.start + simplest;
-            rivals[slot] = rival(&merits, simplest).map(|rival| variants.start + rival);
-        }
-        if chosen == before {
-            break;
-        }
-    }
-    Ok(Choice { chosen, rivals })
-}
-
-/// The variant of each slot that was chosen, and the one beside it.
-struct Choice {
-    chosen: Vec<usize>,
-    rivals: Vec<Option<usize>>,
-}
-
-/// The variant that stands for what the choice leaves open: the best, and where that is chosen the better of
-/// its neighbours in the list.
-fn rival(merits: &[f64], chosen: usize) -> Option<usize> {
-    let best = (0..merits.len()).min_by(|&a, &b| merits[a].total_cmp(&merits[b]))?;
-    if best != chosen {
-        return Some(best);
-    }
-    let neighbours = [chosen.checked_sub(1), Some(chosen + 1).filter(|&next| next < merits.len())];
-    neighbours.into_iter().flatten().min_by(|&a, &b| merits[a].total_cmp(&merits[b]))
-}
-
-/// The training folds with the columns of the chosen effects, and those of their rivals behind them.
-struct Rivals {
-    folds: Vec<GroupedFactor>,
-    /// For each rival's column the parameter, of the design of the chosen effects, that it is another form
-    /// of.
-    stands_for: Vec<usize>,
-}
-
-impl Rivals {
-    /// `None` where no effect has a rival.
-    fn of(
-        design: &Design,
-        chosen: &[usize],
-        rivals: &[Option<usize>],
-        train: &[GroupedFactor],
-    ) -> Result<Option<Self>, RegressorError> {
-        let mut columns: Vec<usize> = (0..design.base().count()).collect();
-        let (mut behind, mut stands_for) = (Vec::new(), Vec::new());
-        for (&effect, rival) in chosen.iter().zip(rivals) {
-            let own = design.effect_parameters(effect);
-            if let Some(rival) = rival {
-                behind.extend(design.effect_parameters(*rival));
-                stands_for.extend(columns.len()..columns.len() + own.len());
-            }
-            columns.extend(own);
-        }
-        if behind.is_empty() {
-            return Ok(None);
-        }
-        columns.extend(behind);
-        let folds = train.iter().map(|fold| fold.select(&columns)).collect::<Result<_, _>>()?;
-        Ok(Some(Rivals { folds, stands_for }))
-    }
-}
-
-/// Parameters that the rows do not determine with the `chosen` effects.
-fn undetermined_with(
-    design: &Design,
-    chosen: &[usize],
-    factors: &GroupedFactor,
-) -> Result<Vec<usize>, RegressorError> {
-    let all: Vec<usize> = (0..design.base().count())
-        .chain(chosen.iter().flat_map(|&effect| design.effect_parameters(effect)))
-        .collect();
-    let undetermined = crate::fit::undetermined(&factors.select(&all)?)?;
-    Ok(undetermined.into_iter().map(|place| all[place]).collect())
-}
-
-/// A weighted fit of what the rows determine; the rest is zero.
-fn solve_determined(factors: &GroupedFactor) -> Result<WeightedSolution, RegressorError> {
-    match weighted_least_squares(factors) {
-        Err(RegressorError::RankDeficient { undetermined, .. }) => {
-            let kept: Vec<usize> = (0..factors.parameter_count())
-                .filter(|parameter| !undetermined.contains(parameter))
-                .collect();
-            weighted_least_squares(&factors.select(&kept)?)
-        }
-        other => other,
-    }
-}
-
-/// The columns of a fit, and which of them are those of the variant that is on trial.
-struct Columns {
-    kept: Vec<usize>,
-    /// Places of the variant's columns in `kept`.
-    variant: Range<usize>,
-}
-
-impl Columns {
-    fn new(kept: Vec<usize>, parameters: Range<usize>) -> Self {
-        let first = kept.iter().position(|column| *column == parameters.start).unwrap_or(kept.len());
-        Columns { kept, variant: first..first + parameters.len() }
-    }
-}
-
-/// The torques that no variant of a slot acts on, merged once for all of them.
-struct Rest {
-    /// Torques that a variant acts on.
-    own: Vec<usize>,
-    /// Over the columns of the others, the variant's left out.
-    others: Factor,
-    weights: Vec<f64>,
-}
-
-impl Rest {
-    fn new(
-        design: &Design,
-        factors: &GroupedFactor,
-        solution: &WeightedSolution,
-        columns: &Columns,
-        variants: Range<usize>,
-    ) -> Result<Self, RegressorError> {
-        let entries = variants.flat_map(|effect| design.effects()[effect].entries());
-        let own: BTreeSet<usize> = entries.map(|entry| entry.row).collect();
-        let weights: Vec<f64> = solution.group_std.iter().map(|std| 1.0 / std).collect();
-        let Columns { kept, variant } = columns;
-        let shared: Vec<usize> = [&kept[..variant.start], &kept[variant.end..]].concat();
-        let selected = factors.select(&shared)?;
-        let mut builder = FactorBuilder::new(shared.len() + 1);
-        for (row, group) in selected.groups().iter().enumerate() {
-            if !own.contains(&row) {
-                let mut columns = group.parameters.clone();
-                columns.push(shared.len());
-                builder.push_factor(&group.factor, &columns, weights[row])?;
-            }
-        }
-        Ok(Rest { own: own.into_iter().collect(), others: builder.factor(), weights })
-    }
-
-    /// Rows of the torques that the effect acts on.
-    fn own_rows(&self, factors: &GroupedFactor) -> f64 {
-        self.own.iter().map(|&row| factors.groups()[row].factor.rows() as f64).sum()
-    }
-
-    /// Σ rows·log(RMSE) of the fit with these columns.
-    fn log_error(&self, factors: &GroupedFactor, columns: &Columns) -> Result<f64, RegressorError> {
-        let Columns { kept, variant } = columns;
-        let mut builder = FactorBuilder::new(kept.len() + 1);
-        let of_others: Vec<usize> = (0..variant.start).chain(variant.end..kept.len()).collect();
-        let with_torque: Vec<usize> = of_others.iter().copied().chain([kept.len()]).collect();
-        builder.push_factor(&self.others, &with_torque, 1.0)?;
-        let mut renumbered = vec![None; factors.parameter_count()];
-        kept.iter().enumerate().for_each(|(new, &old)| renumbered[old] = Some(new));
-        let mut own = Vec::new();
-        for &row in &self.own {
-            let group = &factors.groups()[row];
-            let columns: Vec<(usize, usize)> = (0..group.parameters.len())
-                .filter_map(|column| renumbered[group.parameters[column]].map(|new| (column, new)))
-                .collect();
-            let named: Vec<usize> =
-                columns.iter().map(|&(column, _)| column).chain([group.factor.parameters()]).collect();
-            let mut targets: Vec<usize> = columns.iter().map(|&(_, new)| new).collect();
-            let factor = group.factor.select(&named)?;
-            own.push((factor.clone(), targets.clone()));
-            targets.push(kept.len());
-            builder.push_factor(&factor, &targets, self.weights[row])?;
-        }
-        let solution = match builder.factor().solve() {
-            Ok(solution) => solution.parameters,
-            Err(RegressorError::RankDeficient { undetermined, .. }) => {
-                let determined: Vec<usize> =
-                    (0..kept.len()).filter(|column| !undetermined.contains(column)).collect();
-                let named: Vec<usize> = determined.iter().copied().chain([kept.len()]).collect();
-                let part = builder.factor().select(&named)?.solve()?;
-                let mut parameters = vec![0.0; kept.len()];
-                determined
-                    .iter()
-                    .zip(part.parameters)
-                    .for_each(|(&column, value)| parameters[column] = value);
-                parameters
-            }
-            Err(error) => return Err(error),
-        };
-        let of_others: Vec<f64> = of_others.iter().map(|&column| solution[column]).collect();
-        let others = self.others.residual_sum_of_squares(&of_others)?;
-        let mut total = 0.5 * self.others.rows() as f64 * others.max(f64::MIN_POSITIVE).ln();
-        for (factor, targets) in &own {
-            let parameters: Vec<f64> = targets.iter().map(|&column| solution[column]).collect();
-            let squares = factor.residual_sum_of_squares(&parameters)?;
-            total += 0.5 * factor.rows() as f64 * squares.max(f64::MIN_POSITIVE).ln();
-        }
-        Ok(total)
-    }
 }

@@ -31,13 +31,15 @@ pub mod reproduction;
 mod rivals;
 mod robot_findings;
 mod sample;
+pub mod shard;
+mod variants;
 
 pub use accumulate::Fold;
 pub use block_source::{BlockSource, EveryNth};
 pub use design::Design;
 pub use effect::{Effect, EffectCatalogue, EffectSpec};
 pub use error::IdentificationError;
-pub use identify::{Data, Identified, Variants, identify};
+pub use identify::{Data, Identified, Variants, WithRests, identify, identify_with_rests};
 pub use kept_blocks::KeptBlocks;
 pub use log_file::{Interruption, LogFile, Progress};
 pub use log_set::LogSet;
@@ -47,9 +49,10 @@ pub use predict::{Prediction, predict};
 /// The steps of [`identify()`] by themselves: blocks to factors, factors to parameters, and their error on
 /// the folds held out.
 pub mod fitting {
-    pub use crate::accumulate::accumulate;
+    pub use crate::accumulate::{FoldFactors, Rests, accumulate, accumulate_folds};
     pub use crate::factor_rows::FactorRows;
     pub use crate::fit::{Fit, TorqueError, fit, merge, torque_error, torques_with_enough_rows};
+    pub use crate::identify::Declared;
 }
 
 /// What a model's torques are worth: the parameters' covariance, each effect's share, bands, and the errors

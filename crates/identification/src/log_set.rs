@@ -6,7 +6,9 @@ use crate::log_file::{Interruption, LogFile, Progress, reading};
 use crate::{Fold, IdentificationError};
 use phiw_dynamics::Tree;
 use phiw_telemetry::{Conditioning, ConditioningOptions, LogError, LogSource, Survey, TorqueColumns};
+use rayon::prelude::*;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Stretches of time that the training logs are cut into: long against the residual's correlation, enough for
 /// a standard deviation.
@@ -89,16 +91,28 @@ impl LogSet {
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
         let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
-        let survey = |source: &LogSource| {
-            let what = reading("surveying", &source.path);
-            let mut report = |done: u64, total: u64| progress(&what, done, total);
-            interruption.check()?;
-            phiw_telemetry::survey(source, &joints, torque, &mut report)
-        };
         let payloads = train.iter().chain(&validate).map(|source| KnownPayload::of(tree, source));
         let payloads = payloads.collect::<Result<Vec<_>, LogError>>()?;
-        let mut surveys =
-            train.iter().chain(&validate).map(survey).collect::<Result<Vec<Survey>, LogError>>()?;
+        let logs: Vec<&LogSource> = train.iter().chain(&validate).collect();
+        let what = match logs.as_slice() {
+            [source] => reading("surveying", &source.path),
+            logs => format!("surveying {} logs", logs.len()),
+        };
+        // Bytes of each log: done, and in all.
+        let bytes: Vec<[AtomicU64; 2]> = logs.iter().map(|_| Default::default()).collect();
+        let sum = |which: usize| bytes.iter().map(|log| log[which].load(Ordering::Relaxed)).sum();
+        let survey = |(log, source): (usize, &&LogSource)| {
+            let mut report = |done: u64, total: u64| {
+                bytes[log][0].store(done, Ordering::Relaxed);
+                bytes[log][1].store(total, Ordering::Relaxed);
+                progress(&what, sum(0), sum(1));
+            };
+            interruption.check()?;
+            phiw_telemetry::survey(*source, &joints, torque, &mut report)
+        };
+        // Each log by itself; of several errors the first log's is told.
+        let surveys: Vec<Result<Survey, LogError>> = logs.par_iter().enumerate().map(survey).collect();
+        let mut surveys = surveys.into_iter().collect::<Result<Vec<Survey>, LogError>>()?;
         phiw_telemetry::arrange_session(&mut surveys);
         let (training, held_out) = surveys.split_at(train.len());
         check_logs(tree, training, held_out)?;
@@ -106,6 +120,22 @@ impl LogSet {
         // Cut-offs that were told must fit the logs held out, too.
         held_out.iter().try_for_each(|survey| conditioning.plan(survey).map(drop))?;
         Ok(LogSet { train: train.len(), conditioning, surveys, payloads, interruption })
+    }
+
+    /// Logs without maps that were surveyed and conditioned before, the first `train` of them to fit.
+    pub fn of_surveys(mut surveys: Vec<Survey>, train: usize, conditioning: Conditioning) -> Self {
+        surveys.iter_mut().for_each(|survey| survey.source = LogSource::from(&survey.path));
+        let payloads = vec![None; surveys.len()];
+        let interruption = Interruption::default();
+        LogSet { train: train.min(surveys.len()), surveys, conditioning, payloads, interruption }
+    }
+
+    /// Reads a log from another place from now on; its content must be the same.
+    pub fn set_path(&mut self, log: usize, path: &Path) {
+        if let Some(survey) = self.surveys.get_mut(log) {
+            survey.path = path.to_owned();
+            survey.source.path = path.to_owned();
+        }
     }
 
     /// The same logs, each row of which goes out.
@@ -202,20 +232,19 @@ impl LogSet {
 
     /// The logs as sources of blocks.
     pub fn sources<'a>(&'a self, progress: Progress<'a>) -> Vec<LogFile<'a>> {
-        self.sources_conditioned(&self.conditioning, progress)
+        let source = |log| self.source_conditioned(log, &self.conditioning, progress);
+        (0..self.surveys.len()).map(source).collect()
     }
 
-    /// The same, conditioned in another way.
-    pub(crate) fn sources_conditioned<'a>(
+    /// One log, conditioned in another way.
+    pub(crate) fn source_conditioned<'a>(
         &'a self,
+        log: usize,
         conditioning: &'a Conditioning,
         progress: Progress<'a>,
-    ) -> Vec<LogFile<'a>> {
-        let logs = self.surveys.iter().zip(&self.payloads);
-        logs.map(|(survey, payload)| {
-            LogFile::new(survey, conditioning, payload.as_ref(), &self.interruption, progress)
-        })
-        .collect()
+    ) -> LogFile<'a> {
+        let payload = self.payloads[log].as_ref();
+        LogFile::new(&self.surveys[log], conditioning, payload, &self.interruption, progress)
     }
 }
 

@@ -36,6 +36,11 @@ pub struct Limits {
     pub toml_bytes: u64,
     /// Bytes of a `model.json`.
     pub model_bytes: u64,
+    /// Bytes of a plan of `phiw plan`. A log takes some 10 kB, the first one some 100 kB for its spectra.
+    pub plan_bytes: u64,
+    /// Bytes of a file of factors of `phiw reduce`: for each log about six cut-offs beside what a fit takes,
+    /// where `factor_bytes` holds.
+    pub factor_file_bytes: u64,
     /// Bytes of all triangular factors of one pass together; they are held in memory at once.
     pub factor_bytes: u64,
 }
@@ -56,6 +61,8 @@ impl Default for Limits {
             control_points: 6_000,
             toml_bytes: 1 << 20,
             model_bytes: 64 << 20,
+            plan_bytes: 256 << 20,
+            factor_file_bytes: 8 << 30,
             factor_bytes: 2 << 30,
         }
     }

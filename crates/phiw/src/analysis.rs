@@ -7,8 +7,10 @@ use phiw_identification::bandwidth::Bandwidth;
 use phiw_identification::consistent::{Consistent, ConsistentSettings, Known, consistent};
 use phiw_identification::effect::JointProperty;
 use phiw_identification::fitting::merge;
-use phiw_identification::{Data, EffectCatalogue, EffectSpec, Identified, Model};
+use phiw_identification::model::DataFingerprint;
+use phiw_identification::{Data, EffectCatalogue, EffectSpec, Identified, Model, WithRests};
 use phiw_regressor::RegressorError;
+use phiw_residual::trace;
 
 /// A residual up to this many times the noise floor is noise.
 pub const NOISE_MARGIN: f64 = 1.1;
@@ -23,8 +25,10 @@ pub struct Analysis<'a> {
     pub model: Model,
     /// The same fit over bodies that can exist.
     pub consistent: Consistent,
-    /// Torques over time.
-    pub traces: Traces,
+    /// Torques over time; none where the rows were not at hand.
+    pub traces: Option<Traces>,
+    /// What the rows at which joints rest add.
+    pub with_rests: WithRests,
     /// RMS of the noise in each joint's filtered torque \[N·m, N\].
     pub noise_floor: Vec<f64>,
     /// What other cut-offs would do, where it was asked.
@@ -34,24 +38,41 @@ pub struct Analysis<'a> {
 }
 
 impl<'a> Analysis<'a> {
-    /// Passes over the logs once more with the fitted model and puts everything together.
+    /// Puts everything together; where the logs are at hand, it passes over them once more with the fitted
+    /// model. `with_rests` is found there where it is not given.
     ///
     /// # Errors
     /// A log cannot be read any more.
-    pub fn new(session: &'a Session, data: &Data<'_>, identified: &'a Identified) -> Result<Self, Error> {
+    pub fn new(
+        session: &'a Session,
+        rows: Rows<'_>,
+        identified: &'a Identified,
+        with_rests: Option<WithRests>,
+    ) -> Result<Self, Error> {
         let Identified { design, fit, .. } = identified;
         let at_rest = session.joints_without_held_out_motion(&identified.held_out_folds)?;
         let conditioning = session.logs.conditioning();
         let cutoffs = (conditioning.cutoff_hz, conditioning.parallel_cutoff_hz);
+        let fingerprints = match rows {
+            Rows::Logs(_) => fingerprint::of_session(session)?,
+            Rows::Reduced { fingerprints, .. } => fingerprints.to_vec(),
+        };
         let model = Model::of_fit(design, fit, &session.declared, &session.held, cutoffs)?
-            .with_sources(&session.xml, fingerprint::of_session(session)?);
+            .with_sources(&session.xml, fingerprints);
         let settings = ConsistentSettings { known: known(session)?, ..ConsistentSettings::default() };
         let consistent =
             consistent(design, fit, &identified.train_folds, &identified.held_out_folds, &settings)?;
         let model = model.with_consistent(design, &consistent)?;
-        let folds = [data.train.as_slice(), data.held_out.as_slice()];
-        let traces = Traces::collect(design, &fit.parameters, folds, &data.sources)?;
-        let noise_floor = noise_floor(session, data, &model)?;
+        let traces = match rows {
+            Rows::Logs(data) => {
+                let folds = [data.train.as_slice(), data.held_out.as_slice()];
+                Some(Traces::collect(design, &fit.parameters, folds, &data.sources)?)
+            }
+            Rows::Reduced { .. } => None,
+        };
+        let noise_floor = noise_floor(session, rows, &model)?;
+        let of_traces = || traces.as_ref().map(|traces| traces.with_rests(session.tree.joint_count()));
+        let with_rests = with_rests.or_else(of_traces).unwrap_or_default();
         let mut warnings = warnings::all(session, identified);
         warnings.extend(possible_bodies::warning(&model, &consistent, fit));
         warnings.extend(warnings::at_rest_where_held_out(session, &at_rest));
@@ -61,6 +82,7 @@ impl<'a> Analysis<'a> {
             model,
             consistent,
             traces,
+            with_rests,
             noise_floor,
             bandwidth: None,
             warnings,
@@ -136,11 +158,25 @@ fn known(session: &Session) -> Result<Vec<Known>, Error> {
     Ok(known)
 }
 
+/// Where the rows of the logs are.
+#[derive(Clone, Copy)]
+pub enum Rows<'a> {
+    /// At hand.
+    Logs(&'a Data<'a>),
+    /// Elsewhere: they were reduced.
+    Reduced {
+        /// The logs.
+        fingerprints: &'a [DataFingerprint],
+        /// Positions here and there in the logs \[rad, m\], one row after another.
+        poses: &'a [f64],
+    },
+}
+
 /// What the sensors' noise alone would leave under the model's inertia \[N·m, N\].
 ///
 /// # Errors
 /// A log cannot be read any more.
-pub fn noise_floor(session: &Session, data: &Data<'_>, model: &Model) -> Result<Vec<f64>, Error> {
+pub fn noise_floor(session: &Session, rows: Rows<'_>, model: &Model) -> Result<Vec<f64>, Error> {
     let tree = model.identified_tree(&session.tree)?;
     let mut rotor = vec![0.0; tree.joint_count()];
     let armature = Some(JointProperty::Armature);
@@ -152,5 +188,8 @@ pub fn noise_floor(session: &Session, data: &Data<'_>, model: &Model) -> Result<
         }
     }
     let (surveys, conditioning) = (session.logs.surveys(), session.logs.conditioning());
-    Ok(phiw_residual::trace::noise_floor(&tree, &rotor, surveys, conditioning, &data.sources)?)
+    Ok(match rows {
+        Rows::Logs(data) => trace::noise_floor(&tree, &rotor, surveys, conditioning, &data.sources)?,
+        Rows::Reduced { poses, .. } => trace::noise_floor_at(&tree, &rotor, surveys, conditioning, poses)?,
+    })
 }

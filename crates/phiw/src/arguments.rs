@@ -3,10 +3,14 @@
 pub use crate::argument_values::held_joint;
 use crate::argument_values::{known_mass, positive, quoted, share};
 pub use crate::export::ExportArguments;
+pub use crate::identify_arguments::IdentifyArguments;
 pub use crate::in_memory::InMemory;
 pub use crate::map::MapArguments;
 pub use crate::simulate::Backend;
+
+use crate::fleet::{PlanArguments, ReduceArguments};
 use clap::{Args, Parser, Subcommand};
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// What was asked for.
@@ -48,6 +52,11 @@ pub enum Command {
     /// Choose the motion that a real robot should run next, given what has been measured: one iteration of
     /// the curriculum.
     Next(NextArguments),
+    /// Decide over all logs what `phiw reduce` and `phiw identify --plan` need to work on each log by itself,
+    /// on as many machines as one likes.
+    Plan(PlanArguments),
+    /// Reduce logs of a plan to their factors, which are all that `phiw identify --plan` needs of them.
+    Reduce(ReduceArguments),
 }
 
 impl Command {
@@ -63,16 +72,10 @@ impl Command {
             Command::Map(map) => map.quiet,
             Command::Retarget(retarget) => retarget.quiet,
             Command::Next(next) => next.quiet,
+            Command::Plan(plan) => plan.quiet,
+            Command::Reduce(reduce) => reduce.quiet,
         }
     }
-}
-
-/// Arguments of `phiw identify`.
-#[derive(Debug, Args)]
-pub struct IdentifyArguments {
-    /// Robot, logs and declared model.
-    #[command(flatten)]
-    pub session: SessionArguments,
 }
 
 /// Arguments of `phiw explain`.
@@ -209,9 +212,9 @@ pub struct RetargetArguments {
     /// The robot's URDF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
-    /// Recordings: C3D, or CSV of named points (`t`, `<point>.x`, `<point>.y`, `<point>.z` in metres, or in
-    /// the map's `units`).
-    #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
+    /// Recordings: C3D, TRC, BVH (LAFAN1), npz of AMASS or SMPL-X, or CSV of named points (`t`, `<point>.x`,
+    /// `<point>.y`, `<point>.z` in metres, or in the map's `units`).
+    #[arg(long, visible_alias = "recordings", value_name = "FILE", required = true, num_args = 1..)]
     pub c3d: Vec<PathBuf>,
     /// Which marker sits where; by default the built-in map that names most markers of the recordings.
     #[arg(long, value_name = "MAP.toml")]
@@ -233,6 +236,9 @@ pub struct RetargetArguments {
     /// How velocities and accelerations come about.
     #[arg(long, value_enum, default_value_t = Derivatives::Analytic)]
     pub derivatives: Derivatives,
+    /// What a motion is written as.
+    #[arg(long, value_enum, default_value_t = MotionFormat::Csv)]
+    pub format: MotionFormat,
     /// Folder for the results; it is made if it is absent. What is done in it with the same settings is not
     /// done again.
     #[arg(long, value_name = "DIR")]
@@ -327,8 +333,28 @@ pub enum Derivatives {
     BackwardDifferences,
 }
 
+/// What a motion is written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum MotionFormat {
+    /// A log without torques, as phiw reads it.
+    Csv,
+    /// NumPy arrays, as programs that learn to track motions read them: `fps`, `joint_pos`, `joint_vel`,
+    /// `body_pos_w`, `body_quat_w`, `body_lin_vel_w`, `body_ang_vel_w`, `joint_names`, `body_names`.
+    Npz,
+}
+
+impl MotionFormat {
+    /// How names of its files end.
+    pub fn extension(self) -> &'static str {
+        match self {
+            MotionFormat::Csv => "csv",
+            MotionFormat::Npz => "npz",
+        }
+    }
+}
+
 /// Robot, logs and declared model: what every command on measured logs takes.
-#[derive(Clone, Debug, Default, Args)]
+#[derive(Clone, Debug, Default, Args, Serialize, Deserialize)]
 pub struct SessionArguments {
     /// The robot's URDF.
     #[arg(long, value_name = "ROBOT.urdf")]
@@ -373,6 +399,7 @@ pub struct SessionArguments {
     pub quiet: bool,
     /// What stands in memory for the files.
     #[arg(skip)]
+    #[serde(skip)]
     pub in_memory: InMemory,
 }
 

@@ -3,8 +3,8 @@
 use crate::Error;
 use crate::session::Session;
 use phiw_effects::SignalRanges;
-use phiw_identification::Progress;
 use phiw_identification::bandwidth::{Bandwidth, BandwidthSettings, bandwidth};
+use phiw_identification::{Progress, Variants};
 use phiw_report::json::{BandwidthJson, CutoffJson, MovedParameterJson};
 use phiw_report::number::{percent, significant};
 use phiw_report::page::Picture;
@@ -19,15 +19,23 @@ const TEXTBOOK: [&str; 3] = ["viscous_friction", "coulomb_friction", "torque_off
 /// # Errors
 /// An effect cannot be declared, or a log cannot be read.
 pub fn of_session(session: &Session, progress: Progress<'_>) -> Result<Option<Bandwidth>, Error> {
-    let ranges = SignalRanges::of_surveys(session.logs.training());
     let sources = session.logs.sources(progress);
-    let mut effects = session.effects(&session.data(&sources))?;
+    let effects = with_textbook(session, session.effects(&session.data(&sources))?)?;
+    Ok(bandwidth(&session.tree, effects, &session.logs, &BandwidthSettings::default(), progress)?)
+}
+
+/// The declared effects and the textbook's.
+///
+/// # Errors
+/// An effect cannot be declared.
+pub fn with_textbook(session: &Session, mut effects: Vec<Variants>) -> Result<Vec<Variants>, Error> {
+    let ranges = SignalRanges::of_surveys(session.logs.training());
     let kind_of = |declared: &str| declared.split(':').next().unwrap_or_default().to_owned();
     for kind in TEXTBOOK.iter().filter(|kind| !session.declared.iter().any(|other| kind_of(other) == **kind))
     {
         effects.extend(session.catalogue.declare(kind, &session.tree, &ranges)?);
     }
-    Ok(bandwidth(&session.tree, effects, &session.logs, &BandwidthSettings::default(), progress)?)
+    Ok(effects)
 }
 
 /// What a reader should know of the cut-off.

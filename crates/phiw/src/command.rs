@@ -70,7 +70,10 @@ fn told(command: &Command, console: &Console) -> Result<Told, Error> {
     let no_failures = Vec::new();
     Ok(match command {
         Command::Identify(arguments) => {
-            let outcome = crate::identify::identify(&arguments.session, console)?;
+            let outcome = match &arguments.merge {
+                Some(merge) => crate::fleet::merge(merge, console)?,
+                None => crate::identify::identify(&arguments.session, console)?,
+            };
             Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
         }
         Command::Explain(arguments) => {
@@ -96,6 +99,14 @@ fn told(command: &Command, console: &Console) -> Result<Told, Error> {
         Command::Check(arguments) => {
             let outcome = crate::check::check(arguments, console)?;
             Told { summary: outcome.summary, warnings: Vec::new(), failures: no_failures }
+        }
+        Command::Plan(arguments) => {
+            let outcome = crate::fleet::plan(arguments, console)?;
+            Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
+        }
+        Command::Reduce(arguments) => {
+            let outcome = crate::fleet::reduce(arguments, console)?;
+            Told { summary: outcome.summary, warnings: outcome.warnings, failures: no_failures }
         }
         Command::Retarget(arguments) => {
             let outcome = crate::retarget::retarget(arguments, console)?;

@@ -1,11 +1,13 @@
 //! Why a command failed, and with which exit status.
 
+use crate::fleet::PlanError;
 use phiw_curriculum::CurriculumError;
 use phiw_dynamics::urdf::UrdfError;
 use phiw_estimation::EstimationError;
 use phiw_identification::IdentificationError;
 use phiw_identification::checks::InputError;
 use phiw_identification::effect::EffectError;
+use phiw_identification::shard::ShardError;
 use phiw_result_folder::ResultError;
 use phiw_telemetry::LogError;
 use std::io;
@@ -52,6 +54,58 @@ pub enum Error {
         path: PathBuf,
         /// What is wrong with it.
         source: Box<UrdfError>,
+    },
+    /// A plan that cannot be made or used.
+    #[error("{}: {source}", path.display())]
+    Plan {
+        /// The plan.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: Box<PlanError>,
+    },
+    /// A file of factors that cannot be used.
+    #[error("{}: {source}", path.display())]
+    Shard {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: ShardError,
+    },
+    /// A log that the plan does not know.
+    #[error("{}: the plan has no log of this content among its {logs}; plan again with it, or leave it out", log.display())]
+    NotInPlan {
+        /// The log.
+        log: PathBuf,
+        /// Logs of the plan.
+        logs: usize,
+    },
+    /// A log that is not what it was.
+    #[error("{}: the log of this name has changed since the plan was made; plan again", log.display())]
+    LogChanged {
+        /// The log.
+        log: PathBuf,
+    },
+    /// A log that is named twice.
+    #[error("{}: this log is named twice; name it once", log.display())]
+    LogTwice {
+        /// The log.
+        log: PathBuf,
+    },
+    /// A log in two files of factors.
+    #[error("{}: the factors of {log} are in {} too; give them once", second.display(), first.display())]
+    FactorsTwice {
+        /// The log.
+        log: String,
+        /// A file that has them.
+        first: PathBuf,
+        /// Another one.
+        second: PathBuf,
+    },
+    /// Logs of the plan without factors.
+    #[error("the factors of {} are missing; reduce {} with phiw reduce and give the file, too", first_of(logs), if logs.len() == 1 { "it" } else { "them" })]
+    FactorsMissing {
+        /// The logs.
+        logs: Vec<String>,
     },
     /// A model file that is none.
     #[error("{}: not a model.json of phiw: {source}", path.display())]
@@ -344,6 +398,13 @@ impl Error {
             | Error::NotAFile { .. }
             | Error::TooLarge { .. }
             | Error::NotText { .. }
+            | Error::Plan { .. }
+            | Error::Shard { .. }
+            | Error::NotInPlan { .. }
+            | Error::LogChanged { .. }
+            | Error::LogTwice { .. }
+            | Error::FactorsTwice { .. }
+            | Error::FactorsMissing { .. }
             | Error::Urdf { .. }
             | Error::FloatingBase { .. }
             | Error::NotAModel { .. }
@@ -426,6 +487,18 @@ impl From<LogError> for Error {
 impl From<InputError> for Error {
     fn from(error: InputError) -> Self {
         IdentificationError::from(error).into()
+    }
+}
+
+/// Logs that a message names.
+const LOGS_NAMED: usize = 5;
+
+/// The first of some logs, and how many there are more.
+fn first_of(logs: &[String]) -> String {
+    let named = logs[..logs.len().min(LOGS_NAMED)].join(", ");
+    match logs.len().saturating_sub(LOGS_NAMED) {
+        0 => named,
+        more => format!("{named} and {more} more"),
     }
 }
 

@@ -1,6 +1,6 @@
 //! `phiw explain`: the declared model, what it lacks, and the error before and after.
 
-use crate::analysis::{Analysis, noise_floor};
+use crate::analysis::{Analysis, Rows, noise_floor};
 use crate::argument_values::quoted;
 use crate::arguments::ExplainArguments;
 use crate::console::Console;
@@ -73,7 +73,8 @@ pub fn results(arguments: &ExplainArguments, console: &Console) -> Result<Result
 
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
-    let mut analysis = Analysis::new(&session, &data, &tracing.model)?.with_bandwidth(bandwidth);
+    let mut analysis =
+        Analysis::new(&session, Rows::Logs(&data), &tracing.model, None)?.with_bandwidth(bandwidth);
     analysis.noise_floor = floor;
     analysis.warnings.extend(tracing.not_judged.iter().map(|(kind, joints)| {
         format!("{kind} of {} could not be judged on these logs (its columns are not finite): not all of it was sought", joints.join(", "))
@@ -138,7 +139,7 @@ fn traced(
         start.held.is_none() && start.specs.iter().any(is_other)
     };
     let excluded = excluded.iter().filter(|other| !stays(other)).cloned().collect();
-    let floor = noise_floor(session, data, &start.model)?;
+    let floor = noise_floor(session, Rows::Logs(data), &start.model)?;
     let conditioning = session.logs.conditioning();
     let plan = conditioning.plan(&session.logs.surveys()[0])?;
     let input = TraceInput {

@@ -30,7 +30,10 @@ pub fn of_session(session: &Session) -> Result<Vec<DataFingerprint>, Error> {
 
 /// The hash of the bytes of a file or folder, in hexadecimal digits; of a log in memory that of its columns:
 /// each name, a line feed, the values' bytes, lowest first.
-fn sha256(source: &LogSource) -> Result<String, Error> {
+///
+/// # Errors
+/// It cannot be read.
+pub fn sha256(source: &LogSource) -> Result<String, Error> {
     let path = &source.path;
     let unreadable = |source| Error::Unreadable { path: path.to_owned(), source };
     let mut hasher = Hasher(Sha256::new());

@@ -1,6 +1,6 @@
 //! `phiw identify`: the declared model, fitted and written down.
 
-use crate::analysis::Analysis;
+use crate::analysis::{Analysis, Rows};
 use crate::arguments::SessionArguments;
 use crate::console::Console;
 use crate::exported::Carried;
@@ -72,9 +72,11 @@ pub fn results(arguments: &SessionArguments, console: &Console) -> Result<Result
     let bandwidth = bandwidth::of_session(&session, &progress)?;
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
-    let identified = phiw_identification::identify(&session.tree, session.effects(&data)?, &data)
+    let effects = session.effects(&data)?;
+    let (identified, with_rests) = phiw_identification::identify_with_rests(&session.tree, effects, &data)
         .map_err(|error| session.of_training_logs(error))?;
-    let analysis = Analysis::new(&session, &data, &identified)?.with_bandwidth(bandwidth);
+    let analysis = Analysis::new(&session, Rows::Logs(&data), &identified, Some(with_rests))?;
+    let analysis = analysis.with_bandwidth(bandwidth);
     console.finish();
 
     let report = report_json(&analysis);

@@ -1,7 +1,7 @@
-//! Text files that are read whole: URDF, maps, models.
+//! Files that are read whole: URDF, maps, models, plans, factors.
 
 use crate::Error;
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::Read;
 use std::path::Path;
 
@@ -10,13 +10,20 @@ use std::path::Path;
 /// # Errors
 /// It is absent, no regular file (a pipe without a writer would block for ever), too large, or no UTF-8 text.
 pub fn read_text(path: &Path, most: u64) -> Result<String, Error> {
+    String::from_utf8(read_bytes(path, most)?).map_err(|error| Error::NotText {
+        path: path.to_owned(),
+        looks_like: phiw_telemetry::looks_like(error.as_bytes()).unwrap_or("bytes that are no UTF-8"),
+    })
+}
+
+/// The bytes of a file of at most `most` bytes.
+///
+/// # Errors
+/// It is absent, no regular file, or too large.
+pub fn read_bytes(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
     let unreadable = |source| Error::Unreadable { path: path.to_owned(), source };
-    let metadata = path.metadata().map_err(unreadable)?;
-    if !metadata.is_file() {
-        return Err(Error::NotAFile { path: path.to_owned() });
-    }
     let too_large = || Error::TooLarge { path: path.to_owned(), most };
-    if metadata.len() > most {
+    if regular_file(path)?.len() > most {
         return Err(too_large());
     }
     let mut bytes = Vec::new();
@@ -25,8 +32,17 @@ pub fn read_text(path: &Path, most: u64) -> Result<String, Error> {
     if bytes.len() as u64 > most {
         return Err(too_large());
     }
-    String::from_utf8(bytes).map_err(|error| Error::NotText {
-        path: path.to_owned(),
-        looks_like: phiw_telemetry::looks_like(error.as_bytes()).unwrap_or("bytes that are no UTF-8"),
-    })
+    Ok(bytes)
+}
+
+/// What the system knows of a regular file.
+///
+/// # Errors
+/// It is absent, or no regular file: a pipe without a writer would block for ever.
+pub fn regular_file(path: &Path) -> Result<Metadata, Error> {
+    let metadata = path.metadata().map_err(|source| Error::Unreadable { path: path.to_owned(), source })?;
+    if !metadata.is_file() {
+        return Err(Error::NotAFile { path: path.to_owned() });
+    }
+    Ok(metadata)
 }

@@ -152,15 +152,18 @@ pub fn errors_note(analysis: &Analysis<'_>) -> String {
     format!(
         "{held_out} Errors are of the filtered torque while the joint moves; with rests included the pooled held-out error is {} %. \
          The noise floor is what the sensors' noise alone would leave: the torque's in the filter's band, and the positions' through differentiation and inertia, both taken as white.",
-        percent(analysis.traces.relative_with_rests(Role::HeldOut))
+        percent(analysis.with_rests.held_out_relative)
     )
 }
 
 fn joint_section(analysis: &Analysis<'_>, joint: usize) -> JointSection {
     let session = analysis.session;
     let unit = session.torque_unit(joint);
-    let traces =
-        |role| analysis.traces.of_joint(role, joint, |log| file_name(&session.logs.surveys()[log].path));
+    let name = |log: usize| file_name(&session.logs.surveys()[log].path);
+    let traces = |role| match &analysis.traces {
+        Some(traces) => traces.of_joint(role, joint, name),
+        None => Vec::new(),
+    };
     JointSection {
         joint: session.tree.joint(joint).joint.clone(),
         unit: unit.into(),
@@ -209,7 +212,7 @@ pub fn conditioning_entries(analysis: &Analysis<'_>) -> Vec<(String, String)> {
         .joints()
         .iter()
         .enumerate()
-        .map(|(joint, name)| (name, analysis.traces.rest_share(joint)))
+        .map(|(joint, name)| (name, analysis.with_rests.share[joint]))
         .filter(|(_, share)| *share >= 5e-4)
         .map(|(name, share)| format!("{name} {} %", percent(share)))
         .collect();

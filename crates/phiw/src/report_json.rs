@@ -2,7 +2,6 @@
 
 use crate::analysis::Analysis;
 use crate::page::conditioning_entries;
-use crate::traces::Role;
 use crate::{bandwidth, possible_bodies};
 use phiw_identification::fitting::TorqueError;
 use phiw_report::ReportJson;
@@ -53,8 +52,8 @@ pub fn program(analysis: &Analysis<'_>) -> ProgramJson {
         conditioning: entries.map(|(quantity, value)| (quantity, value.into())).collect(),
         bandwidth: analysis.bandwidth.as_ref().map(bandwidth::json),
         relative_with_rests: Some(RelativeErrors {
-            train: analysis.traces.relative_with_rests(Role::Train),
-            validate: analysis.traces.relative_with_rests(Role::HeldOut),
+            train: analysis.with_rests.train_relative,
+            validate: analysis.with_rests.held_out_relative,
         }),
         evidence: Vec::new(),
         unidentifiable: Vec::new(),

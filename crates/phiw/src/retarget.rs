@@ -1,6 +1,7 @@
 //! `phiw retarget`: marker recordings in, motions of the robot out, many files at a time.
 
 mod batch;
+mod learning_file;
 mod motion_file;
 
 pub use batch::{Failure, RetargetOutcome};
@@ -20,8 +21,8 @@ use phiw_result_folder::{Disk, Lock, check_inputs, remove_partial_files};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Retargets all recordings: for each a log `<name>.csv` without torques, and `<name>.json` with what it is
-/// worth.
+/// Retargets all recordings: for each a log `<name>.csv` without torques (or `<name>.npz`), and `<name>.json`
+/// with what it is worth.
 ///
 /// A file that has been done with the same settings is kept. A file that cannot be done does not stop the
 /// others.
@@ -35,8 +36,9 @@ pub fn retarget(arguments: &RetargetArguments, console: &Console) -> Result<Reta
     let inputs: Vec<PathBuf> =
         std::iter::once(&arguments.urdf).chain(&arguments.c3d).chain(&arguments.map).cloned().collect();
     let result = |file: &PathBuf, extension| arguments.out.join(format!("{}.{extension}", stem(file)));
+    let extension = arguments.format.extension();
     let outputs: Vec<PathBuf> =
-        arguments.c3d.iter().flat_map(|file| [result(file, "csv"), result(file, "json")]).collect();
+        arguments.c3d.iter().flat_map(|file| [result(file, extension), result(file, "json")]).collect();
     check_inputs(&inputs, &outputs)?;
     let _place = Lock::acquire(&arguments.out, "phiw retarget")?;
     remove_partial_files(&Disk, &arguments.out);
@@ -75,14 +77,16 @@ fn check_names(files: &[PathBuf]) -> Result<(), Error> {
     Ok(())
 }
 
-/// The built-in map that names most markers of the first recording that can be read.
+/// The built-in map that names most markers of the first recording that can be read; the first of them where
+/// none can.
 fn default_map(files: &[PathBuf]) -> Result<MarkerMap, MapError> {
-    let (seated, embedded) = (MarkerMap::ue_adl()?, MarkerMap::embedded()?);
     // Only the names count here, whatever unit the numbers are in.
     let named = |file: &PathBuf| read_recording(file, Some("m")).ok();
     let recording = files.iter().find_map(named);
     let share = |map: &MarkerMap| recording.as_ref().map_or(0.0, |recording| share_named(map, recording));
-    Ok(if share(&embedded) > share(&seated) { embedded } else { seated })
+    let mut maps = MarkerMap::built_in()?.into_iter();
+    let first = maps.next().map_or_else(MarkerMap::ue_adl, Ok)?;
+    Ok(maps.fold(first, |best, map| if share(&map) > share(&best) { map } else { best }))
 }
 
 /// Share of a map's markers that a recording has.

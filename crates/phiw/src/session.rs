@@ -71,17 +71,19 @@ impl Session {
         let interruption = given.interruption.clone();
         let torque = TorqueColumns::Required;
         let logs = LogSet::surveyed(&robot.tree, logs, torque, &options, interruption, progress)?;
-        Ok(Session {
-            tree: robot.tree,
-            xml: robot.xml,
-            findings: robot.findings,
-            held: robot.held,
-            snapped: robot.snapped,
-            declared,
-            catalogue,
-            logs,
-            arguments: arguments.clone(),
-        })
+        Ok(Session::of(robot, declared, logs, arguments.clone()))
+    }
+
+    /// Of what was read and checked.
+    pub(crate) fn of(
+        robot: RobotOfUrdf,
+        declared: Vec<String>,
+        logs: LogSet,
+        arguments: SessionArguments,
+    ) -> Self {
+        let RobotOfUrdf { tree, xml, findings, held, snapped } = robot;
+        let catalogue = Catalogue::default();
+        Session { tree, xml, findings, held, snapped, declared, catalogue, logs, arguments }
     }
 
     /// The same error, with the training logs' names if it is about all of them.
@@ -206,9 +208,13 @@ impl RobotOfUrdf {
 
 /// The robot of a session.
 pub(crate) fn read_robot(arguments: &SessionArguments) -> Result<RobotOfUrdf, Error> {
-    let path = || arguments.urdf.clone();
     let given = arguments.in_memory.urdf.as_ref();
-    let xml = text_of(given, &arguments.urdf, Limits::default().urdf_bytes)?;
+    robot_of(text_of(given, &arguments.urdf, Limits::default().urdf_bytes)?, arguments)
+}
+
+/// The robot of a session, given the text of its URDF.
+pub(crate) fn robot_of(xml: String, arguments: &SessionArguments) -> Result<RobotOfUrdf, Error> {
+    let path = || arguments.urdf.clone();
     let options = UrdfOptions { held: arguments.hold.clone(), snap: true, ..UrdfOptions::default() };
     let reading =
         read_urdf(&xml, &options).map_err(|source| Error::Urdf { path: path(), source: Box::new(source) })?;

@@ -5,7 +5,6 @@ use crate::exported::Carried;
 use crate::generated_code;
 use crate::page::{counted, declared_in_words};
 use crate::possible_bodies;
-use crate::traces::Role;
 use crate::{identified_mjcf, identified_urdf};
 use phiw_identification::LogSet;
 use phiw_report::number::{percent, significant};
@@ -45,7 +44,7 @@ fn errors(analysis: &Analysis<'_>, text: &mut String) -> std::fmt::Result {
         "pooled: train {} %, held out {} % of RMS torque ({} % with rests included)",
         percent(identified.train.relative),
         percent(identified.held_out.relative),
-        percent(analysis.traces.relative_with_rests(Role::HeldOut))
+        percent(analysis.with_rests.held_out_relative)
     )?;
     writeln!(text, "{}", possible_bodies::sentence(analysis))?;
     if analysis.session.logs.splits_training_logs() {

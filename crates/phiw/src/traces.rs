@@ -1,6 +1,6 @@
 //! Measured and predicted torque over the logs, thinned for pictures while they stream by.
 
-use phiw_identification::{BlockSource, Design, Fold, IdentificationError, Prediction, predict};
+use phiw_identification::{BlockSource, Design, Fold, IdentificationError, Prediction, WithRests, predict};
 use phiw_report::page::TorqueTrace;
 use phiw_report::plot::{Decimator, LINE_POINTS};
 
@@ -86,22 +86,14 @@ impl Traces {
         self.parts.iter().filter(|part| part.role == role).map(trace).collect()
     }
 
-    /// RMS of the error over RMS of the torque, all joints and outputs pooled, rests included.
-    pub fn relative_with_rests(&self, role: Role) -> f64 {
-        let sums = self.sums(role);
-        (sums.error_squares / sums.torque_squares).sqrt()
-    }
-
-    /// Share of the outputs at which a joint rests, of all logs.
-    pub fn rest_share(&self, joint: usize) -> f64 {
+    /// What the outputs at which joints rest add, of so many joints.
+    pub fn with_rests(&self, joints: usize) -> WithRests {
         let outputs = self.train.outputs + self.held_out.outputs;
-        (self.train.rests[joint] + self.held_out.rests[joint]) as f64 / outputs.max(1) as f64
-    }
-
-    fn sums(&self, role: Role) -> &ErrorSums {
-        match role {
-            Role::Train => &self.train,
-            Role::HeldOut => &self.held_out,
+        let rests = |joint: usize| self.train.rests[joint] + self.held_out.rests[joint];
+        WithRests {
+            train_relative: self.train.relative(),
+            held_out_relative: self.held_out.relative(),
+            share: (0..joints).map(|joint| rests(joint) as f64 / outputs.max(1) as f64).collect(),
         }
     }
 
@@ -114,6 +106,11 @@ impl Traces {
 }
 
 impl ErrorSums {
+    /// RMS of the error over RMS of the torque.
+    fn relative(&self) -> f64 {
+        (self.error_squares / self.torque_squares).sqrt()
+    }
+
     fn push(&mut self, prediction: &Prediction<'_>) {
         self.outputs += 1;
         for (joint, rests) in self.rests.iter_mut().enumerate() {

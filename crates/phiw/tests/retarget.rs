@@ -2,6 +2,7 @@
 
 use assert_cmd::Command;
 use phiw_bspline_retarget::embedded::embedded_motions;
+use phiw_bspline_retarget::npz::{Array, Npz, NpzWriter};
 use phiw_telemetry::{Recording, TorqueColumns};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -239,5 +240,75 @@ fn what_retarget_writes_has_no_jumps() {
                 Recording::from_csv(&path(derivatives).join(file), &joints, TorqueColumns::Absent).unwrap();
             phiw_curriculum::motion::Motion::from_recording(file, "", &log).unwrap();
         }
+    }
+}
+
+/// A second of AMASS: a person who sways and bends the left elbow.
+fn amass() -> Vec<u8> {
+    let (mut poses, mut trans) = (Vec::new(), Vec::new());
+    for frame in 0..60 {
+        let swing = (0.1 * f64::from(frame)).sin();
+        let mut pose = vec![0.0; 66];
+        (pose[0], pose[3 * 16 + 2], pose[3 * 17 + 2]) = (1.57, -1.2, 1.2);
+        pose[3 * 18 + 1] = -1.0 - 0.5 * swing;
+        poses.extend(pose);
+        trans.extend([0.05 * swing, 0.03 * swing, 0.95]);
+    }
+    let mut writer = NpzWriter::default();
+    writer.numbers("poses", &Array { shape: vec![60, 66], values: poses });
+    writer.numbers("trans", &Array { shape: vec![60, 3], values: trans });
+    writer.numbers("mocap_framerate", &Array { shape: vec![], values: vec![60.0] });
+    writer.finish().unwrap()
+}
+
+#[test]
+fn an_npz_of_amass_becomes_an_npz_that_learning_programs_read() {
+    let folder = scene();
+    let file = folder.path().join("sway.npz");
+    std::fs::write(&file, amass()).unwrap();
+    let (status, summary, errors) = run(&folder, std::slice::from_ref(&file), &["--format", "npz"]);
+    assert_eq!(status, 0, "{errors}");
+    assert!(summary.contains("with the map `smpl`"), "{summary}");
+    let out = folder.path().join("out");
+    assert_eq!(names(&out), ["sway.json", "sway.npz"]);
+    let bytes = std::fs::read(out.join("sway.npz")).unwrap();
+    let mut npz = Npz::new(&bytes, 1 << 20).unwrap();
+    let mut shape = |name: &str| npz.array(name).unwrap().unwrap().shape;
+    assert_eq!(shape("fps"), [1]);
+    assert_eq!(shape("joint_pos"), [60, 18]);
+    assert_eq!(shape("joint_vel"), [60, 18]);
+    assert_eq!(shape("body_pos_w"), [60, 18, 3]);
+    assert_eq!(shape("body_quat_w"), [60, 18, 4]);
+    assert_eq!(shape("body_lin_vel_w"), [60, 18, 3]);
+    assert_eq!(shape("body_ang_vel_w"), [60, 18, 3]);
+    assert!(["joint_names", "body_names"].iter().all(|name| npz.names().contains(&(*name).to_owned())));
+
+    // The same as a log: the same angles.
+    let (status, _, errors) = run(&folder, &[file], &[]);
+    assert_eq!(status, 0, "{errors}");
+    let text = std::fs::read_to_string(out.join("sway.csv")).unwrap();
+    let header = text.lines().next().unwrap();
+    let joints: Vec<String> =
+        header.split(',').filter_map(|name| name.strip_prefix("q.")).map(str::to_owned).collect();
+    let log = Recording::from_csv(&out.join("sway.csv"), &joints, TorqueColumns::Optional).unwrap();
+    assert_eq!(npz.array("joint_pos").unwrap().unwrap().values, log.q);
+}
+
+#[test]
+fn motions_that_are_cut_short_are_refused_in_one_line() {
+    let folder = scene();
+    let whole = amass();
+    let cut: [(&str, &[u8]); 3] = [
+        ("cut.npz", &whole[..whole.len() / 2]),
+        ("cut.bvh", b"HIERARCHY\nROOT Hips\n{\n  OFFSET 0 0"),
+        ("cut.trc", b"PathFileType\t4\t(X/Y/Z)\tcut.trc\nDataRate"),
+    ];
+    for (name, bytes) in cut {
+        let file = folder.path().join(name);
+        std::fs::write(&file, bytes).unwrap();
+        let (status, _, errors) = run(&folder, &[file], &[]);
+        assert_eq!(status, 2, "{errors}");
+        assert!(errors.contains(name) && errors.trim_end().lines().count() == 1, "{errors}");
+        assert!(names(&folder.path().join("out")).is_empty());
     }
 }

@@ -4,7 +4,7 @@ use crate::arrays::{Doubles, array};
 use crate::robot::Robot;
 use crate::work::{InputError, raised, run};
 use phiw::arguments::{
-    CheckArguments, Derivatives, ExplainArguments, InMemory, NextArguments, PredictArguments,
+    CheckArguments, Derivatives, ExplainArguments, InMemory, MotionFormat, NextArguments, PredictArguments,
     RetargetArguments, SessionArguments,
 };
 use phiw::identify::Results;
@@ -226,6 +226,7 @@ pub fn retarget<'py>(
         velocity_limits,
         interval,
         derivatives: Derivatives::Analytic,
+        format: MotionFormat::Csv,
         out,
         quiet: true,
     };

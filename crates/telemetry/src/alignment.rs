@@ -1,5 +1,6 @@
 //! A measured velocity compared with the positions: its delay, its unit, and its dead band.
 
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// Length of a stretch over which both are averaged \[s\]; one sample where samples are further apart.
@@ -12,21 +13,28 @@ const MOST_LAGS: usize = 40;
 const FEWEST: f64 = 100.0;
 
 /// How a velocity column relates to the positions' differences.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Alignment {
     /// How much later the column is than the positions, in seconds.
+    #[serde(with = "crate::any_number")]
     pub lag: f64,
     /// What the column must be multiplied by, at this lag, to be the positions' derivative.
+    #[serde(with = "crate::any_number")]
     pub scale: f64,
     /// Share of its power that the positions' derivative does not explain.
+    #[serde(with = "crate::any_number")]
     pub unexplained: f64,
     /// The same at this lag.
+    #[serde(with = "crate::any_number")]
     pub unexplained_at_lag: f64,
     /// Share of stretches in which the column is exactly 0 throughout.
+    #[serde(with = "crate::any_number")]
     pub zero_share: f64,
     /// Root mean square of the positions' derivative in those, over that of all.
+    #[serde(with = "crate::any_number")]
     pub motion_at_zero: f64,
     /// Distance of the lags that were tried, in seconds.
+    #[serde(with = "crate::any_number")]
     pub resolution: f64,
 }
 

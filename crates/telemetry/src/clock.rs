@@ -1,10 +1,11 @@
 //! The times at which samples were taken, where the stamps jitter.
 
 use crate::columns::Layout;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// What the time stamps of a log mean.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Clock {
     /// Samples were taken at equal distances; where stamps jitter, it is the stamping that does. The stamps
     /// are kept, and not used for differentiation.
@@ -24,7 +25,7 @@ impl fmt::Display for Clock {
 }
 
 /// How the [`Clock`] is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum ClockChoice {
     /// The one under which the positions are smoother; see [`Survey::clock`](crate::Survey::clock).
     #[default]

@@ -3,10 +3,11 @@
 use crate::LogError;
 use crate::map::{Expression, LogMap, Lookup, Signal};
 use phiw_log_formats::Table;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Whether a log must have torque columns (`tau.<joint>`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum TorqueColumns {
     /// Every joint needs one.
     Required,

@@ -3,10 +3,11 @@
 use crate::clock::ClockChoice;
 use crate::cutoff::{self, BANDWIDTHS, CutoffSuggestion};
 use crate::{LogError, Survey};
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// What the user fixes; what is left `None` is chosen from the data.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ConditioningOptions {
     /// Cut-off of the positions' low-pass, in Hz.
     pub cutoff_hz: Option<f64>,
@@ -22,6 +23,7 @@ pub struct ConditioningOptions {
     /// differentiating.
     pub use_measured_derivatives: bool,
     /// Leading samples of a block that no output covers, in seconds.
+    #[serde(with = "crate::any_number")]
     pub warm_up: f64,
     /// About how many samples a block has.
     pub block_samples: usize,
@@ -42,13 +44,15 @@ impl Default for ConditioningOptions {
 }
 
 /// How the logs of a session are conditioned.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Conditioning {
     /// Cut-off of the positions' low-pass (−6 dB), in Hz.
+    #[serde(with = "crate::any_number")]
     pub cutoff_hz: f64,
     /// Whether the data chose it, not the user.
     pub cutoff_from_data: bool,
     /// Cut-off of the parallel filter (−6 dB), in Hz.
+    #[serde(with = "crate::any_number")]
     pub parallel_cutoff_hz: f64,
     /// What each joint of each log suggests as the positions' cut-off; the largest is taken. Joints that
     /// never move suggest none.

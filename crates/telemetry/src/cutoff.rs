@@ -2,24 +2,26 @@
 
 use crate::Survey;
 use crate::spectrum::Spectrum;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use std::fmt;
 
 /// A cut-off for one joint of one log.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CutoffSuggestion {
     /// Name of the joint.
     pub joint: String,
     /// Place of its log among those surveyed.
     pub log: usize,
     /// The cut-off, in Hz.
+    #[serde(with = "crate::any_number")]
     pub cutoff_hz: f64,
     /// What set it.
     pub bound: Bound,
 }
 
 /// What set a cut-off.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Bound {
     /// A higher one would let more noise into the acceleration than it saves of the signal.
     Noise,

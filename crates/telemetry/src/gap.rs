@@ -1,9 +1,10 @@
 //! Why samples are missing.
 
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Why a log is interrupted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum GapReason {
     /// A cell that is needed is empty.
     EmptyCell,

@@ -9,27 +9,34 @@ use crate::check_settings::CheckSettings;
 use crate::clock::{stamped_interpolation_error, uniform_interpolation_error};
 use crate::histogram::Histogram;
 use crate::signal_shape::ShapeCollector;
+use serde::{Deserialize, Serialize};
 
 /// What a log shows of one joint, over all usable rows.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct JointSurvey {
     /// Name of the joint.
     pub name: String,
     /// Smallest position, in rad or m.
+    #[serde(with = "crate::any_number")]
     pub q_min: f64,
     /// Largest position, in rad or m.
+    #[serde(with = "crate::any_number")]
     pub q_max: f64,
     /// Mean position, in rad or m.
+    #[serde(with = "crate::any_number")]
     pub q_mean: f64,
     /// Standard deviation of the position, in rad or m.
+    #[serde(with = "crate::any_number")]
     pub q_std: f64,
     /// Root mean square of the velocity (differences over four steps, the noise taken off), in rad/s or m/s.
+    #[serde(with = "crate::any_number")]
     pub velocity_rms: f64,
     /// The torque, where the log has it.
     pub torque: Option<TorqueSurvey>,
     /// Standard deviation of the position's white noise, from fourth differences: their median magnitude,
     /// over windows where the reading changes at all, divided by what unit white noise gives. Low-passed
     /// noise looks smaller than it is, motion fast for the sample rate looks like noise. In rad or m.
+    #[serde(with = "crate::any_number")]
     pub position_noise_std: f64,
     /// What the encoder made of the position.
     pub position_shape: SignalShape,
@@ -49,15 +56,19 @@ impl JointSurvey {
 }
 
 /// What a log shows of one joint's torque.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TorqueSurvey {
     /// Smallest, in N·m or N.
+    #[serde(with = "crate::any_number")]
     pub min: f64,
     /// Largest, in N·m or N.
+    #[serde(with = "crate::any_number")]
     pub max: f64,
     /// Root mean square, in N·m or N.
+    #[serde(with = "crate::any_number")]
     pub rms: f64,
     /// Standard deviation of the white noise, found as [`JointSurvey::position_noise_std`] is, in N·m or N.
+    #[serde(with = "crate::any_number")]
     pub noise_std: f64,
     /// What the sensor made of it.
     pub shape: SignalShape,
@@ -76,14 +87,17 @@ impl TorqueSurvey {
 }
 
 /// What a log shows of a measured derivative of one joint's position.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DerivativeSurvey {
     /// Smallest.
+    #[serde(with = "crate::any_number")]
     pub min: f64,
     /// Largest.
+    #[serde(with = "crate::any_number")]
     pub max: f64,
     /// Slope of the derivative of the signal below (`q` for `qd`, `qd` for `qdd`; by central differences)
     /// over this column, by least squares: 1 where the two agree; NaN where there is too little motion.
+    #[serde(with = "crate::any_number")]
     pub agreement: f64,
     /// Of a velocity, how it relates to the positions in detail; `None` where there is too little motion.
     pub alignment: Option<Alignment>,

@@ -7,6 +7,7 @@ pub mod joint_survey;
 pub mod segments;
 
 mod alignment;
+mod any_number;
 mod block;
 mod blocks;
 mod check_settings;

@@ -19,6 +19,11 @@ pub struct LogSource {
 }
 
 impl LogSource {
+    /// The place of a survey that is read back, until it is given one.
+    pub(crate) fn nowhere() -> Self {
+        LogSource::mapped(PathBuf::new(), None)
+    }
+
     /// A log whose columns a map explains.
     pub fn mapped(path: impl Into<PathBuf>, map: Option<Arc<LogMap>>) -> Self {
         LogSource { path: path.into(), map, part: LogPart::All, columns: None }

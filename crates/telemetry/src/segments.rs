@@ -4,9 +4,10 @@ pub use crate::gap::GapReason;
 
 use crate::LogError;
 use crate::reader::{Row, Rows};
+use serde::{Deserialize, Serialize};
 
 /// How often a log is interrupted for one reason.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GapCount {
     /// The reason.
     pub reason: GapReason,
@@ -17,7 +18,7 @@ pub struct GapCount {
 }
 
 /// Spikes of one column.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SpikeCount {
     /// The column, such as `q.joint_1`.
     pub column: String,
@@ -28,15 +29,17 @@ pub struct SpikeCount {
 }
 
 /// A stretch of samples without a gap.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
     /// Line of its first row in the file, counted from 1.
     pub first_line: u64,
     /// Samples in it.
     pub rows: usize,
     /// First time stamp, in seconds.
+    #[serde(with = "crate::any_number")]
     pub t_start: f64,
     /// Last time stamp, in seconds.
+    #[serde(with = "crate::any_number")]
     pub t_end: f64,
 }
 

@@ -2,6 +2,7 @@
 //! stretches.
 
 use crate::histogram::Histogram;
+use serde::{Deserialize, Serialize};
 
 /// Stretches of one value from this length on are counted \[s\].
 pub(crate) const LONG: f64 = 0.5;
@@ -17,13 +18,16 @@ const SMALLEST_SHARE: f64 = 0.05;
 const SMALLEST_TOLERANCE: f64 = 1.1;
 
 /// The shape of a signal, over all usable rows.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct SignalShape {
     /// The step in which the signal comes; 0 if it comes in none that shows.
+    #[serde(with = "crate::any_number")]
     pub step: f64,
     /// Share of rows in which it is exactly 0.
+    #[serde(with = "crate::any_number")]
     pub zero_share: f64,
     /// Smallest magnitude besides 0; 0 where there is none.
+    #[serde(with = "crate::any_number")]
     pub smallest: f64,
     /// How often it came near 0 and went away again.
     pub touches: u64,
@@ -32,6 +36,7 @@ pub struct SignalShape {
     /// Rows within 6 % of those, themselves included.
     pub near_ends: [u64; 2],
     /// Mean number of rows for which it keeps a value.
+    #[serde(with = "crate::any_number")]
     pub mean_run: f64,
     /// The longest stretch of one value during which the joint moved on, if there is one.
     pub still: Option<Still>,
@@ -40,13 +45,16 @@ pub struct SignalShape {
 }
 
 /// A stretch in which a signal kept one value while the joint moved.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Still {
     /// The value.
+    #[serde(with = "crate::any_number")]
     pub value: f64,
     /// Its first time stamp, in seconds.
+    #[serde(with = "crate::any_number")]
     pub from: f64,
     /// How long it lasts, in seconds.
+    #[serde(with = "crate::any_number")]
     pub duration: f64,
     /// Its rows.
     pub rows: u64,

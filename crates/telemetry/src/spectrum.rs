@@ -3,6 +3,7 @@
 use crate::columns::Layout;
 use realfft::num_complex::Complex;
 use realfft::{RealFftPlanner, RealToComplex};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -11,9 +12,10 @@ use std::sync::Arc;
 /// Of a position it is the density of its second difference, the acceleration: a position has so much power
 /// near 0 Hz that it would leak through the window and hide the noise at high frequency; its second
 /// difference does not.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Spectrum {
     /// Distance of the bins, in Hz; bin k is at k times it. The last one is half the sample rate.
+    #[serde(with = "crate::any_number")]
     pub resolution_hz: f64,
     /// Windows averaged over; 0 where no segment is long enough, and the densities are empty then.
     pub windows: usize,

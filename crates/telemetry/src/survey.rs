@@ -18,17 +18,21 @@ use crate::spectrum::SpectrumEstimator;
 use crate::spike::{SpikeFinder, WithoutSpikes};
 use crate::still::{StillFinder, WithoutStill};
 use phiw_spikes::{SpikeSettings, WINDOW};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 use std::path::{Path, PathBuf};
 
 /// What is in a log: the result of [`survey`], and what [`stream`](crate::stream) needs to read it again.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Survey {
     /// The log.
     pub path: PathBuf,
     /// How it is read.
+    #[serde(skip, default = "LogSource::nowhere")]
     pub source: LogSource,
     /// What lines are counted in: `line`, `message` or `row`.
-    pub rows_are: &'static str,
+    #[serde(deserialize_with = "known_rows")]
+    pub rows_are: RowsAre,
     /// How the rows came about, where the log does not say it plainly.
     pub notes: Vec<String>,
     /// Place in the session, see [`arrange_session`].
@@ -49,8 +53,10 @@ pub struct Survey {
     pub spikes: Vec<SpikeCount>,
     /// The largest excursion of each column `q.<joint>`, `tau.<joint>`, … of a row, as a multiple of what is
     /// usual in it, see [`SpikeSettings::multiple`]; without spikes that were left out.
+    #[serde(with = "crate::any_number::list")]
     pub excursions: Vec<f64>,
     /// What an excursion must exceed to be a spike, by place in a row; empty where the log has none.
+    #[serde(with = "crate::any_number::list")]
     pub(crate) spike_bounds: Vec<f64>,
     /// First and last stamp of stretches in which no torque changes though the robot moves, in seconds: their
     /// rows are counted as gaps.
@@ -59,13 +65,17 @@ pub struct Survey {
     pub ignored_columns: Vec<String>,
     /// Median distance of consecutive stamps, in seconds; exact over the first 65536, checked against a
     /// histogram over all.
+    #[serde(with = "crate::any_number")]
     pub median_period: f64,
     /// Mean distance of consecutive stamps inside segments, in seconds: the sample period.
+    #[serde(with = "crate::any_number")]
     pub period: f64,
     /// Root mean square deviation of the distances inside segments from the median, relative to it.
+    #[serde(with = "crate::any_number")]
     pub jitter: f64,
     /// Longest distance of stamps, in seconds, that does not split: 1.25 times the 99th percentile, within
     /// 1.5 to 2.5 medians.
+    #[serde(with = "crate::any_number")]
     pub longest_step: f64,
     /// The clock under which the positions are smoother: the median error of a sample against the cubic
     /// through its four neighbours is compared at places where the stamps are uneven. [`Clock::Uniform`] must
@@ -79,12 +89,25 @@ pub struct Survey {
     pub spectrum: Spectrum,
 }
 
+/// A name that is known beforehand, under a name of its own: a reference would be read from the text.
+type RowsAre = &'static str;
+
+/// What lines can be counted in.
+const ROWS_ARE: [&str; 3] = ["line", "message", "row"];
+
+fn known_rows<'de, D: Deserializer<'de>>(deserializer: D) -> Result<&'static str, D::Error> {
+    let written = String::deserialize(deserializer)?;
+    let known = ROWS_ARE.into_iter().find(|known| *known == written);
+    known.ok_or_else(|| D::Error::custom(format!("rows are `{written}`; known are {}", ROWS_ARE.join(", "))))
+}
+
 /// Where a log lies in its session.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Session {
     /// Which log it is, counted from 0.
     pub log: usize,
     /// What to add to the log's stamps to get the session's time, in seconds.
+    #[serde(with = "crate::any_number")]
     pub offset: f64,
 }
 

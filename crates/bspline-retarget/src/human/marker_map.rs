@@ -124,6 +124,30 @@ impl MarkerMap {
         Self::from_toml(include_str!("../../maps/embedded.toml"))
     }
 
+    /// The map for BVH files whose joints have the names of LAFAN1.
+    ///
+    /// # Errors
+    /// As [`MarkerMap::ue_adl`].
+    pub fn lafan1() -> Result<Self, MapError> {
+        Self::from_toml(include_str!("../../maps/lafan1.toml"))
+    }
+
+    /// The map for the joints of AMASS and SMPL-X.
+    ///
+    /// # Errors
+    /// As [`MarkerMap::ue_adl`].
+    pub fn smpl() -> Result<Self, MapError> {
+        Self::from_toml(include_str!("../../maps/smpl.toml"))
+    }
+
+    /// All maps that are built in.
+    ///
+    /// # Errors
+    /// As [`MarkerMap::ue_adl`].
+    pub fn built_in() -> Result<Vec<Self>, MapError> {
+        [Self::ue_adl, Self::embedded, Self::lafan1, Self::smpl].into_iter().map(|map| map()).collect()
+    }
+
     /// Reads a map.
     ///
     /// # Errors

@@ -4,7 +4,7 @@ use super::subject::Subject;
 use crate::environment;
 use crate::retarget::database::{c3d_files, embedded, two_handed};
 use anyhow::{Context, ensure};
-use phiw::arguments::{Derivatives, RetargetArguments};
+use phiw::arguments::{Derivatives, MotionFormat, RetargetArguments};
 use phiw::console::Console;
 use phiw_curriculum::motion::Motion;
 use phiw_telemetry::{Recording, TorqueColumns};
@@ -115,6 +115,7 @@ impl Motions {
             velocity_limits: false,
             interval: 0.2,
             derivatives: Derivatives::Analytic,
+            format: MotionFormat::Csv,
             out: folder.to_owned(),
             quiet: true,
         };

@@ -4,7 +4,7 @@
 use super::page::Page;
 use super::scene::Scene;
 use anyhow::Context;
-use phiw::arguments::{Derivatives, RetargetArguments};
+use phiw::arguments::{Derivatives, MotionFormat, RetargetArguments};
 use phiw::console::Console;
 use phiw_bspline_retarget::c3d::{C3dFormat, write_c3d};
 use phiw_bspline_retarget::embedded::embedded_motions;
@@ -57,6 +57,7 @@ pub(super) fn measure(scene: &Scene, seed: u64, out: &Path, page: &mut Page) -> 
             velocity_limits: false,
             interval: 0.2,
             derivatives: Derivatives::Analytic,
+            format: MotionFormat::Csv,
             out: folder.clone(),
             quiet: true,
         };

@@ -21,6 +21,7 @@ use crate::{BlockSource, Design, Fold, IdentificationError, LogSet, Progress, Va
 use phiw_dynamics::Tree;
 use phiw_regressor::least_squares::{GroupedFactor, weighted_least_squares};
 use phiw_regressor::{BaseParameters, BaseParametersOptions, RegressorError, fewest_base_parameters};
+use phiw_telemetry::Survey;
 use stretches::Stretches;
 
 /// How cut-offs are compared.
@@ -120,38 +121,129 @@ pub fn bandwidth(
     settings: &BandwidthSettings,
     progress: Progress<'_>,
 ) -> Result<Option<Bandwidth>, IdentificationError> {
-    let reference_hz = logs.conditioning().parallel_cutoff_hz;
-    let highest = logs.conditioning().cutoff_hz;
-    let rungs = -(settings.below as i32)..=settings.above as i32;
-    let cutoffs: Vec<f64> = rungs
-        .map(|rung| reference_hz * settings.ratio.powi(rung))
-        .filter(|&cutoff_hz| cutoff_hz <= highest || cutoff_hz <= reference_hz)
-        .collect();
-    let Some(design) = design(tree, effects, logs, settings)? else { return Ok(None) };
-    let stretches = Stretches::read(logs, cutoffs[0], settings, progress)?;
-    let factors = |cutoff_hz: f64| {
-        let sources = stretches.at(cutoff_hz);
+    let Some(contest) = Contest::new(tree, effects, logs, settings)? else { return Ok(None) };
+    let stretches = contest.stretches(logs.training(), logs, progress)?;
+    contest.judged(|rung| contest.factors_of(&stretches, rung))
+}
+
+/// Cut-offs that are compared, and the columns and the motion that they are compared on.
+pub struct Contest {
+    design: Design,
+    /// The cut-offs, ascending, in Hz.
+    cutoffs: Vec<f64>,
+    reference_hz: f64,
+    /// The beginning of each training fold.
+    folds: Vec<Fold>,
+    settings: BandwidthSettings,
+}
+
+impl Contest {
+    /// Of a rigid body with `effects` on the training logs; `None` where it has more parameters than the
+    /// settings allow.
+    ///
+    /// # Errors
+    /// The base parameters cannot be found.
+    pub fn new(
+        tree: &Tree,
+        effects: Vec<Variants>,
+        logs: &LogSet,
+        settings: &BandwidthSettings,
+    ) -> Result<Option<Self>, IdentificationError> {
+        let reference_hz = logs.conditioning().parallel_cutoff_hz;
+        let highest = logs.conditioning().cutoff_hz;
+        let rungs = -(settings.below as i32)..=settings.above as i32;
+        let cutoffs: Vec<f64> = rungs
+            .map(|rung| reference_hz * settings.ratio.powi(rung))
+            .filter(|&cutoff_hz| cutoff_hz <= highest || cutoff_hz <= reference_hz)
+            .collect();
+        let Some(design) = design(tree, effects, logs, settings)? else { return Ok(None) };
+        let rates: Vec<f64> = logs.training().iter().map(|survey| survey.rate_hz()).collect();
+        let folds = beginnings(&logs.training_folds(), &rates, settings);
+        Ok(Some(Contest { design, cutoffs, reference_hz, folds, settings: *settings }))
+    }
+
+    /// The columns.
+    pub fn design(&self) -> &Design {
+        &self.design
+    }
+
+    /// The stretches of time, in the order of the logs.
+    pub fn folds(&self) -> &[Fold] {
+        &self.folds
+    }
+
+    /// Number of cut-offs.
+    pub fn rungs(&self) -> usize {
+        self.cutoffs.len()
+    }
+
+    /// What some training logs bring: for each cut-off the factors of their stretches of time, in order.
+    ///
+    /// # Errors
+    /// A log cannot be read or does not fit the robot.
+    pub fn factors(
+        &self,
+        surveys: &[Survey],
+        logs: &LogSet,
+        progress: Progress<'_>,
+    ) -> Result<Vec<Vec<GroupedFactor>>, IdentificationError> {
+        let stretches = self.stretches(surveys, logs, progress)?;
+        (0..self.rungs()).map(|rung| self.factors_of(&stretches, rung)).collect()
+    }
+
+    fn stretches(
+        &self,
+        surveys: &[Survey],
+        logs: &LogSet,
+        progress: Progress<'_>,
+    ) -> Result<Stretches, IdentificationError> {
+        let of_logs = |fold: &&Fold| surveys.iter().any(|survey| survey.session.log == fold.log);
+        let folds = self.folds.iter().filter(of_logs).copied().collect();
+        Stretches::read(folds, surveys, logs, self.cutoffs[0], progress)
+    }
+
+    fn factors_of(
+        &self,
+        stretches: &Stretches,
+        rung: usize,
+    ) -> Result<Vec<GroupedFactor>, IdentificationError> {
+        let sources = stretches.at(self.cutoffs[rung]);
         let sources: Vec<&dyn BlockSource> =
             sources.iter().map(|source| source as &dyn BlockSource).collect();
-        accumulate(&design, stretches.folds(), &sources)
-    };
-    let reference = factors(reference_hz)?;
-    let all = merge(&reference)?;
-    let undetermined = undetermined(&all)?;
-    let determined: Vec<usize> =
-        (0..design.parameter_count()).filter(|parameter| !undetermined.contains(parameter)).collect();
-    let mut fits = Vec::with_capacity(cutoffs.len());
-    for &cutoff_hz in &cutoffs {
-        let own;
-        let folds = if cutoff_hz == reference_hz {
-            &reference
-        } else {
-            own = factors(cutoff_hz)?;
-            &own
-        };
-        fits.extend(RungFit::new(cutoff_hz, folds, &determined)?);
+        accumulate(&self.design, stretches.folds(), &sources)
     }
-    judged(&design, &reference, &determined, fits, reference_hz, settings)
+
+    /// Compares the cut-offs, whose factors of all stretches of time `factors` gives; `None` where they hold
+    /// too little.
+    ///
+    /// # Errors
+    /// Those of `factors`, or they are of other columns.
+    pub fn judged(
+        &self,
+        factors: impl Fn(usize) -> Result<Vec<GroupedFactor>, IdentificationError>,
+    ) -> Result<Option<Bandwidth>, IdentificationError> {
+        let Contest { design, cutoffs, reference_hz, settings, .. } = self;
+        let Some(place) = cutoffs.iter().position(|cutoff_hz| cutoff_hz == reference_hz) else {
+            return Ok(None);
+        };
+        let reference = factors(place)?;
+        let all = merge(&reference)?;
+        let undetermined = undetermined(&all)?;
+        let determined: Vec<usize> =
+            (0..design.parameter_count()).filter(|parameter| !undetermined.contains(parameter)).collect();
+        let mut fits = Vec::with_capacity(cutoffs.len());
+        for (rung, &cutoff_hz) in cutoffs.iter().enumerate() {
+            let own;
+            let folds = if rung == place {
+                &reference
+            } else {
+                own = factors(rung)?;
+                &own
+            };
+            fits.extend(RungFit::new(cutoff_hz, folds, &determined)?);
+        }
+        judged(design, &reference, &determined, fits, *reference_hz, settings)
+    }
 }
 
 /// The rigid body with the first variant of each effect; `None` where it has too many parameters.

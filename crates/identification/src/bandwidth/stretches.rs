@@ -1,7 +1,5 @@
 //! The training motion that cut-offs are compared on, in memory, to be filtered with any of them.
 
-use super::{BandwidthSettings, beginnings};
-use crate::log_file::LogFile;
 use crate::{BlockSource, Fold, IdentificationError, LogSet, Progress};
 use phiw_telemetry::filter::ParallelFilter;
 use phiw_telemetry::{Block, LogError, Survey};
@@ -16,20 +14,19 @@ pub struct Stretches {
 }
 
 impl Stretches {
-    /// Reads the training logs once. `lowest_hz` is the lowest cut-off that the blocks will be filtered with.
+    /// Reads training logs once. `lowest_hz` is the lowest cut-off that the blocks will be filtered with.
     pub fn read(
+        folds: Vec<Fold>,
+        surveys: &[Survey],
         logs: &LogSet,
         lowest_hz: f64,
-        settings: &BandwidthSettings,
         progress: Progress<'_>,
     ) -> Result<Self, IdentificationError> {
-        let rates: Vec<f64> = logs.training().iter().map(|survey| survey.rate_hz()).collect();
-        let folds = beginnings(&logs.training_folds(), &rates, settings);
         let mut conditioning = logs.conditioning().clone();
         conditioning.parallel_cutoff_hz = lowest_hz;
         conditioning.options.parallel_cutoff_hz = Some(lowest_hz);
-        let sources = logs.sources_conditioned(&conditioning, progress);
-        let read = |(survey, source): (&Survey, &LogFile<'_>)| {
+        let read = |survey: &Survey| {
+            let source = logs.source_conditioned(survey.session.log, &conditioning, progress);
             let mut blocks = Vec::new();
             source.blocks(&mut |block| {
                 let (Some(&first), Some(&last)) = (block.t.first(), block.t.last()) else { return };
@@ -40,8 +37,7 @@ impl Stretches {
             })?;
             Ok((survey.period, blocks))
         };
-        let logs =
-            logs.training().iter().zip(&sources).map(read).collect::<Result<_, IdentificationError>>()?;
+        let logs = surveys.iter().map(read).collect::<Result<_, IdentificationError>>()?;
         Ok(Stretches { folds, logs })
     }
 

@@ -208,7 +208,7 @@ fn one(
     let content = std::fs::read(file)
         .map_err(|source| Error::Recording(RecordingError::Unreadable { path: file.to_owned(), source }))?;
     let settings = Settings::new(arguments, urdf, retargeter, &content, trial.as_deref());
-    let output = MotionFile::new(&arguments.out, &stem(file));
+    let output = MotionFile::new(&arguments.out, &stem(file), arguments.format);
     if output.holds(&settings) {
         return Ok(Done::Kept);
     }

@@ -1,7 +1,8 @@
 //! One motion in the result folder: a log and what is known of it.
 
+use super::learning_file::learning_file;
 use crate::Error;
-use crate::arguments::{Derivatives, RetargetArguments};
+use crate::arguments::{Derivatives, MotionFormat, RetargetArguments};
 use phiw_bspline_retarget::{Retargeted, Retargeter, backward_differences};
 use phiw_result_folder::{Disk, ResultError, replace_vouched};
 use phiw_telemetry::{LogColumns, LogWriter};
@@ -25,8 +26,8 @@ impl Settings {
         let mut digest = Sha256::new();
         digest.update(env!("CARGO_PKG_VERSION"));
         digest.update(urdf);
-        let settings =
-            (&arguments.hold, &arguments.derivatives, retargeter.map(), retargeter.options(), static_trial);
+        let written = (&arguments.derivatives, &arguments.format);
+        let settings = (&arguments.hold, written, retargeter.map(), retargeter.options(), static_trial);
         digest.update(format!("{settings:?}"));
         digest.update(recording);
         if let Some(Ok(trial)) = static_trial.map(fs::read) {
@@ -36,15 +37,16 @@ impl Settings {
     }
 }
 
-/// `<name>.csv` and `<name>.json`.
+/// `<name>.csv` (or `<name>.npz`) and `<name>.json`.
 pub struct MotionFile {
     log: PathBuf,
     facts: PathBuf,
 }
 
 impl MotionFile {
-    pub fn new(folder: &Path, name: &str) -> Self {
-        MotionFile { log: folder.join(format!("{name}.csv")), facts: folder.join(format!("{name}.json")) }
+    pub fn new(folder: &Path, name: &str, format: MotionFormat) -> Self {
+        let file = |extension: &str| folder.join(format!("{name}.{extension}"));
+        MotionFile { log: file(format.extension()), facts: file("json") }
     }
 
     /// Whether the motion is there, made with the same settings.
@@ -63,7 +65,7 @@ impl MotionFile {
         settings: &Settings,
         arguments: &RetargetArguments,
     ) -> Result<(), Error> {
-        let log = log(motion, retargeter, arguments.derivatives).map_err(unwritable(&self.log))?;
+        let log = log(motion, retargeter, arguments).map_err(unwritable(&self.log))?;
         let mut facts = facts(motion, artefacts, retargeter, settings).to_string();
         facts.push('\n');
         if let Some(folder) = self.log.parent() {
@@ -80,14 +82,17 @@ fn unwritable(path: &Path) -> impl FnOnce(io::Error) -> Error {
 }
 
 /// The robot's motion at the recording's rate.
-fn log(motion: &Retargeted, retargeter: &Retargeter, derivatives: Derivatives) -> io::Result<Vec<u8>> {
+fn log(motion: &Retargeted, retargeter: &Retargeter, arguments: &RetargetArguments) -> io::Result<Vec<u8>> {
     let joints: Vec<String> = retargeter.robot().tree().joint_names().map(str::to_owned).collect();
     let (count, frames) = (joints.len(), motion.frames);
     let mut signals = motion.signals();
     let [q, qd, qdd] = &mut signals;
-    if derivatives == Derivatives::BackwardDifferences {
+    if arguments.derivatives == Derivatives::BackwardDifferences {
         backward_differences(q, count, 1.0 / motion.rate_hz, qd, qdd)
             .map_err(|error| io::Error::other(error.to_string()))?;
+    }
+    if arguments.format == MotionFormat::Npz {
+        return learning_file(retargeter.robot().tree(), motion.rate_hz, q, qd);
     }
     let columns = LogColumns { velocity: true, acceleration: true, ..LogColumns::default() };
     let mut writer = LogWriter::new(Vec::new(), &joints, columns)?;
@@ -155,21 +160,26 @@ mod tests {
             velocity_limits: false,
             interval: 0.2,
             derivatives: Derivatives::Analytic,
+            format: MotionFormat::Csv,
             out: PathBuf::new(),
             quiet: true,
         };
-        let settings = |markers: MarkerSettings| {
+        let settings_of = |markers: MarkerSettings, arguments: &RetargetArguments| {
             let tree = read_urdf(urdf, &UrdfOptions::default()).unwrap().tree;
             let options = RetargetOptions { markers, ..RetargetOptions::default() };
             let retargeter = Retargeter::new(tree, MarkerMap::embedded().unwrap(), options).unwrap();
-            Settings::new(&arguments, urdf, &retargeter, &[], None).0
+            Settings::new(arguments, urdf, &retargeter, &[], None).0
         };
+        let settings = |markers| settings_of(markers, &arguments);
         let usual = settings(MarkerSettings::default());
         assert_eq!(settings(MarkerSettings::default()), usual);
         let mut spikes = MarkerSettings::default();
         spikes.spikes.smallest = 0.1;
         assert_ne!(settings(spikes), usual);
         assert_ne!(settings(MarkerSettings { person_m: 0.1..=9.0, ..MarkerSettings::default() }), usual);
+        // One motion written in two formats has one file of facts, which is about the last.
+        let npz = RetargetArguments { format: MotionFormat::Npz, ..arguments.clone() };
+        assert_ne!(settings_of(MarkerSettings::default(), &npz), usual);
         assert_ne!(settings(MarkerSettings { frozen_share: 0.8, ..MarkerSettings::default() }), usual);
     }
 }

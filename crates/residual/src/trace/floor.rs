@@ -1,6 +1,6 @@
 //! The noise floor: what a right model would leave, from the sensors' noise alone.
 
-use phiw_dynamics::{Tree, Workspace};
+use phiw_dynamics::{DimensionError, Tree, Workspace};
 use phiw_identification::{BlockSource, IdentificationError};
 use phiw_telemetry::{Conditioning, LogError, Survey};
 
@@ -22,9 +22,40 @@ pub fn noise_floor(
     conditioning: &Conditioning,
     sources: &[&dyn BlockSource],
 ) -> Result<Vec<f64>, IdentificationError> {
-    let joints = tree.joint_count();
+    let mut squares = SquaredMassMatrix::new(tree, rotor_inertia);
+    let mut outcome = Ok(());
+    each_pose(sources, sources.len(), &mut |q| {
+        if outcome.is_ok() {
+            outcome = squares.push(q);
+        }
+    })?;
+    outcome?;
+    floor_of(&squares.mean(), surveys, conditioning)
+}
+
+/// [`noise_floor`] with the mass matrix averaged over these [`poses`], one row of positions after another.
+///
+/// # Errors
+/// The conditioning does not fit a log, or the poses are another robot's.
+pub fn noise_floor_at(
+    tree: &Tree,
+    rotor_inertia: &[f64],
+    surveys: &[Survey],
+    conditioning: &Conditioning,
+    poses: &[f64],
+) -> Result<Vec<f64>, IdentificationError> {
+    let mut squares = SquaredMassMatrix::new(tree, rotor_inertia);
+    poses.chunks(tree.joint_count().max(1)).try_for_each(|q| squares.push(q))?;
+    floor_of(&squares.mean(), surveys, conditioning)
+}
+
+fn floor_of(
+    squares: &[f64],
+    surveys: &[Survey],
+    conditioning: &Conditioning,
+) -> Result<Vec<f64>, IdentificationError> {
+    let joints = surveys.first().map_or(0, |survey| survey.joints.len());
     let mut variance = vec![0.0; joints];
-    let squares = mean_squared_mass_matrix(tree, rotor_inertia, sources)?;
     let total: f64 = surveys.iter().map(Survey::duration).sum();
     for survey in surveys {
         let share = survey.duration() / total;
@@ -63,37 +94,63 @@ fn gains(conditioning: &Conditioning, survey: &Survey) -> Result<Gains, LogError
     Ok(Gains { torque: norm(parallel), acceleration: norm(&both) })
 }
 
-fn mean_squared_mass_matrix(
-    tree: &Tree,
-    rotor_inertia: &[f64],
+/// Positions here and there in logs \[rad, m\], one row after another: some hundreds in each block of the
+/// only log of a session, fewer where it has more `logs`, of which `sources` may be a part.
+///
+/// # Errors
+/// A log cannot be read.
+pub fn poses(sources: &[&dyn BlockSource], logs: usize) -> Result<Vec<f64>, IdentificationError> {
+    let mut poses = Vec::new();
+    each_pose(sources, logs, &mut |q| poses.extend_from_slice(q))?;
+    Ok(poses)
+}
+
+fn each_pose(
     sources: &[&dyn BlockSource],
-) -> Result<Vec<f64>, IdentificationError> {
-    let joints = tree.joint_count();
-    let mut workspace = Workspace::new(tree);
-    let mut matrix = vec![0.0; joints * joints];
-    let mut sums = vec![0.0; joints * joints];
-    let mut count = 0.0;
-    let mut failure = None;
+    logs: usize,
+    take: &mut dyn FnMut(&[f64]),
+) -> Result<(), LogError> {
+    let of_block = (POSES / logs.max(1) / 4).max(1);
     for source in sources {
         source.blocks(&mut |block| {
-            let step = (block.t.len() / (POSES / sources.len().max(1) / 4).max(1)).max(1);
-            for sample in (0..block.t.len()).step_by(step) {
-                if let Err(error) = tree.mass_matrix(&block.q[block.row(sample)], &mut workspace, &mut matrix)
-                {
-                    failure.get_or_insert(error);
-                    return;
-                }
-                for joint in 0..joints {
-                    matrix[joint * joints + joint] += rotor_inertia[joint];
-                }
-                sums.iter_mut().zip(&matrix).for_each(|(sum, entry)| *sum += entry * entry);
-                count += 1.0;
-            }
+            let step = (block.t.len() / of_block).max(1);
+            (0..block.t.len()).step_by(step).for_each(|sample| take(&block.q[block.row(sample)]));
         })?;
     }
-    if let Some(error) = failure {
-        return Err(error.into());
+    Ok(())
+}
+
+/// The mean over poses of each squared entry of the mass matrix.
+struct SquaredMassMatrix<'a> {
+    tree: &'a Tree,
+    rotor_inertia: &'a [f64],
+    workspace: Workspace<f64>,
+    matrix: Vec<f64>,
+    sums: Vec<f64>,
+    count: f64,
+}
+
+impl<'a> SquaredMassMatrix<'a> {
+    fn new(tree: &'a Tree, rotor_inertia: &'a [f64]) -> Self {
+        let entries = tree.joint_count() * tree.joint_count();
+        let (matrix, sums) = (vec![0.0; entries], vec![0.0; entries]);
+        SquaredMassMatrix { tree, rotor_inertia, workspace: Workspace::new(tree), matrix, sums, count: 0.0 }
     }
-    sums.iter_mut().for_each(|sum| *sum /= f64::max(count, 1.0));
-    Ok(sums)
+
+    fn push(&mut self, q: &[f64]) -> Result<(), DimensionError> {
+        let joints = self.tree.joint_count();
+        self.tree.mass_matrix(q, &mut self.workspace, &mut self.matrix)?;
+        for joint in 0..joints {
+            self.matrix[joint * joints + joint] += self.rotor_inertia[joint];
+        }
+        self.sums.iter_mut().zip(&self.matrix).for_each(|(sum, entry)| *sum += entry * entry);
+        self.count += 1.0;
+        Ok(())
+    }
+
+    fn mean(mut self) -> Vec<f64> {
+        let count = self.count.max(1.0);
+        self.sums.iter_mut().for_each(|sum| *sum /= count);
+        self.sums
+    }
 }

@@ -22,7 +22,7 @@ mod tracing;
 mod trial;
 mod verdict;
 
-pub use floor::noise_floor;
+pub use floor::{noise_floor, noise_floor_at, poses};
 pub use input::{HeldModel, TraceInput, TraceOptions};
 pub use naming::LEAST_RIVAL;
 pub use probe::Dependence;
