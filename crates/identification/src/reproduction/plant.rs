@@ -277,7 +277,6 @@ impl Effects<'_> {
             torque_rate: none.clone(),
             torque_second_rate: none.clone(),
             total_torque_rate: none,
-            ..BlockReference::default()
         });
         self.other.evaluate(&self.block, 1, &mut self.evaluation)?;
         self.add(&self.other_parameters, torque);
