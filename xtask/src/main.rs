@@ -29,7 +29,8 @@ enum Task {
     Test(test::Arguments),
     /// Hostile inputs, kills and concurrent runs on the release binary: a table of what came of each class.
     Torture(torture::Arguments),
-    /// The Python package in a fresh environment: pip install, pytest, notebooks; with --timings against others.
+    /// The Python package in a fresh environment: pip install, pytest, notebooks; with --timings against
+    /// others.
     Python(python::Arguments),
     /// Fetch MuJoCo's library into the user's cache folder, with Python's pip.
     Mujoco(mujoco::Arguments),

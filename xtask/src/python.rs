@@ -1,4 +1,5 @@
-//! `cargo xtask python`: the Python package of `crates/python` as a user meets it, in an environment of its own.
+//! `cargo xtask python`: the Python package of `crates/python` as a user meets it, in an environment of its
+//! own.
 
 use crate::test::tally::Tally;
 use anyhow::{Context, ensure};

@@ -451,8 +451,7 @@ impl Error {
         }
     }
 
-    /// Whether the work was called off (see
-    /// [`Interruption`](phiw_identification::Interruption)).
+    /// Whether the work was called off (see [`Interruption`](phiw_identification::Interruption)).
     pub fn is_interruption(&self) -> bool {
         matches!(
             self,

@@ -164,8 +164,8 @@ impl Robot {
     /// q, qd, qdd : array, shape (N, dof) or (dof,)
     ///     Positions (rad, m), velocities (rad/s, m/s) and accelerations (rad/s², m/s²).
     /// out : array, optional
-    ///     Contiguous, of the result's shape: is written to and given back, which saves the system the work of
-    ///     finding new memory.
+    ///     Contiguous, of the result's shape: is written to and given back, which saves the system the work
+    ///     of finding new memory.
     ///
     /// Returns
     /// -------
@@ -205,8 +205,8 @@ impl Robot {
     /// q, qd, tau : array, shape (N, dof) or (dof,)
     ///     Positions (rad, m), velocities (rad/s, m/s) and torques (N·m, N).
     /// out : array, optional
-    ///     Contiguous, of the result's shape: is written to and given back, which saves the system the work of
-    ///     finding new memory.
+    ///     Contiguous, of the result's shape: is written to and given back, which saves the system the work
+    ///     of finding new memory.
     ///
     /// Returns
     /// -------
@@ -246,8 +246,8 @@ impl Robot {
     /// q : array, shape (N, dof) or (dof,)
     ///     Positions (rad, m).
     /// out : array, optional
-    ///     Contiguous, of the result's shape: is written to and given back, which saves the system the work of
-    ///     finding new memory.
+    ///     Contiguous, of the result's shape: is written to and given back, which saves the system the work
+    ///     of finding new memory.
     ///
     /// Returns
     /// -------
@@ -286,8 +286,8 @@ impl Robot {
     /// q, qd, qdd : array, shape (N, dof) or (dof,)
     ///     Positions (rad, m), velocities (rad/s, m/s) and accelerations (rad/s², m/s²).
     /// out : array, optional
-    ///     Contiguous, of the result's shape: is written to and given back, which saves the system the work of
-    ///     finding new memory.
+    ///     Contiguous, of the result's shape: is written to and given back, which saves the system the work
+    ///     of finding new memory.
     ///
     /// Returns
     /// -------
