@@ -180,7 +180,7 @@ pub struct CheckArguments {
     /// name, * stands for any letters and ? for one: --hold 'left_*'.
     #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
     pub hold: Vec<(String, f64)>,
-    /// Folder for check.json, the same as numbers; it is made if it is absent.
+    /// Folder for check.json and check.html, the same as numbers and as a page; it is made if it is absent.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Print nothing but errors.
@@ -203,6 +203,22 @@ impl CheckArguments {
             in_memory: self.in_memory.clone(),
             ..SessionArguments::default()
         }
+    }
+
+    /// The command line that gives these arguments to `phiw`, quoted for a shell.
+    pub fn command_line(&self) -> String {
+        let mut words = vec!["phiw check --urdf".to_owned()];
+        let mut path = |path: &PathBuf| words.push(quoted(&path.display().to_string()));
+        path(&self.urdf);
+        self.logs.iter().for_each(&mut path);
+        let [map, out] = [&self.map, &self.out].map(Option::as_ref);
+        let hold: Vec<String> = self.hold.iter().map(held_in_words).collect();
+        let hold = (!hold.is_empty()).then(|| PathBuf::from(hold.join(",")));
+        for (name, value) in [("--map", map), ("--hold", hold.as_ref()), ("--out", out)] {
+            words
+                .extend(value.iter().map(|value| format!("{name} {}", quoted(&value.display().to_string()))));
+        }
+        words.join(" ")
     }
 }
 
@@ -423,22 +439,26 @@ impl SessionArguments {
             |paths: &[PathBuf]| paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>();
         let list = |values: Vec<String>| if values.is_empty() { values } else { vec![values.join(",")] };
         let number = |value: Option<f64>| value.iter().map(f64::to_string).collect::<Vec<_>>();
-        let held = |(joint, value): &(String, f64)| match *value {
-            0.0 => joint.clone(),
-            value => format!("{joint}={value}"),
-        };
         option("--urdf", paths(std::slice::from_ref(&self.urdf)));
         option("--train", paths(&self.train));
         option("--validate", paths(&self.validate));
         option("--map", paths(self.map.as_slice()));
         option("--declare", list(self.declare.clone()));
-        option("--hold", list(self.hold.iter().map(held).collect()));
+        option("--hold", list(self.hold.iter().map(held_in_words).collect()));
         option("--mass", list(self.mass.iter().map(|(link, mass)| format!("{link}={mass}")).collect()));
         option("--total-mass", number(self.total_mass));
         option("--cutoff-hz", number(self.cutoff_hz));
         option("--parallel-cutoff-hz", number(self.parallel_cutoff_hz));
         option("--out", paths(std::slice::from_ref(&self.out)));
         words.join(" ")
+    }
+}
+
+/// A joint that is held, as `--hold` takes it.
+fn held_in_words((joint, value): &(String, f64)) -> String {
+    match *value {
+        0.0 => joint.clone(),
+        value => format!("{joint}={value}"),
     }
 }
 

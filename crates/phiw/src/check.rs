@@ -1,5 +1,9 @@
 //! `phiw check`: what is in logs, before anything is fitted to them.
 
+mod page;
+mod report_json;
+mod signals;
+
 use crate::arguments::CheckArguments;
 use crate::console::Console;
 use crate::log_inputs::{read_map, said_of_logs, sources};
@@ -8,14 +12,27 @@ use crate::warnings::{file_name, of_log, snapped};
 use crate::{Error, session};
 use phiw_dynamics::Tree;
 use phiw_identification::checks::{InputError, check_excitation, check_logs, robot_findings};
-use phiw_result_folder::{Disk, Lock, ResultFile, check_inputs, replace_files};
+use phiw_result_folder::{Disk, Lock, ResultFile, check_inputs, replace_folder};
 use phiw_telemetry::findings::{CheckSettings, Finding, FindingKind};
 use phiw_telemetry::{Survey, TorqueColumns};
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::fmt::Write;
+use std::path::{Path, PathBuf};
 
-/// Name of the file with the findings.
-const RESULT_FILE: &str = "check.json";
+/// Names of the files with the findings: as numbers, and as a page.
+const RESULT_FILES: [&str; 2] = ["check.json", "check.html"];
+
+/// What the logs show, with what follows from it.
+struct Checked<'a> {
+    tree: &'a Tree,
+    surveys: &'a [Survey],
+    /// Each with its log.
+    findings: &'a [(usize, Finding)],
+    /// What was read otherwise than it is written, and what a map says.
+    notes: &'a [String],
+    /// Why no identification would begin.
+    refused: &'a [String],
+}
 
 /// What was found.
 #[derive(Debug)]
@@ -31,19 +48,7 @@ pub struct CheckOutcome {
 /// # Errors
 /// A robot or a log that cannot be read, or results that cannot be written.
 pub fn check(arguments: &CheckArguments, console: &Console) -> Result<CheckOutcome, Error> {
-    let place = match &arguments.out {
-        Some(folder) => {
-            check_folder(folder)?;
-            let inputs: Vec<_> = std::iter::once(&arguments.urdf)
-                .chain(&arguments.logs)
-                .chain(&arguments.map)
-                .cloned()
-                .collect();
-            check_inputs(&inputs, &[folder.join(RESULT_FILE)])?;
-            Some((folder, Lock::acquire(&folder.join(RESULT_FILE), "phiw check")?))
-        }
-        None => None,
-    };
+    let place = arguments.out.as_deref().map(|folder| take_folder(folder, arguments)).transpose()?;
     let robot = session::read_robot(&arguments.session())?;
     let tree = &robot.tree;
     let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
@@ -60,15 +65,29 @@ pub fn check(arguments: &CheckArguments, console: &Console) -> Result<CheckOutco
     let refused: Vec<String> = refused.iter().flatten().map(InputError::to_string).collect();
     let mut notes = Vec::from_iter(snapped(robot.snapped));
     notes.extend(map.iter().flat_map(|map| said_of_logs(map, &arguments.logs)));
-    let report = report(tree, &surveys, &findings, (&notes, &refused));
-    if let Some((folder, _lock)) = &place {
-        let text = serde_json::to_string_pretty(&report)
-            .map_err(|source| Error::Json { file: RESULT_FILE, source })?;
-        std::fs::create_dir_all(folder)
-            .map_err(|source| Error::Unreadable { path: folder.into(), source })?;
-        replace_files(&Disk, folder, RESULT_FILE, &[ResultFile::new(RESULT_FILE, text + "\n")])?;
+    let checked = Checked { tree, surveys: &surveys, findings: &findings, notes: &notes, refused: &refused };
+    let report = report_json::report(&checked);
+    let mut summary = summary(&checked);
+    if let Some(place) = &place {
+        let drawn = signals::drawn(&checked, &arguments.in_memory.interruption, console)?;
+        let [json, html] = RESULT_FILES;
+        let text =
+            serde_json::to_string_pretty(&report).map_err(|source| Error::Json { file: json, source })?;
+        let page = page::page(&checked, &drawn, arguments.command_line()).render();
+        replace_folder(&Disk, place, &[ResultFile::new(json, text + "\n"), ResultFile::new(html, page)])?;
+        let out = arguments.out.iter().map(|out| out.display().to_string()).collect::<String>();
+        let _ = writeln!(summary, "\n{json}, {html} in {out}");
     }
-    Ok(CheckOutcome { summary: summary(&surveys, &findings, (&notes, &refused)), report })
+    Ok(CheckOutcome { summary, report })
+}
+
+/// Takes the folder for the results: it can be there, none of them is an input, and nobody else writes to it.
+fn take_folder(folder: &Path, arguments: &CheckArguments) -> Result<Lock, Error> {
+    check_folder(folder)?;
+    let inputs: Vec<PathBuf> =
+        std::iter::once(&arguments.urdf).chain(&arguments.logs).chain(&arguments.map).cloned().collect();
+    check_inputs(&inputs, &RESULT_FILES.map(|name| folder.join(name)))?;
+    Ok(Lock::acquire(folder, "phiw check")?)
 }
 
 /// One warning for each thing that was found, with the number of logs that show it; without what the
@@ -114,11 +133,8 @@ fn logs_in_words(logs: &[usize], surveys: &[Survey]) -> String {
     }
 }
 
-fn summary(
-    surveys: &[Survey],
-    findings: &[(usize, Finding)],
-    (notes, refused): (&[String], &[String]),
-) -> String {
+fn summary(checked: &Checked<'_>) -> String {
+    let Checked { surveys, findings, notes, refused, .. } = *checked;
     let mut text = String::new();
     // Writing to a string does not fail.
     for note in notes {
@@ -151,42 +167,4 @@ fn summary(
         text.push_str("\nnothing found\n");
     }
     text
-}
-
-fn report(
-    tree: &Tree,
-    surveys: &[Survey],
-    findings: &[(usize, Finding)],
-    (notes, refused): (&[String], &[String]),
-) -> Value {
-    let finding = |(log, finding): &(usize, Finding)| {
-        json!({
-            "log": surveys[*log].path.display().to_string(),
-            "kind": finding.kind.name(),
-            "column": finding.column,
-            "measured": finding.measured,
-            "consequence": finding.kind.consequence(),
-            "mend": finding.kind.mend(),
-        })
-    };
-    let log = |survey: &Survey| {
-        json!({
-            "log": survey.path.display().to_string(),
-            "rows": survey.rows,
-            "used_rows": survey.used_rows,
-            "seconds": survey.duration(),
-            "rate_hz": survey.rate_hz(),
-            "jitter": survey.jitter,
-            "clock": survey.clock.to_string(),
-            "warnings": of_log(survey),
-        })
-    };
-    json!({
-        "schema": 1,
-        "robot": tree.name(),
-        "logs": surveys.iter().map(log).collect::<Vec<_>>(),
-        "findings": findings.iter().map(finding).collect::<Vec<_>>(),
-        "notes": notes,
-        "refused": refused,
-    })
 }

@@ -95,7 +95,50 @@ fn what_no_identification_would_take_is_said_and_what_cannot_be_read_is_refused(
     ] {
         let (status, _, stderr) = run(arguments, all_zero.path());
         assert_eq!(status, 2, "{arguments:?}: {stderr}");
-        assert!(!all_zero.path().join("out/check.json").exists(), "{arguments:?}");
+        assert!(!all_zero.path().join("out").exists(), "{arguments:?}");
+    }
+}
+
+/// The page and the numbers say the same of a joint whose torque has lost its sign: of a CSV, and of the same
+/// log under a map, whose positions are in degrees.
+#[test]
+fn the_page_and_the_numbers_name_a_joints_finding() {
+    let unsigned = |log: &mut Recording| {
+        log.tau.iter_mut().step_by(3).for_each(|torque| *torque = torque.abs());
+    };
+    let degrees = |log: &mut Recording| {
+        unsigned(log);
+        log.q.iter_mut().for_each(|q| *q = q.to_degrees());
+    };
+    let map = "[every_joint]\nq = { column = \"q.{joint}\", unit = \"deg\" }\n";
+    for (folder, more) in [(folder(unsigned), &[][..]), (folder(degrees), &["--map", "map.toml"])] {
+        std::fs::write(folder.path().join("map.toml"), map).unwrap();
+        let words = ["check", "--urdf", "robot.urdf", "log.csv", "--out", "out"];
+        let (status, stdout, stderr) = run(&[&words[..], more].concat(), folder.path());
+        assert_eq!(status, 0, "{stderr}");
+        assert!(stdout.contains("check.json, check.html in out"), "{stdout}");
+        let text = std::fs::read_to_string(folder.path().join("out/check.json")).unwrap();
+        let report: Value = serde_json::from_str(&text).unwrap();
+        let [finding] = report["findings"].as_array().unwrap().as_slice() else { panic!("{report}") };
+        assert_eq!(finding["column"], "tau.joint_1", "{report}");
+        let [log] = report["logs"].as_array().unwrap().as_slice() else { panic!("{report}") };
+        assert_eq!((&log["segments"], log["joints"].as_array().unwrap().len()), (&Value::from(1), 3));
+        let range = log["joints"][1]["q"]["max"].as_f64().unwrap();
+        assert!((0.1..7.0).contains(&range), "radians in {log}");
+
+        let page = std::fs::read_to_string(folder.path().join("out/check.html")).unwrap();
+        for part in ["measured", "consequence", "mend"] {
+            let said = finding[part].as_str().unwrap();
+            assert!(page.contains(said), "the page does not say `{said}`");
+        }
+        let sections: Vec<&str> = page.split("<section").skip(1).collect();
+        let of_joint = |joint: &str| {
+            let title = format!("<h2>{joint}</h2>");
+            *sections.iter().find(|section| section.contains(&title)).unwrap()
+        };
+        assert!(of_joint("joint_1").contains("tau.joint_1"));
+        assert!(!of_joint("joint_2").contains("What follows"));
+        assert_eq!(of_joint("joint_2").matches("<svg").count(), 3, "position, velocity, torque");
     }
 }
 

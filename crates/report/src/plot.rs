@@ -30,7 +30,7 @@ pub use motion_map::{MapRow, MotionMap, motion_map};
 pub use residual_against_signal::{ResidualAgainstSignal, residual_against_signal};
 pub use spectrum::{SpectrumLine, SpectrumPlot, spectrum};
 pub use support_map::{SupportMap, support_map};
-pub use time_series::{ResidualPanel, TorquePanel, residual_panel, torque_panel};
+pub use time_series::{ResidualPanel, SignalPanel, TorquePanel, residual_panel, signal_panel, torque_panel};
 
 pub(crate) use palette::css as palette_css;
 

@@ -43,6 +43,7 @@ fn pictures(x: &[f64], y: &[f64]) -> Vec<(&'static str, Svg)> {
             "residual",
             residual_panel(&ResidualPanel { residual: line, torque: line, noise_floor: floor, unit: name }),
         ),
+        ("signal", signal_panel(&SignalPanel { line, label: name })),
         ("bars", joint_bars(&JointBars { groups: &groups, label: name })),
         ("spectrum", spectrum(&SpectrumPlot { lines: &spectra, y_label: name, cut_off: floor })),
         ("error growth", error_growth(&ErrorGrowth { lines: &[GrowthLine { name, line }], y_label: name })),

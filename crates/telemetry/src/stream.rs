@@ -5,7 +5,7 @@ use crate::clock::Resampler;
 use crate::log_rows::open_log;
 use crate::reader::Rows;
 use crate::segments::Segment;
-use crate::segments::{SegmentSink, split};
+use crate::segments::{RowCounts, SegmentSink, split};
 use crate::spike::WithoutSpikes;
 use crate::still::WithoutStill;
 use crate::{Block, Conditioning, LogError, LogPlan, Survey};
@@ -67,14 +67,7 @@ pub(crate) fn stream_rows(
         progress,
         longest: 0,
     };
-    let (bounds, still) = (survey.spike_bounds.clone(), survey.still.clone());
-    let counts = if bounds.is_empty() && still.is_empty() {
-        split(rows, survey.longest_step, &mut streamer)?
-    } else {
-        let bounds = if bounds.is_empty() { vec![f64::INFINITY; rows.layout().width] } else { bounds };
-        let mut without = WithoutStill::new(WithoutSpikes::new(rows, bounds), still);
-        split(&mut without, survey.longest_step, &mut streamer)?
-    };
+    let counts = usable_rows(rows, survey, &mut streamer)?;
     if !streamer.outlet.summary.stopped && (counts.rows, counts.used) != (survey.rows, survey.used_rows) {
         return Err(LogError::Changed { path: survey.path.clone() });
     }
@@ -88,6 +81,21 @@ pub(crate) fn stream_rows(
         });
     }
     Ok(summary)
+}
+
+/// Hands the rows that the survey has found usable to `sink`.
+pub(crate) fn usable_rows(
+    rows: &mut dyn Rows,
+    survey: &Survey,
+    sink: &mut dyn SegmentSink,
+) -> Result<RowCounts, LogError> {
+    let (bounds, still) = (survey.spike_bounds.clone(), survey.still.clone());
+    if bounds.is_empty() && still.is_empty() {
+        return split(rows, survey.longest_step, sink);
+    }
+    let bounds = if bounds.is_empty() { vec![f64::INFINITY; rows.layout().width] } else { bounds };
+    let mut without = WithoutStill::new(WithoutSpikes::new(rows, bounds), still);
+    split(&mut without, survey.longest_step, sink)
 }
 
 struct Streamer<'a> {

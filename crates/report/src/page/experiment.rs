@@ -1,4 +1,4 @@
-//! The page of an experiment: headline, then sections of sentences, tables and pictures.
+//! The page of an experiment or a check: headline, then sections of sentences, tables and pictures.
 
 use super::parts::Picture;
 use super::{list, shell};

@@ -1,4 +1,4 @@
-//! Torque over time: measured against predicted, and what is left between them.
+//! Signals over time: a single one, torque measured against predicted, and what is left between them.
 
 use super::axis::Axis;
 use super::canvas::{Svg, WIDTH, picture};
@@ -8,6 +8,30 @@ use super::panel::{Legend, Mark, line, panel, stroke};
 use super::{Line, drawable};
 use plotters::element::Rectangle;
 use plotters::style::Color;
+
+/// Width of a picture of one signal in CSS pixels: three stand side by side on a page.
+const SIGNAL_WIDTH: i32 = 400;
+
+/// What [`signal_panel`] shows.
+#[derive(Debug, Clone, Copy)]
+pub struct SignalPanel<'a> {
+    /// The signal over time (s); NaN at a gap.
+    pub line: Line<'a>,
+    /// The quantity, with its unit: `q [rad]`.
+    pub label: &'a str,
+}
+
+/// One signal over time, small, thinned to what the eye can tell apart.
+pub fn signal_panel(input: &SignalPanel<'_>) -> Svg {
+    let SignalPanel { line: samples, label } = *input;
+    let x = Axis::linear("t [s]", samples.points().map(|point| point.0), false, 4);
+    let y = Axis::linear(label, samples.points().map(|point| point.1), true, 3);
+    picture(SIGNAL_WIDTH, 170, &format!("{label} over time"), |sheet| {
+        let plot = panel(sheet, &x, &y, &[])?;
+        let thinned = decimate(samples.x, samples.y, LINE_POINTS);
+        line(&plot, Line::from(&thinned).points(), stroke(MEASURED, 11))
+    })
+}
 
 /// What [`torque_panel`] shows.
 #[derive(Debug, Clone, Copy)]
