@@ -18,7 +18,7 @@ impl KnownPayload {
     /// The map names a link that no joint carries, or says that nothing is known of the body.
     pub fn of(tree: &Tree, source: &LogSource) -> Result<Option<Self>, LogError> {
         let Some(map) = &source.map else { return Ok(None) };
-        let (link, mass_kg, com_m) = match map.facts(&source.path).payload {
+        let (link, mass_kg, com_m) = match source.facts().payload {
             None => return Ok(None),
             Some(Payload::Known { link, mass_kg, com_m }) => (link, mass_kg, com_m),
             Some(Payload::UnknownButTheSame) => {

@@ -122,19 +122,28 @@ impl LogSet {
         Ok(LogSet { train: train.len(), conditioning, surveys, payloads, interruption })
     }
 
-    /// Logs without maps that were surveyed and conditioned before, the first `train` of them to fit.
-    pub fn of_surveys(mut surveys: Vec<Survey>, train: usize, conditioning: Conditioning) -> Self {
-        surveys.iter_mut().for_each(|survey| survey.source = LogSource::from(&survey.path));
-        let payloads = vec![None; surveys.len()];
+    /// Logs that were surveyed and conditioned before, the first `train` of them to fit; they are read as
+    /// the surveys' sources say.
+    ///
+    /// # Errors
+    /// A map names a payload that the robot cannot hold.
+    pub fn of_surveys(
+        tree: &Tree,
+        surveys: Vec<Survey>,
+        train: usize,
+        conditioning: Conditioning,
+    ) -> Result<Self, IdentificationError> {
+        let payloads = surveys.iter().map(|survey| KnownPayload::of(tree, &survey.source));
+        let payloads = payloads.collect::<Result<Vec<_>, LogError>>()?;
         let interruption = Interruption::default();
-        LogSet { train: train.min(surveys.len()), surveys, conditioning, payloads, interruption }
+        Ok(LogSet { train: train.min(surveys.len()), surveys, conditioning, payloads, interruption })
     }
 
     /// Reads a log from another place from now on; its content must be the same.
     pub fn set_path(&mut self, log: usize, path: &Path) {
         if let Some(survey) = self.surveys.get_mut(log) {
             survey.path = path.to_owned();
-            survey.source.path = path.to_owned();
+            survey.source = survey.source.clone().moved_to(path);
         }
     }
 

@@ -16,9 +16,17 @@ use std::sync::Arc;
 pub fn read_map(path: Option<&Path>, joints: &[String]) -> Result<Option<Arc<LogMap>>, Error> {
     let Some(path) = path else { return Ok(None) };
     let text = read_text(path, Limits::default().toml_bytes)?;
-    let map = LogMap::parse(path, &text).map_err(LogError::from)?;
+    map_of(path, &text, joints).map(Some)
+}
+
+/// The same of a map's text, which `path` had.
+///
+/// # Errors
+/// It is no map, or names a joint that the robot has not.
+pub fn map_of(path: &Path, text: &str, joints: &[String]) -> Result<Arc<LogMap>, Error> {
+    let map = LogMap::parse(path, text).map_err(LogError::from)?;
     map.check_joints(joints).map_err(LogError::from)?;
-    Ok(Some(Arc::new(map)))
+    Ok(Arc::new(map))
 }
 
 /// Logs of which all is read that the map does not leave out.

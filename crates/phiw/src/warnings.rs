@@ -120,9 +120,7 @@ pub fn of_log(survey: &Survey) -> Vec<String> {
         }
     };
     let mut warnings: Vec<String> = survey.notes.iter().map(|note| format!("{name}: {note}")).collect();
-    if let Some(map) = &survey.source.map
-        && let Some(Payload::Known { link, mass_kg, .. }) = map.facts(&survey.path).payload
-    {
+    if let Some(Payload::Known { link, mass_kg, .. }) = survey.source.facts().payload {
         warnings.push(format!(
             "{name}: the torques of a payload of {mass_kg} kg at `{link}`, a point mass, are taken off those that were measured"
         ));

@@ -11,6 +11,8 @@ use tempfile::TempDir;
 /// A robot and its logs: three to fit and one to validate on.
 struct Fleet {
     folder: TempDir,
+    /// The logs to fit; the third also lies elsewhere.
+    train: [&'static str; 3],
 }
 
 const TRAIN: [&str; 3] = ["a.csv", "b.csv", "c.csv"];
@@ -34,7 +36,19 @@ impl Fleet {
             change(&mut recording);
             recording.write_csv(&folder.path().join(name)).unwrap();
         }
-        Fleet { folder }
+        Fleet { folder, train: TRAIN }
+    }
+
+    /// A robot of two joints, whose third log is a short one in one of the formats' own files or folders.
+    fn with_log_of_format(name: &'static str) -> Self {
+        let fleet = Self::with_logs(1.0, |_| ());
+        std::fs::write(fleet.path("robot.urdf"), TWO_JOINTS).unwrap();
+        for (seed, log) in [(1, "a.csv"), (2, "b.csv"), (3, VALIDATE)] {
+            synthetic::recording_of(TWO_JOINTS, seed, 12.0).write_csv(&fleet.path(log)).unwrap();
+        }
+        let files = Path::new(env!("CARGO_MANIFEST_DIR")).join("../log-formats/tests/files");
+        copy(&files.join(name), &fleet.path(name));
+        Fleet { train: ["a.csv", "b.csv", name], ..fleet }
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -61,7 +75,8 @@ impl Fleet {
     }
 
     fn plan(&self, more: &[&str]) {
-        self.done(&[&["plan", "--urdf", "robot.urdf"], &TRAIN[..], &["--out", "plan.json"], more].concat());
+        let words = [&["plan", "--urdf", "robot.urdf"], &self.train[..], &["--out", "plan.json"], more];
+        self.done(&words.concat());
     }
 
     fn reduce(&self, logs: &[&str], out: &str) {
@@ -71,14 +86,16 @@ impl Fleet {
     /// Identifies in one process and from factors that two have made, the second half elsewhere and under
     /// other names.
     fn both(&self, more: &[&str]) {
-        let one = [&["identify", "--urdf", "robot.urdf", "--train"], &TRAIN[..], &["--out", "one"], more];
+        let [first, second, third] = self.train;
+        let one =
+            [&["identify", "--urdf", "robot.urdf", "--train"], &self.train[..], &["--out", "one"], more];
         self.done(&one.concat());
         self.plan(more);
         std::fs::create_dir(self.path("elsewhere")).unwrap();
-        std::fs::copy(self.path("c.csv"), self.path("elsewhere/x.csv")).unwrap();
-        let logs: &[&str] = if more.contains(&VALIDATE) { &[VALIDATE, "b.csv"] } else { &["b.csv"] };
+        copy(&self.path(third), &self.path("elsewhere/x"));
+        let logs: &[&str] = if more.contains(&VALIDATE) { &[VALIDATE, second] } else { &[second] };
         self.reduce(logs, "1.factor");
-        self.reduce(&["elsewhere/x.csv", "a.csv"], "2.factor");
+        self.reduce(&["elsewhere/x", first], "2.factor");
         let merged =
             ["identify", "--plan", "plan.json", "--factors", "2.factor", "1.factor", "--out", "merged"];
         self.done(&merged);
@@ -88,6 +105,29 @@ impl Fleet {
         }
         let page = read(&self.path("merged/report.html"));
         assert!(page.contains("Torques over time are not shown"));
+    }
+}
+
+/// Two joints, named as in the formats' own files.
+const TWO_JOINTS: &str = r#"<robot name="two_joints">
+  <link name="base"/>
+  <link name="upper"><inertial><origin xyz="0.2 0 0.01"/><mass value="3"/><inertia ixx="0.02" iyy="0.07" izz="0.08" ixy="0" ixz="0.004" iyz="0"/></inertial></link>
+  <link name="lower"><inertial><origin xyz="0.15 -0.02 0"/><mass value="1.5"/><inertia ixx="0.005" iyy="0.02" izz="0.021" ixy="0.001" ixz="0" iyz="0"/></inertial></link>
+  <joint name="a" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/></joint>
+  <joint name="b" type="continuous"><parent link="upper"/><child link="lower"/><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/></joint>
+</robot>
+"#;
+
+/// Copies a file, or a folder with all that is in it.
+fn copy(from: &Path, to: &Path) {
+    if !from.is_dir() {
+        std::fs::copy(from, to).unwrap();
+        return;
+    }
+    std::fs::create_dir(to).unwrap();
+    for entry in from.read_dir().unwrap() {
+        let entry = entry.unwrap();
+        copy(&entry.path(), &to.join(entry.file_name()));
     }
 }
 
@@ -114,6 +154,41 @@ fn logs_whose_ends_are_held_out_are_reduced_apart_too() {
 #[test]
 fn a_ripple_is_reduced_with_the_periods_of_the_plan() {
     Fleet::new().both(&["--validate", VALIDATE, "--declare", "torque_ripple:joint_2,stribeck_friction"]);
+}
+
+/// The plan carries the map: `reduce` needs no file of it, and a log that the map gives stretches and a payload
+/// keeps them under another name.
+#[test]
+fn logs_with_a_map_are_reduced_apart_too() {
+    let fleet = Fleet::with_logs(12.0, |log| log.q.iter_mut().for_each(|q| *q = q.to_degrees()));
+    let map = r#"[every_joint]
+q = { column = "q.{joint}", unit = "deg" }
+
+[[log]]
+file = "c.csv"
+validate = [[10.0, 14.0]]
+leave_out = [[3.0, 3.5]]
+payload = { link = "link_3", mass_kg = 0.5, com_m = [0.1, 0.0, 0.0] }
+"#;
+    std::fs::write(fleet.path("map.toml"), map).unwrap();
+    fleet.both(&["--map", "map.toml", "--validate", VALIDATE, "--declare", "viscous_friction"]);
+    let model: Value = serde_json::from_str(&read(&fleet.path("merged/model.json"))).unwrap();
+    assert!(model.to_string().matches("\"c.csv\"").count() > 1, "one log to fit and to validate on");
+
+    std::fs::remove_file(fleet.path("map.toml")).unwrap();
+    fleet.reduce(&["c.csv"], "c.factor");
+    fleet.refused(
+        &["reduce", "--plan", "plan.json", "c.csv", "elsewhere/x", "--out", "x.factor"],
+        &["elsewhere/x: this log is named twice"],
+    );
+}
+
+#[test]
+fn logs_that_are_folders_are_reduced_apart_too() {
+    for name in ["ros2_sqlite", "lerobot_v3"] {
+        let fleet = Fleet::with_log_of_format(name);
+        fleet.both(&["--declare", "viscous_friction", "--cutoff-hz", "30", "--parallel-cutoff-hz", "20"]);
+    }
 }
 
 #[test]

@@ -33,7 +33,7 @@ pub(crate) fn open_log(
     joints: &[String],
     torque: TorqueColumns,
 ) -> Result<LogRows, LogError> {
-    let LogSource { path, map, part, columns: in_memory } = source;
+    let LogSource { path, map, part, columns: in_memory, .. } = source;
     let map = map.as_deref();
     let options = OpenOptions { topic: map.and_then(|map| map.topic()).map(str::to_owned) };
     let mut table = match in_memory {
@@ -58,7 +58,7 @@ pub(crate) fn open_log(
         .iter()
         .enumerate()
         .all(|(place, expression)| *expression == Expression::Column(place));
-    let facts = map.map(|map| map.facts(path)).filter(|facts| !facts.holds_all(*part));
+    let facts = map.map(|_| source.facts()).filter(|facts| !facts.holds_all(*part));
     Ok(LogRows {
         path: path.clone(),
         last: vec![f64::NAN; columns.layout.width],

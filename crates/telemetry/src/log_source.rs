@@ -1,7 +1,7 @@
 //! Where a log is, and how it is read.
 
 use crate::NamedColumns;
-use crate::map::{LogMap, LogPart};
+use crate::map::{LogFacts, LogMap, LogPart};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -16,6 +16,8 @@ pub struct LogSource {
     pub part: LogPart,
     /// What is read instead of the file, of a log in memory.
     pub columns: Option<Arc<NamedColumns>>,
+    /// What the map calls it, where that is not the name it has now.
+    pub name_in_map: Option<PathBuf>,
 }
 
 impl LogSource {
@@ -26,7 +28,19 @@ impl LogSource {
 
     /// A log whose columns a map explains.
     pub fn mapped(path: impl Into<PathBuf>, map: Option<Arc<LogMap>>) -> Self {
-        LogSource { path: path.into(), map, part: LogPart::All, columns: None }
+        LogSource { path: path.into(), map, part: LogPart::All, columns: None, name_in_map: None }
+    }
+
+    /// The same log at another place, of which the map says what it says of this one.
+    pub fn moved_to(self, path: &Path) -> Self {
+        let name_in_map = Some(self.name_in_map.unwrap_or(self.path));
+        LogSource { path: path.to_owned(), name_in_map, ..self }
+    }
+
+    /// What the map says of it; nothing without a map.
+    pub fn facts(&self) -> LogFacts {
+        let name = self.name_in_map.as_ref().unwrap_or(&self.path);
+        self.map.as_ref().map(|map| map.facts(name)).unwrap_or_default()
     }
 }
 

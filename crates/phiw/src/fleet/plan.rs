@@ -23,12 +23,16 @@ pub struct PlanArguments {
     /// The robot's URDF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
-    /// Logs (CSV) that the model is fitted to.
+    /// Logs that the model is fitted to: CSV, MCAP, ROS bags, LeRobot folders, npz.
     #[arg(value_name = "LOG", required = true)]
     pub train: Vec<PathBuf>,
     /// Logs that its error is measured on; without any, the last 30 % of each training log are held out.
     #[arg(long, value_name = "LOG", num_args = 1..)]
     pub validate: Vec<PathBuf>,
+    /// What the columns of the logs mean: topics, units, gears, currents (docs/log-maps.md). Without it they
+    /// are named as in a log of phiw.
+    #[arg(long, value_name = "MAP.toml")]
+    pub map: Option<PathBuf>,
     /// Effects beside the rigid body, wherever they can act or on the joints named: viscous_friction,
     /// coulomb_friction:j1+j2, transmission_coupling:j5+j6, …
     #[arg(long, value_name = "KIND[:JOINT[+JOINT…]],…", value_delimiter = ',')]
@@ -61,12 +65,13 @@ pub struct PlanArguments {
 impl PlanArguments {
     /// The same as a session on the logs.
     fn session(&self) -> SessionArguments {
-        let PlanArguments { urdf, train, validate, declare, hold, mass, total_mass, .. } = self.clone();
+        let PlanArguments { urdf, train, validate, map, declare, hold, mass, total_mass, .. } = self.clone();
         let PlanArguments { cutoff_hz, parallel_cutoff_hz, .. } = *self;
         SessionArguments {
             urdf,
             train,
             validate,
+            map,
             declare,
             hold,
             mass,

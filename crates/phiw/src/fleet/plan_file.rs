@@ -3,6 +3,7 @@
 use crate::arguments::SessionArguments;
 use crate::bandwidth::with_textbook;
 use crate::input::read_text;
+use crate::log_inputs::{map_of, train_and_validate};
 use crate::session::{Session, robot_of};
 use crate::{Error, fingerprint};
 use phiw_identification::bandwidth::{BandwidthSettings, Contest};
@@ -11,7 +12,7 @@ use phiw_identification::model::DataFingerprint;
 use phiw_identification::shard::ShardColumns;
 use phiw_identification::{EffectCatalogue, EffectSpec, Fold, LogSet, Variants};
 use phiw_limits::Limits;
-use phiw_telemetry::{Conditioning, Survey};
+use phiw_telemetry::{Conditioning, LogSource, Survey};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::path::Path;
@@ -59,6 +60,9 @@ pub struct PlanFile {
     arguments: SessionArguments,
     /// Text of the URDF.
     urdf: String,
+    /// Text of the map, where the logs are read with one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    map: Option<String>,
     /// Declared effects, each kind united.
     declared: Vec<String>,
     /// The logs, those to fit first: the order in which their factors are merged.
@@ -104,6 +108,7 @@ impl PlanFile {
             sha256: String::new(),
             arguments: session.arguments.clone(),
             urdf: session.xml.clone(),
+            map: surveys.iter().find_map(|survey| Some(survey.source.map.as_ref()?.text().to_owned())),
             declared: session.declared.clone(),
             logs: fingerprint::of_session(session)?,
             surveys,
@@ -177,12 +182,22 @@ impl Plan {
 
     fn of_file(file: PlanFile, hash: [u8; 32], path: &Path) -> Result<Self, Error> {
         let wrong = |what| Err(PlanError::Inconsistent(what).in_file(path));
-        let PlanFile { arguments, urdf, declared, logs, surveys, conditioning, effects, compared, .. } = file;
+        let PlanFile { arguments, urdf, map, declared, logs, mut surveys, conditioning, .. } = file;
+        let (effects, compared) = (file.effects, file.compared);
         let robot = robot_of(urdf, &arguments)?;
-        let named = arguments.train.len() + arguments.validate.len();
-        if surveys.is_empty() || surveys.len() != logs.len() || surveys.len() != named {
+        let map = match (&arguments.map, map) {
+            (Some(path), Some(text)) => Some(map_of(path, &text, &robot.all_joints())?),
+            (None, None) => None,
+            _ => return wrong("maps"),
+        };
+        let [train, validate] =
+            train_and_validate(&arguments.train, &arguments.validate, map.as_ref(), &arguments.in_memory);
+        let to_fit = train.len();
+        let sources: Vec<LogSource> = train.into_iter().chain(validate).collect();
+        if surveys.is_empty() || surveys.len() != logs.len() || surveys.len() != sources.len() {
             return wrong("surveys");
         }
+        surveys.iter_mut().zip(sources).for_each(|(survey, source)| survey.source = source);
         let joints: Vec<&str> = robot.tree.joint_names().collect();
         let of_robot = |survey: &Survey| {
             survey.joints.iter().map(|joint| joint.name.as_str()).eq(joints.iter().copied())
@@ -194,7 +209,7 @@ impl Plan {
         {
             return wrong("surveys");
         }
-        let logs_of_session = LogSet::of_surveys(surveys, arguments.train.len(), conditioning);
+        let logs_of_session = LogSet::of_surveys(&robot.tree, surveys, to_fit, conditioning)?;
         for survey in logs_of_session.surveys() {
             logs_of_session.conditioning().plan(survey)?;
         }

@@ -46,11 +46,13 @@ pub fn reduce(arguments: &ReduceArguments, console: &Console) -> Result<FleetOut
     let _place = Lock::acquire(&arguments.out, "phiw reduce")?;
     let mut plan = Plan::read(&arguments.plan)?;
     let mut logs: Vec<usize> = Vec::with_capacity(arguments.logs.len());
+    let mut paths = Vec::with_capacity(arguments.logs.len());
     for path in &arguments.logs {
-        let log = log_of(&plan, path, &logs)?;
-        plan.session.logs.set_path(log, path);
-        logs.push(log);
+        let parts = parts_of(&plan, path, &logs)?;
+        paths.extend(parts.iter().map(|_| path));
+        logs.extend(parts);
     }
+    logs.iter().zip(paths).for_each(|(&log, path)| plan.session.logs.set_path(log, path));
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
     let reduced = logs.iter().map(|&log| factors(&plan, log, &progress));
     let logs = reduced.collect::<Result<Vec<LogFactors>, IdentificationError>>()?;
@@ -69,10 +71,12 @@ pub fn reduce(arguments: &ReduceArguments, console: &Console) -> Result<FleetOut
     })
 }
 
-/// Which log of the plan a file is: one of its content that is not `taken`, if there are several the one of
-/// its name.
-fn log_of(plan: &Plan, path: &Path, taken: &[usize]) -> Result<usize, Error> {
-    regular_file(path)?;
+/// Which logs of the plan a file or folder is: what was made of one that has its content and is not `taken`,
+/// if there are several the one of its name. A map can make two of one, to fit and to validate on.
+fn parts_of(plan: &Plan, path: &Path, taken: &[usize]) -> Result<Vec<usize>, Error> {
+    if !path.is_dir() {
+        regular_file(path)?;
+    }
     let sha256 = fingerprint::sha256(&LogSource::from(path))?;
     let same: Vec<usize> = (0..plan.logs.len()).filter(|&log| plan.logs[log].sha256 == sha256).collect();
     let free: Vec<usize> = same.iter().copied().filter(|log| !taken.contains(log)).collect();
@@ -81,7 +85,8 @@ fn log_of(plan: &Plan, path: &Path, taken: &[usize]) -> Result<usize, Error> {
     let of_path = free.iter().find(|&&log| surveys[log].path == path);
     let of_name = free.iter().find(|&&log| plan.logs[log].log == name);
     if let Some(&log) = of_path.or(of_name).or(free.first()) {
-        return Ok(log);
+        let of_same = |other: &usize| surveys[*other].path == surveys[log].path;
+        return Ok(free.into_iter().filter(of_same).collect());
     }
     let log = path.to_owned();
     if !same.is_empty() {
