@@ -203,6 +203,7 @@ pub struct RetargetOptions {
     torso_from_reach: bool,
     velocity_limits: bool,
     interval: f64,
+    format: String,
     out: PathBuf,
 }
 
@@ -216,7 +217,16 @@ pub fn retarget<'py>(
     options: RetargetOptions,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(String, Vec<String>, Vec<(PathBuf, String)>)> {
-    let RetargetOptions { urdf, files, map, torso_from_reach, velocity_limits, interval, out } = options;
+    let RetargetOptions { urdf, files, map, torso_from_reach, velocity_limits, interval, format, out } =
+        options;
+    let format = match format.as_str() {
+        "csv" => MotionFormat::Csv,
+        "npz" => MotionFormat::Npz,
+        other => {
+            let what = format!("format=\"{other}\" is not known; write \"csv\" or \"npz\"");
+            return Err(InputError::new_err(what));
+        }
+    };
     let arguments = RetargetArguments {
         urdf,
         c3d: files,
@@ -226,7 +236,7 @@ pub fn retarget<'py>(
         velocity_limits,
         interval,
         derivatives: Derivatives::Analytic,
-        format: MotionFormat::Csv,
+        format,
         out,
         quiet: true,
     };

@@ -298,7 +298,9 @@ def test_markers_become_motions(tmp_path):
     markers = tmp_path / "nothing.csv"
     markers.write_text("t,a.x,a.y,a.z\n0,0,0,0\n")
     with pytest.raises(phiw.InputError, match="nothing.csv"):
-        phiw.retarget(phiw.examples.robot("upper_body18"), markers, tmp_path / "out")
+        phiw.retarget(phiw.examples.robot("upper_body18"), markers, tmp_path / "out", format="npz")
+    with pytest.raises(phiw.InputError, match='format="bvh" is not known'):
+        phiw.retarget(phiw.examples.robot("upper_body18"), markers, tmp_path / "out", format="bvh")
 
 
 def test_a_map_says_what_columns_mean(robot, logs, tmp_path):

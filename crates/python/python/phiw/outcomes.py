@@ -117,11 +117,13 @@ class Retargeted:
     warnings: List[str]
     #: Recordings that could not be retargeted, each with the reason.
     failures: List[Tuple[str, str]]
+    #: What the motions are written as: ``"csv"`` or ``"npz"``.
+    format: str = "csv"
 
     @property
     def motions(self) -> List[pathlib.Path]:
-        """The logs in the folder."""
-        return sorted(self.out.glob("*.csv"))
+        """The motions in the folder."""
+        return sorted(self.out.glob(f"*.{self.format}"))
 
     def __str__(self) -> str:
         return self.summary

@@ -235,12 +235,14 @@ def retarget(
     torso_from_reach: bool = False,
     velocity_limits: bool = False,
     interval: float = 0.2,
+    format: str = "csv",
     progress: Optional[Progress] = None,
 ) -> Retargeted:
-    """Turns marker recordings of people (C3D, or CSV of points) into motions of the robot.
+    """Turns recordings of people into motions of the robot: markers (C3D, TRC, or CSV of points) or joint
+    angles (BVH, npz of AMASS and SMPL-X).
 
-    For each recording the folder ``out`` gets a log without torques, ``<name>.csv``, and ``<name>.json`` with
-    what it is worth. What is done in it with the same settings is not done again.
+    For each recording the folder ``out`` gets a log without torques, ``<name>.csv``, or ``<name>.npz``, and
+    ``<name>.json`` with what it is worth. What is done in it with the same settings is not done again.
 
     Parameters
     ----------
@@ -252,6 +254,11 @@ def retarget(
         Keep joint velocities inside the URDF's limits, too.
     interval : float
         Time between the control points of the splines (s).
+    format : "csv" or "npz"
+        What a motion is written as. The npz is as programs that learn to track motions read it: ``fps`` (Hz),
+        ``joint_pos`` and ``joint_vel`` (rad, m, rad/s, m/s), shape (N, dof), ``body_pos_w`` (m) and
+        ``body_lin_vel_w``, ``body_ang_vel_w`` (m/s, rad/s), shape (N, bodies, 3), ``body_quat_w``
+        (w, x, y, z), shape (N, bodies, 4), ``joint_names``, ``body_names``.
     """
     robot = _robot(robot)
     if isinstance(files, (str, os.PathLike)):
@@ -266,9 +273,10 @@ def retarget(
             "torso_from_reach": torso_from_reach,
             "velocity_limits": velocity_limits,
             "interval": interval,
+            "format": format,
             "out": os.fspath(out),
         }
-        return Retargeted(pathlib.Path(out), *_phiw.retarget(robot, options, progress))
+        return Retargeted(pathlib.Path(out), *_phiw.retarget(robot, options, progress), format)
 
 
 def _robot(robot: Union[Robot, PathLike]) -> Robot:
