@@ -1,22 +1,15 @@
 //! NumPy's files: arrays (npy), and zip archives of them (npz).
 //!
-//! The form is that of NumPy Enhancement Proposal 1: `\x93NUMPY`, version, length of the header, a header
-//! that is a Python dictionary, the numbers.
+//! The form of an array is that of NumPy Enhancement Proposal 1: `\x93NUMPY`, version, length of the header, a
+//! header that is a Python dictionary, the numbers. [`Array::from_npy`] reads it.
+
+pub use phiw_log_formats::NumberArray as Array;
 
 use std::io::{Cursor, Read, Write};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
-
-/// An array of numbers, row by row.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Array {
-    /// Its lengths; none of a single number.
-    pub shape: Vec<usize>,
-    /// Its numbers.
-    pub values: Vec<f64>,
-}
 
 /// An archive of arrays that is read.
 pub struct Npz<'a> {
@@ -59,85 +52,7 @@ impl<'a> Npz<'a> {
         if bytes.len() as u64 > self.most {
             return Err(wrong(format!("it has more than {} bytes; cut the recording", self.most)));
         }
-        parse_npy(&bytes).map(Some).map_err(wrong)
-    }
-}
-
-/// The numbers of a npy file: floats or integers of any width and order of bytes.
-fn parse_npy(bytes: &[u8]) -> Result<Array, String> {
-    let cut = || "it is cut short".to_owned();
-    let rest = bytes.strip_prefix(MAGIC).ok_or("it is no npy")?;
-    let (version, rest) = rest.split_first_chunk::<2>().ok_or_else(cut)?;
-    let (length, rest) = match version[0] {
-        1 => {
-            let (length, rest) = rest.split_first_chunk::<2>().ok_or_else(cut)?;
-            (usize::from(u16::from_le_bytes(*length)), rest)
-        }
-        2 | 3 => {
-            let (length, rest) = rest.split_first_chunk::<4>().ok_or_else(cut)?;
-            (u32::from_le_bytes(*length) as usize, rest)
-        }
-        other => return Err(format!("npy of version {other}; known are 1 to 3")),
-    };
-    let header = rest.get(..length).ok_or_else(cut)?;
-    let header = std::str::from_utf8(header).map_err(|_| "its header is no text")?;
-    let data = &rest[length..];
-    let kind = quoted(header, "descr").ok_or("its header has no `descr` of one kind of number")?;
-    if header
-        .split_once("'fortran_order'")
-        .is_some_and(|(_, rest)| rest.trim_start_matches([':', ' ']).starts_with("True"))
-    {
-        return Err("it is stored by columns; save numpy.ascontiguousarray of it".to_owned());
-    }
-    let shape = shape(header).ok_or("its header has no `shape`")?;
-    let count = shape.iter().try_fold(1_usize, |count, &length| count.checked_mul(length));
-    let values = numbers(kind, data)?;
-    match count {
-        Some(count) if count == values.len() => Ok(Array { shape, values }),
-        _ => Err(format!("it should have {shape:?} numbers, but has {}", values.len())),
-    }
-}
-
-/// The text of an entry of a Python dictionary.
-fn quoted<'a>(header: &'a str, key: &str) -> Option<&'a str> {
-    let (_, rest) = header.split_once(&format!("'{key}'"))?;
-    let rest = rest.trim_start_matches([':', ' ']).strip_prefix('\'')?;
-    rest.split_once('\'').map(|(text, _)| text)
-}
-
-fn shape(header: &str) -> Option<Vec<usize>> {
-    let (_, rest) = header.split_once("'shape'")?;
-    let (_, rest) = rest.split_once('(')?;
-    let (inside, _) = rest.split_once(')')?;
-    inside.split(',').map(str::trim).filter(|text| !text.is_empty()).map(|text| text.parse().ok()).collect()
-}
-
-fn numbers(kind: &str, data: &[u8]) -> Result<Vec<f64>, String> {
-    let (order, kind) = kind.split_at_checked(1).unwrap_or_default();
-    let big = order == ">";
-    macro_rules! read {
-        ($number:ty) => {{
-            let (chunks, rest) = data.as_chunks::<{ size_of::<$number>() }>();
-            if !rest.is_empty() {
-                return Err("it is cut short".to_owned());
-            }
-            let read = |chunk: &[u8; size_of::<$number>()]| match big {
-                true => <$number>::from_be_bytes(*chunk) as f64,
-                false => <$number>::from_le_bytes(*chunk) as f64,
-            };
-            Ok(chunks.iter().map(read).collect())
-        }};
-    }
-    match kind {
-        "f8" => read!(f64),
-        "f4" => read!(f32),
-        "i8" => read!(i64),
-        "i4" => read!(i32),
-        "i2" => read!(i16),
-        "u8" => read!(u64),
-        "u4" => read!(u32),
-        "u1" => read!(u8),
-        other => Err(format!("it holds `{order}{other}`, not numbers of 32 or 64 bits")),
+        Array::from_npy(&bytes).map(Some).map_err(wrong)
     }
 }
 
@@ -226,19 +141,6 @@ mod tests {
             prop_assert_eq!(npz.array("other").unwrap(), None);
             prop_assert!(npz.array("names").unwrap_err().contains("<U4"));
         }
-    }
-
-    #[test]
-    fn numbers_of_all_widths_are_read() {
-        let check = |kind: &str, data: &[u8], expected: &[f64]| {
-            let mut bytes = header(kind, &[expected.len()]);
-            bytes.extend(data);
-            assert_eq!(parse_npy(&bytes).unwrap().values, expected, "{kind}");
-        };
-        check("<f4", &1.5_f32.to_le_bytes(), &[1.5]);
-        check(">f8", &(-2.25_f64).to_be_bytes(), &[-2.25]);
-        check("<i8", &(-7_i64).to_le_bytes(), &[-7.0]);
-        check("|u1", &[3, 4], &[3.0, 4.0]);
     }
 
     #[test]

@@ -15,6 +15,7 @@ mod open;
 mod table;
 mod text_stream;
 
+pub use arrays::NumberArray;
 pub use error::FormatError;
 pub use guarded::is_guarded;
 pub use open::{OpenOptions, looks_like, open};

@@ -45,6 +45,14 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Table>, Format
         [0x28, 0xb5, 0x2f, 0xfd, ..] => Packing::Zstd,
         _ => Packing::None,
     };
+    #[cfg(not(feature = "zstd"))]
+    if packing == Packing::Zstd {
+        return Err(FormatError::LeftOut {
+            path: path.into(),
+            format: "text packed by zstd",
+            feature: "zstd",
+        });
+    }
     if packing != Packing::None {
         let inside = head(path, &mut file, packing).map_err(|source| packing.error(path, source))?;
         if let Some(kind) = looks_like(&inside) {

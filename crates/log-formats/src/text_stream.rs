@@ -84,6 +84,9 @@ impl TextStream {
         let bytes: Box<dyn Read> = match packing {
             Packing::None => Box::new(counted),
             Packing::Gzip => Box::new(flate2::bufread::MultiGzDecoder::new(BufReader::new(counted))),
+            #[cfg(not(feature = "zstd"))]
+            Packing::Zstd => return Err(io::ErrorKind::Unsupported.into()),
+            #[cfg(feature = "zstd")]
             Packing::Zstd => {
                 let mut decoder = zstd::stream::read::Decoder::new(counted)?;
                 decoder.window_log_max(LARGEST_WINDOW)?;
@@ -98,6 +101,7 @@ impl TextStream {
     }
 }
 
+#[cfg(feature = "zstd")]
 /// log₂ of the bytes that zstd may look back on; what `zstd` itself unpacks without being asked to.
 const LARGEST_WINDOW: u32 = 27;
 

@@ -10,6 +10,7 @@ mod zip_arrays;
 
 pub(crate) use array_table::ArrayTable;
 pub(crate) use mat5::MAT5;
+pub use npy::NumberArray;
 
 use crate::FormatError;
 use crate::open::OpenOptions;

@@ -3,10 +3,10 @@
 use super::array_table::Array;
 use super::element::{Element, ElementKind};
 use super::rows::Order;
-use super::section::{Section, SectionPacking, SectionReader};
+use super::section::{Section, SectionPacking};
 use crate::FormatError;
 use phiw_limits::Limits;
-use std::io;
+use std::io::{self, Read};
 use std::path::Path;
 
 /// Bytes of a header at most; NumPy itself refuses more.
@@ -26,16 +26,10 @@ pub(crate) fn read_file(path: &Path) -> Result<Vec<Array>, FormatError> {
 /// # Errors
 /// It is no such section.
 pub(crate) fn arrays(name: String, section: Section) -> io::Result<Vec<Array>> {
-    let mut reader = section.whole()?;
-    let (text, skip) = header(&mut reader)?;
-    let wrong = || io::Error::new(io::ErrorKind::InvalidData, "its header is not one of NumPy");
-    let shape = field(&text, "shape").and_then(shape).ok_or_else(wrong)?;
-    let is_fortran = field(&text, "fortran_order").ok_or_else(wrong)?.starts_with("True");
-    let description = field(&text, "descr").ok_or_else(wrong)?;
+    let (text, skip) = header(&mut section.whole()?)?;
+    let Header { shape, order, description } = Header::of_text(&text).ok_or_else(wrong_header)?;
     let section = Section { skip, ..section };
-    let order = if is_fortran { Order::FirstFastest } else { Order::LastFastest };
-    if let Some(quoted) = description.strip_prefix(['\'', '"']) {
-        let code = quoted.split(['\'', '"']).next().unwrap_or_default();
+    if let Some((code, _)) = quoted(description) {
         // Texts and objects are no numbers: such an array is not there.
         let element = element(code);
         return Ok(element
@@ -43,10 +37,10 @@ pub(crate) fn arrays(name: String, section: Section) -> io::Result<Vec<Array>> {
             .into_iter()
             .collect());
     }
-    let fields = fields(description).ok_or_else(wrong)?;
+    let fields = fields(description).ok_or_else(wrong_header)?;
     let record = fields.iter().fold(0, |all: usize, (_, _, bytes)| all.saturating_add(*bytes));
     if record > Limits::default().log_line_bytes || shape.len() > 1 {
-        return Err(wrong());
+        return Err(wrong_header());
     }
     let mut within = 0;
     let mut found = Vec::new();
@@ -69,23 +63,81 @@ pub(crate) fn arrays(name: String, section: Section) -> io::Result<Vec<Array>> {
     Ok(found)
 }
 
+/// An array of numbers in memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NumberArray {
+    /// Its lengths; none of a single number.
+    pub shape: Vec<usize>,
+    /// Its numbers, row by row.
+    pub values: Vec<f64>,
+}
+
+impl NumberArray {
+    /// The array of a `.npy` file: floats or integers of any width and order of bytes.
+    ///
+    /// # Errors
+    /// In words: it is cut short, or does not hold numbers row by row.
+    pub fn from_npy(bytes: &[u8]) -> Result<Self, String> {
+        let in_words = |error: io::Error| match error.kind() {
+            io::ErrorKind::UnexpectedEof => "it is cut short".to_owned(),
+            _ => error.to_string(),
+        };
+        let mut rest = bytes;
+        let (text, _) = header(&mut rest).map_err(in_words)?;
+        let header = Header::of_text(&text).ok_or_else(|| in_words(wrong_header()))?;
+        let Header { shape, order, description } = header;
+        let (code, _) = quoted(description).ok_or("it is of records, not of numbers")?;
+        let element = element(code).ok_or_else(|| format!("it holds `{code}`, not numbers"))?;
+        if order == Order::FirstFastest {
+            return Err("it is stored by columns; save numpy.ascontiguousarray of it".to_owned());
+        }
+        let count = shape.iter().try_fold(element.bytes, |count, &length| count.checked_mul(length));
+        if count != Some(rest.len()) {
+            let numbers = rest.len() / element.bytes;
+            return Err(format!("it should have {shape:?} numbers, but has {numbers}"));
+        }
+        let values = rest.chunks_exact(element.bytes).map(|bytes| element.value(bytes)).collect();
+        Ok(NumberArray { shape, values })
+    }
+}
+
+/// What a header says.
+struct Header<'a> {
+    shape: Vec<usize>,
+    order: Order,
+    /// The type of its numbers, or of its records.
+    description: &'a str,
+}
+
+impl<'a> Header<'a> {
+    fn of_text(text: &'a str) -> Option<Self> {
+        let is_fortran = field(text, "fortran_order")?.starts_with("True");
+        let order = if is_fortran { Order::FirstFastest } else { Order::LastFastest };
+        Some(Header { shape: shape(field(text, "shape")?)?, order, description: field(text, "descr")? })
+    }
+}
+
+fn wrong_header() -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, "its header is not one of NumPy")
+}
+
 /// The header's text, and where the numbers begin.
-fn header(reader: &mut SectionReader) -> io::Result<(String, u64)> {
+fn header(reader: &mut dyn Read) -> io::Result<(String, u64)> {
     let wrong = |what: &str| io::Error::new(io::ErrorKind::InvalidData, what.to_owned());
     let mut start = [0; 8];
-    reader.fill(&mut start)?;
+    reader.read_exact(&mut start)?;
     if !start.starts_with(super::NPY) {
         return Err(wrong("it is no array of NumPy"));
     }
     let (length, before) = match start[6] {
         1 => {
             let mut length = [0; 2];
-            reader.fill(&mut length)?;
+            reader.read_exact(&mut length)?;
             (usize::from(u16::from_le_bytes(length)), 10)
         }
         2 | 3 => {
             let mut length = [0; 4];
-            reader.fill(&mut length)?;
+            reader.read_exact(&mut length)?;
             (u32::from_le_bytes(length) as usize, 12)
         }
         _ => return Err(wrong("it is an array of a NumPy newer than is known")),
@@ -94,7 +146,7 @@ fn header(reader: &mut SectionReader) -> io::Result<(String, u64)> {
         return Err(wrong("its header is too long"));
     }
     let mut text = vec![0; length];
-    reader.fill(&mut text)?;
+    reader.read_exact(&mut text)?;
     let text = String::from_utf8(text).map_err(|_| wrong("its header is no text"))?;
     Ok((text, (before + length) as u64))
 }
@@ -172,5 +224,36 @@ fn bytes_of_other(code: &str) -> Option<usize> {
         'U' => count.checked_mul(4),
         'S' | 'V' | 'M' | 'm' | 'c' | 'a' => Some(count),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file of `shape` `code`s.
+    fn npy(code: &str, order: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+        let text = format!("{{'descr': '{code}', 'fortran_order': {order}, 'shape': {shape}, }}\n");
+        let length = (text.len() as u16).to_le_bytes();
+        [super::super::NPY, &[1, 0], &length, text.as_bytes(), data].concat()
+    }
+
+    #[test]
+    fn arrays_in_memory_are_read_or_refused_in_words() {
+        let data = [1.5f32.to_le_bytes(), (-2.0f32).to_le_bytes()].concat();
+        let read = NumberArray::from_npy(&npy("<f4", "False", "(1, 2)", &data)).unwrap();
+        assert_eq!(read, NumberArray { shape: vec![1, 2], values: vec![1.5, -2.0] });
+        let read = NumberArray::from_npy(&npy(">f8", "False", "()", &0.25f64.to_be_bytes())).unwrap();
+        assert_eq!(read, NumberArray { shape: vec![], values: vec![0.25] });
+        let refused = |bytes: &[u8], said: &str| {
+            let what = NumberArray::from_npy(bytes).unwrap_err();
+            assert!(what.contains(said), "{what}");
+        };
+        refused(&npy("<f4", "True", "(1, 2)", &data), "numpy.ascontiguousarray");
+        refused(&npy("<f4", "False", "(3,)", &data), "should have [3] numbers, but has 2");
+        refused(&npy("<f4", "False", "(2,)", &data[..7]), "but has 1");
+        refused(&npy("<U1", "False", "(2,)", &data), "`<U1`, not numbers");
+        refused(&npy("<f4", "False", "(2,)", &data)[..20], "cut short");
+        refused(b"PK\x03\x04 and more", "no array of NumPy");
     }
 }

@@ -57,11 +57,7 @@ pub(crate) struct SectionReader {
 impl SectionReader {
     /// Reads as many bytes as there is room for.
     pub fn fill(&mut self, buffer: &mut [u8]) -> io::Result<()> {
-        self.bytes.read_exact(buffer)?;
-        if let Some((crc, _)) = &mut self.crc {
-            crc.update(buffer);
-        }
-        Ok(())
+        self.read_exact(buffer)
     }
 
     /// Passes over bytes.
@@ -78,20 +74,22 @@ impl SectionReader {
     /// Reads to the end and compares the check sum.
     pub fn finish(&mut self) -> io::Result<()> {
         let mut buffer = [0; 1 << 13];
-        loop {
-            let count = self.bytes.read(&mut buffer)?;
-            if count == 0 {
-                break;
-            }
-            if let Some((crc, _)) = &mut self.crc {
-                crc.update(&buffer[..count]);
-            }
-        }
+        while self.read(&mut buffer)? > 0 {}
         match &self.crc {
             Some((crc, expected)) if crc.sum() != *expected => {
                 Err(io::Error::new(io::ErrorKind::InvalidData, "its check sum is wrong"))
             }
             _ => Ok(()),
         }
+    }
+}
+
+impl Read for SectionReader {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.bytes.read(buffer)?;
+        if let Some((crc, _)) = &mut self.crc {
+            crc.update(&buffer[..count]);
+        }
+        Ok(count)
     }
 }
