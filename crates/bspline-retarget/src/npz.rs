@@ -1,7 +1,7 @@
 //! NumPy's files: arrays (npy), and zip archives of them (npz).
 //!
-//! The form of an array is that of NumPy Enhancement Proposal 1: `\x93NUMPY`, version, length of the header, a
-//! header that is a Python dictionary, the numbers. [`Array::from_npy`] reads it.
+//! The form of an array is that of NumPy Enhancement Proposal 1: `\x93NUMPY`, version, length of the header,
+//! a header that is a Python dictionary, the numbers. [`Array::from_npy`] reads it.
 
 pub use phiw_log_formats::NumberArray as Array;
 

@@ -156,8 +156,8 @@ fn a_ripple_is_reduced_with_the_periods_of_the_plan() {
     Fleet::new().both(&["--validate", VALIDATE, "--declare", "torque_ripple:joint_2,stribeck_friction"]);
 }
 
-/// The plan carries the map: `reduce` needs no file of it, and a log that the map gives stretches and a payload
-/// keeps them under another name.
+/// The plan carries the map: `reduce` needs no file of it, and a log that the map gives stretches and a
+/// payload keeps them under another name.
 #[test]
 fn logs_with_a_map_are_reduced_apart_too() {
     let fleet = Fleet::with_logs(12.0, |log| log.q.iter_mut().for_each(|q| *q = q.to_degrees()));
