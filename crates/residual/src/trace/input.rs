@@ -21,8 +21,8 @@ pub struct TraceOptions {
     /// Share of a torque's residual variance on motion held out that an effect on it must take away to have a
     /// name.
     pub least_share: f64,
-    /// Share that a form of something simpler must take away of what the whole model takes away of the
-    /// residual that the simpler ones leave.
+    /// The same for an effect whose torque follows the same signal of the same joint as a simpler one of the
+    /// model.
     pub least_share_of_kin: f64,
     /// Share of what the other effects took from the same torque that it must take: the form of an effect is
     /// never quite the catalogue's, and what mends it is no effect of its own.

@@ -243,7 +243,7 @@ impl Search<'_> {
             let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
             let squares = Squares { initial, without, with };
             let material = match level {
-                Some(_) => self.is_form_material(trial, own_member, &squares, &all),
+                Some(_) => self.is_form_material(trial, own_member, &squares),
                 None => self.is_material(trial, own_member, &squares),
             };
             let certainty = certainty(&trial.problem, &trial.fit, own_member);
@@ -262,9 +262,8 @@ impl Search<'_> {
     }
 
     /// Whether a form of something simpler is worth a name of its own: it must take away most of what the
-    /// whole model takes of what the simpler ones leave (`left` is what the whole model leaves), be a share
-    /// of the torque, and a share of what it is a form of.
-    fn is_form_material(&self, trial: &Trial, member: Member, squares: &Squares, left: &[f64]) -> bool {
+    /// simpler ones leave, be a share of the torque, and a share of what it is a form of.
+    fn is_form_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
         let hypothesis = &trial.problem.hypotheses[member.hypothesis];
         hypothesis.torques.iter().any(|&torque| {
             let whole = trial.held_out[torque].right_hand_side().max(f64::MIN_POSITIVE);
@@ -276,8 +275,7 @@ impl Search<'_> {
                 simpler.flat_map(|&other| trial.values_of(other, torque)).collect();
             let of_simpler = trial.held_out[torque].size_of(&simpler);
             !self.is_as_it_was(torque, (without / trial.held_out[torque].rows().max(1.0)).sqrt())
-                && taken >= self.options.least_share * without
-                && taken >= self.options.least_share_of_kin * (without - left[torque])
+                && taken >= self.options.least_share_of_kin * without
                 && taken >= self.options.least_of_simpler * of_simpler
                 && (taken / whole).sqrt() >= self.options.least_size
         })
