@@ -2,7 +2,7 @@
 //! offsets, …).
 
 use crate::Effect;
-use crate::rates::{LocalRates, interpolate};
+use crate::rates::{LocalRates, WindowsByWidth, interpolate};
 use crate::sample::{BlockReference, Needs, Sample};
 use phiw_dynamics::scalar::Dual;
 use phiw_dynamics::{DimensionError, Tree, Workspace};
@@ -13,12 +13,13 @@ use std::sync::Arc;
 pub struct ReferenceModel {
     tree: Tree,
     effects: Vec<(Arc<dyn Effect>, Vec<f64>)>,
+    windows: WindowsByWidth,
 }
 
 impl ReferenceModel {
     /// A reference with the tree's own inertial parameters.
     pub fn new(tree: Tree) -> Self {
-        ReferenceModel { tree, effects: Vec::new() }
+        ReferenceModel { tree, effects: Vec::new(), windows: WindowsByWidth::default() }
     }
 
     /// The same with effects and their parameters. Those that need a reference themselves are left out.
@@ -79,8 +80,17 @@ impl ReferenceModel {
             self.tree.inverse_dynamics(q, v, a, workspace, &mut out.torque[row])?;
         }
         let (first, second) = (&mut out.torque_rate, &mut out.torque_second_rate);
-        local_rates(block).apply(block.joints, &out.torque, first, second);
+        self.local_rates(block).apply(block.joints, &out.torque, first, second);
         Ok(())
+    }
+
+    /// What differentiates the torques over a block.
+    fn local_rates(&self, block: &Block) -> LocalRates {
+        let period = match block.t.as_slice() {
+            [first, .., last] => (last - first) / (block.t.len() - 1) as f64,
+            _ => 1.0,
+        };
+        LocalRates::new(period, RATE_BAND * block.motion_bandwidth_hz, &self.windows)
     }
 
     /// Where the links are behind compliant joints whose encoders sit on the motors: q − τ/k, with τ at the
@@ -202,15 +212,6 @@ const DEFLECTION_STEPS: usize = 2;
 
 /// Band of torques' rates over the motion's bandwidth.
 const RATE_BAND: f64 = 2.5;
-
-/// What differentiates the torques over a block.
-fn local_rates(block: &Block) -> LocalRates {
-    let period = match block.t.as_slice() {
-        [first, .., last] => (last - first) / (block.t.len() - 1) as f64,
-        _ => 1.0,
-    };
-    LocalRates::new(period, RATE_BAND * block.motion_bandwidth_hz)
-}
 
 /// Time between two evaluations of the derivatives \[s\].
 const DERIVATIVE_PERIOD: f64 = 0.02;

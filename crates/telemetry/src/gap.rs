@@ -16,6 +16,8 @@ pub enum GapReason {
     Spike,
     /// No torque changes for a while though the robot moves: the drives had stopped logging.
     StillTorques,
+    /// Positions and torques are those of earlier rows, to the last digit: a copy, which says nothing new.
+    Repeated,
     /// The time stamp of the row before, once more.
     DuplicateStamp,
     /// The last row is cut short, or may be since its line feed is missing.
@@ -27,12 +29,13 @@ pub enum GapReason {
 }
 
 impl GapReason {
-    pub(crate) const ALL: [GapReason; 9] = [
+    pub(crate) const ALL: [GapReason; 10] = [
         GapReason::EmptyCell,
         GapReason::NotFinite,
         GapReason::Huge,
         GapReason::Spike,
         GapReason::StillTorques,
+        GapReason::Repeated,
         GapReason::DuplicateStamp,
         GapReason::TruncatedLastRow,
         GapReason::LeftOut,
@@ -48,6 +51,7 @@ impl fmt::Display for GapReason {
             GapReason::Huge => "value beyond 1e100",
             GapReason::Spike => "spike",
             GapReason::StillTorques => "no torque changes while the robot moves",
+            GapReason::Repeated => "copy of earlier rows",
             GapReason::DuplicateStamp => "duplicate time stamp",
             GapReason::TruncatedLastRow => "truncated last row",
             GapReason::LeftOut => "left out by the map",

@@ -27,6 +27,7 @@ mod parallel_filter;
 mod plan;
 mod reader;
 mod recording;
+mod repeated;
 mod samples;
 mod signal_shape;
 mod spectrum;
@@ -34,6 +35,7 @@ mod spike;
 mod still;
 mod stream;
 mod survey;
+mod without_stretches;
 mod writer;
 
 pub use block::{Block, Signals};

@@ -1,12 +1,8 @@
 //! Rows in which the drives had stopped logging: no torque changes though the robot moves. They are left out.
 
-use crate::LogError;
 use crate::check_settings::CheckSettings;
 use crate::columns::Layout;
-use crate::gap::GapReason;
-use crate::reader::{Row, Rows};
 use crate::signal_shape::{LONG, MOVED};
-use std::path::Path;
 
 /// Stretches that are remembered; a log with more is one of torques in steps.
 const MOST: usize = 4096;
@@ -88,52 +84,5 @@ impl StillFinder {
             rows += count;
         }
         if 2 * rows > self.all_rows { Vec::new() } else { stretches }
-    }
-}
-
-/// Rows without those stretches.
-pub(crate) struct WithoutStill<R> {
-    rows: R,
-    stretches: Vec<[f64; 2]>,
-    next: usize,
-}
-
-impl<R: Rows> WithoutStill<R> {
-    /// `stretches` as [`StillFinder::stretches`] gives them.
-    pub fn new(rows: R, stretches: Vec<[f64; 2]>) -> Self {
-        WithoutStill { rows, stretches, next: 0 }
-    }
-
-    /// The rows with all stretches.
-    pub fn into_inner(self) -> R {
-        self.rows
-    }
-}
-
-impl<R: Rows> Rows for WithoutStill<R> {
-    fn layout(&self) -> &Layout {
-        self.rows.layout()
-    }
-
-    fn next(&mut self, values: &mut [f64]) -> Result<Row, LogError> {
-        let row = self.rows.next(values)?;
-        let Row::Sample { line } = row else { return Ok(row) };
-        while self.stretches.get(self.next).is_some_and(|[_, to]| values[0] > *to) {
-            self.next += 1;
-        }
-        Ok(match self.stretches.get(self.next) {
-            Some([from, _]) if values[0] >= *from => {
-                Row::Gap { line, reason: GapReason::StillTorques, t: Some(values[0]) }
-            }
-            _ => row,
-        })
-    }
-
-    fn progress(&self) -> (u64, u64) {
-        self.rows.progress()
-    }
-
-    fn path(&self) -> &Path {
-        self.rows.path()
     }
 }

@@ -6,8 +6,7 @@ use crate::log_rows::open_log;
 use crate::reader::Rows;
 use crate::segments::Segment;
 use crate::segments::{RowCounts, SegmentSink, split};
-use crate::spike::WithoutSpikes;
-use crate::still::WithoutStill;
+use crate::survey::without;
 use crate::{Block, Conditioning, LogError, LogPlan, Survey};
 use std::ops::ControlFlow;
 
@@ -89,12 +88,10 @@ pub(crate) fn usable_rows(
     survey: &Survey,
     sink: &mut dyn SegmentSink,
 ) -> Result<RowCounts, LogError> {
-    let (bounds, still) = (survey.spike_bounds.clone(), survey.still.clone());
-    if bounds.is_empty() && still.is_empty() {
+    if survey.spike_bounds.is_empty() && survey.still.is_empty() && survey.repeated.is_empty() {
         return split(rows, survey.longest_step, sink);
     }
-    let bounds = if bounds.is_empty() { vec![f64::INFINITY; rows.layout().width] } else { bounds };
-    let mut without = WithoutStill::new(WithoutSpikes::new(rows, bounds), still);
+    let mut without = without(rows, &survey.spike_bounds, &survey.still, &survey.repeated);
     split(&mut without, survey.longest_step, sink)
 }
 

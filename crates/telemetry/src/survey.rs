@@ -11,12 +11,14 @@ use crate::joint_survey::{Five, JointCollector};
 use crate::log_rows::open_log;
 use crate::log_source::LogSource;
 use crate::reader::{Row, Rows};
+use crate::repeated::RepetitionFinder;
 use crate::segments::{GapCount, Segment};
 use crate::segments::{RowCounts, SegmentSink, SpikeCount, split};
 use crate::spectrum::Spectrum;
 use crate::spectrum::SpectrumEstimator;
 use crate::spike::{SpikeFinder, WithoutSpikes};
-use crate::still::{StillFinder, WithoutStill};
+use crate::still::StillFinder;
+use crate::without_stretches::WithoutStretches;
 use phiw_spikes::{SpikeSettings, WINDOW};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -61,6 +63,10 @@ pub struct Survey {
     /// First and last stamp of stretches in which no torque changes though the robot moves, in seconds: their
     /// rows are counted as gaps.
     pub still: Vec<[f64; 2]>,
+    /// First and last stamp of stretches that repeat earlier rows to the last digit, in seconds: their rows
+    /// are counted as gaps.
+    #[serde(default)]
+    pub repeated: Vec<[f64; 2]>,
     /// Columns in the header that are not used.
     pub ignored_columns: Vec<String>,
     /// Median distance of consecutive stamps, in seconds; exact over the first 65536, checked against a
@@ -208,16 +214,15 @@ pub(crate) fn survey_rows<R: Rows>(
         rows = without.into_inner();
     }
     let still = collector.still.stretches(&CheckSettings::default());
-    if !still.is_empty() {
-        // Rows without logged torques would bias all parameters towards zero: the pass is repeated without
-        // them.
+    let repeated = collector.repeated.stretches();
+    if !still.is_empty() || !repeated.is_empty() {
+        // Rows without logged torques would bias all parameters towards zero, and copies make them look
+        // better known than they are: the pass is repeated without them.
         let steps = collector.steps;
-        let bounds = spike_bounds.clone();
-        let bounds = if bounds.is_empty() { vec![f64::INFINITY; rows.layout().width] } else { bounds };
-        let mut without = WithoutStill::new(WithoutSpikes::new(open()?, bounds), still.clone());
+        let mut without = without(open()?, &spike_bounds, &still, &repeated);
         collector = Collector::new(without.layout(), steps, progress);
         counts = split(&mut without, steps.longest(), &mut collector)?;
-        let without = without.into_inner();
+        let without = without.into_inner().into_inner();
         spikes = without.counts(joints);
         rows = without.into_inner();
     }
@@ -238,7 +243,23 @@ pub(crate) fn survey_rows<R: Rows>(
         });
     }
     let survey = collector.finish(rows.path(), rows.rows_are(), joints, counts);
-    Ok((Survey { spikes, spike_bounds, still, ..survey }, rows))
+    Ok((Survey { spikes, spike_bounds, still, repeated, ..survey }, rows))
+}
+
+/// Rows without spikes, and without stretches in which torques stand still or that repeat earlier ones.
+pub(crate) fn without<R: Rows>(
+    rows: R,
+    spike_bounds: &[f64],
+    still: &[[f64; 2]],
+    repeated: &[[f64; 2]],
+) -> WithoutStretches<WithoutStretches<WithoutSpikes<R>>> {
+    let bounds = match spike_bounds {
+        [] => vec![f64::INFINITY; rows.layout().width],
+        bounds => bounds.to_vec(),
+    };
+    let without = WithoutSpikes::new(rows, bounds);
+    let without = WithoutStretches::new(without, GapReason::StillTorques, still.to_vec());
+    WithoutStretches::new(without, GapReason::Repeated, repeated.to_vec())
 }
 
 /// How far apart the stamps are.
@@ -294,6 +315,7 @@ struct Collector<'a> {
     spectrum: SpectrumEstimator,
     spikes: SpikeFinder,
     still: StillFinder,
+    repeated: RepetitionFinder,
     segments: Vec<Segment>,
     short_segments: u64,
     /// The [`WINDOW`] latest samples of the segment, oldest first, flat.
@@ -320,6 +342,7 @@ impl<'a> Collector<'a> {
             spectrum: SpectrumEstimator::new(layout, steps.median),
             spikes: SpikeFinder::new(layout),
             still: StillFinder::new(layout),
+            repeated: RepetitionFinder::new(),
             steps,
             segments: Vec::new(),
             short_segments: 0,
@@ -381,6 +404,7 @@ impl<'a> Collector<'a> {
             spikes: Vec::new(),
             spike_bounds: Vec::new(),
             still: Vec::new(),
+            repeated: Vec::new(),
             excursions: self.spikes.multiples(SpikeSettings::default()),
             ignored_columns: Vec::new(),
             median_period: self.steps.median,
@@ -420,6 +444,7 @@ impl SegmentSink for Collector<'_> {
         self.spectrum.push(&values[q..q + n], torques);
         if self.layout.torque {
             self.still.push(values[0], &values[q..q + n], torques);
+            self.repeated.push(&self.layout, values);
         }
         let optional = |place: Option<usize>| place.map_or(f64::NAN, |place| values[place]);
         for (i, joint) in self.joints.iter_mut().enumerate() {
@@ -459,6 +484,7 @@ impl SegmentSink for Collector<'_> {
         }
         self.in_segment = 0;
         self.still.end();
+        self.repeated.end();
         self.joints.iter_mut().for_each(JointCollector::end_segment);
         self.spectrum.end_segment();
         true

@@ -130,3 +130,33 @@ fn rows_in_which_no_torque_changes_are_left_out_and_counted() {
         assert!(streamed.is_ok() && left == 0, "{pause:?}: {left} rows, {streamed:?}");
     }
 }
+
+/// A log that is one recording over and over has what the recording has, and no more: ten times the rows made
+/// the parameters look three times better known, and its noise foretold itself.
+#[test]
+fn copies_of_a_recording_in_one_log_are_left_out_and_counted() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("log.csv");
+    let surveyed = |copies: usize| {
+        let mut text = String::from("t,q.a,tau.a\n");
+        for k in 0..2000 * copies {
+            let [_, q, _, tau] = clean(k % 2000);
+            let _ = writeln!(text, "{:.6},{q:.9},{tau:.6}", k as f64 / RATE);
+        }
+        std::fs::write(&path, text).expect("written");
+        survey(&path, &["a".to_owned()], TorqueColumns::Required, &mut |_, _| {}).expect("it reads")
+    };
+    let (once, copied) = (surveyed(1), surveyed(5));
+    assert!(once.gaps.is_empty() && once.repeated.is_empty(), "{:?}", once.gaps);
+    let gap = copied.gaps.iter().find(|gap| gap.reason == GapReason::Repeated).expect("copies");
+    assert_eq!((gap.count, gap.first_line), (8000, 2002));
+    assert_eq!((copied.rows, copied.used_rows, copied.repeated.len()), (10_000, once.used_rows, 1));
+    assert_eq!(copied.segments, once.segments);
+    let conditioning = Conditioning::choose(std::slice::from_ref(&copied), &ConditioningOptions::default());
+    let mut last = f64::NEG_INFINITY;
+    let summary = stream(&copied, &conditioning.expect("a cut-off"), &mut |_, _| {}, &mut |block| {
+        last = block.t.iter().fold(last, |last, t| last.max(*t));
+        ControlFlow::Continue(())
+    });
+    assert!(summary.is_ok() && last < 2000.5 / RATE, "{summary:?}, {last}");
+}
