@@ -2,12 +2,13 @@
 
 use crate::effect::{Effect, EffectParameter, Evaluator};
 use crate::model::with_masses;
+use crate::pairs::PairsOfBlock;
 use crate::reference::ReferenceModel;
 use crate::sample::{BlockReference, Needs, Sample};
 use phiw_dynamics::check::check_size;
 use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
 use phiw_dynamics::{DimensionError, Tree};
-use phiw_regressor::{BaseParameters, JointTorqueRegressor, RegressorError, RegressorScratch};
+use phiw_regressor::{BaseParameters, JointTorqueRegressor, RegressorError};
 use phiw_telemetry::Block;
 use std::ops::Range;
 use std::sync::Arc;
@@ -70,12 +71,11 @@ pub struct Design {
 pub struct DesignScratch<'a> {
     design: &'a Design,
     evaluators: Vec<Box<dyn Evaluator + 'a>>,
-    regressor: RegressorScratch<f64>,
+    pairs_of_block: PairsOfBlock,
     pairs: Vec<f64>,
     /// The pairs at rest under unit gravity along x, y, z, where some effect needs them.
     statics: Vec<f64>,
-    unit_gravity: Vec<Tree>,
-    rest: Vec<f64>,
+    unit_gravity: Vec<(Tree, PairsOfBlock)>,
     columns: Vec<f64>,
     reference: BlockReference,
     /// Where the links are, if that is not where their encoders are.
@@ -278,16 +278,15 @@ impl Design {
         let unit_gravity = |axis: usize| {
             let mut tree = self.tree.clone();
             tree.gravity = std::array::from_fn(|other| if other == axis { 1.0 } else { 0.0 });
-            tree
+            (tree, PairsOfBlock::new(&self.regressor, self.tree.velocity_size(), true))
         };
         let axes = if self.needs.statics { 0..3 } else { 0..0 };
         DesignScratch {
             design: self,
             statics: vec![0.0; axes.len() * self.regressor.buffer_size()],
             unit_gravity: axes.map(unit_gravity).collect(),
-            rest: vec![0.0; self.tree.velocity_size()],
             evaluators: self.effects.iter().map(|effect| effect.evaluator()).collect(),
-            regressor: self.regressor.scratch(),
+            pairs_of_block: PairsOfBlock::new(&self.regressor, self.tree.velocity_size(), false),
             pairs: vec![0.0; self.regressor.buffer_size()],
             columns: vec![0.0; self.effect_columns.last().map_or(0, |range| range.end)],
             reference: BlockReference::default(),
@@ -312,6 +311,8 @@ impl DesignScratch<'_> {
             let at = self.links.as_ref().unwrap_or(block);
             reference.evaluate(at, self.design.needs, &mut self.reference)?;
         }
+        self.pairs_of_block.begin();
+        self.unit_gravity.iter_mut().for_each(|(_, pairs)| pairs.begin());
         self.evaluators.iter_mut().for_each(|evaluator| evaluator.restart());
         for sample in 0..block.warm_up {
             self.evaluate_effects(block, sample);
@@ -335,11 +336,11 @@ impl DesignScratch<'_> {
         let design = self.design;
         let row = block.row(sample);
         let links = self.links.as_ref().unwrap_or(block);
-        let (q, v, a) = (&links.q[row.clone()], &links.qd[row.clone()], &links.qdd[row.clone()]);
-        design.regressor.compute(&design.tree, q, v, a, &mut self.regressor, &mut self.pairs)?;
+        let regressor = &design.regressor;
+        self.pairs_of_block.put(regressor, &design.tree, links, sample, &mut self.pairs)?;
         let statics = self.statics.chunks_exact_mut(self.pairs.len().max(1));
-        for (tree, pairs) in self.unit_gravity.iter().zip(statics) {
-            design.regressor.compute(tree, q, &self.rest, &self.rest, &mut self.regressor, pairs)?;
+        for ((tree, pairs_of_block), pairs) in self.unit_gravity.iter_mut().zip(statics) {
+            pairs_of_block.put(regressor, tree, links, sample, pairs)?;
         }
         self.evaluate_effects(block, sample);
         for (joint, layout) in design.rows.iter().enumerate() {

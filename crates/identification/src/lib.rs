@@ -23,6 +23,7 @@ mod known_payload;
 mod log_file;
 mod log_set;
 mod model_sources;
+mod pairs;
 mod predict;
 mod prediction_errors;
 mod rates;
