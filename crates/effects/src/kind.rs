@@ -1,6 +1,7 @@
 //! The description of a kind of effect in the catalogue.
 
 use crate::FittedEffect;
+use crate::friction::WIDTH;
 use crate::mechanism::{Mechanism, Mechanisms};
 use phiw_codegen::{Expression, JointTorque};
 use phiw_dynamics::Tree;
@@ -124,6 +125,7 @@ pub trait EffectKind: Send + Sync {
             joint: joint.clone(),
             property,
             value: found.value(0),
+            width: found.constant(WIDTH),
         };
         let parts = self.joint_property().into_iter().zip(found.joint_names()).map(of_joint);
         Mechanisms { parts: parts.collect(), left_out: Vec::new() }

@@ -21,8 +21,9 @@ use rayon::prelude::*;
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConsistentSettings {
     /// Weights of the prior that are tried, ascending. One is worth one nat of the likelihood for each unit
-    /// of divergence if the samples were independent; they are not, so that the best is mostly above one. On
-    /// the six robots of docs/results/consistent.md it is between the ends of these.
+    /// of divergence if the samples were independent; they are not, so that the best is mostly above one.
+    /// Below the least of these nothing is gained on the robots of docs/results/consistent.md, and bodies come
+    /// so near to the edge of the possible that Rapier refuses one.
     pub weights: Vec<f64>,
     /// The weight where there are too few training folds to leave one out.
     pub default_weight: f64,

@@ -166,7 +166,7 @@ pub struct SimulateArguments {
 /// Arguments of `phiw check`.
 #[derive(Clone, Debug, Args)]
 pub struct CheckArguments {
-    /// The robot's URDF.
+    /// The robot's URDF, or MuJoCo's MJCF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
     /// Logs: CSV, MCAP, ROS bags, LeRobot folders, npz.
@@ -225,7 +225,7 @@ impl CheckArguments {
 /// Arguments of `phiw retarget`.
 #[derive(Clone, Debug, Args)]
 pub struct RetargetArguments {
-    /// The robot's URDF.
+    /// The robot's URDF, or MuJoCo's MJCF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
     /// Recordings: C3D, TRC, BVH (LAFAN1), npz of AMASS or SMPL-X, or CSV of named points (`t`, `<point>.x`,
@@ -267,7 +267,7 @@ pub struct RetargetArguments {
 /// Arguments of `phiw next`.
 #[derive(Clone, Debug, Args)]
 pub struct NextArguments {
-    /// The robot's URDF.
+    /// The robot's URDF, or MuJoCo's MJCF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
     /// Folder of motions to choose from, as `phiw retarget` writes them: logs with q, qd and qdd.
@@ -372,7 +372,7 @@ impl MotionFormat {
 /// Robot, logs and declared model: what every command on measured logs takes.
 #[derive(Clone, Debug, Default, Args, Serialize, Deserialize)]
 pub struct SessionArguments {
-    /// The robot's URDF.
+    /// The robot's URDF, or MuJoCo's MJCF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
     /// Logs that the model is fitted to: CSV, MCAP, ROS bags, LeRobot folders, npz.

@@ -55,6 +55,14 @@ pub enum Error {
         /// What is wrong with it.
         source: Box<UrdfError>,
     },
+    /// A robot's file is MJCF, and is not read.
+    #[error("{}: {source}", path.display())]
+    Mjcf {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: Box<phiw_mjcf::MjcfReadError>,
+    },
     /// A plan that cannot be made or used.
     #[error("{}: {source}", path.display())]
     Plan {
@@ -406,6 +414,7 @@ impl Error {
             | Error::FactorsTwice { .. }
             | Error::FactorsMissing { .. }
             | Error::Urdf { .. }
+            | Error::Mjcf { .. }
             | Error::FloatingBase { .. }
             | Error::NotAModel { .. }
             | Error::Model { .. }

@@ -109,14 +109,16 @@ impl Exported {
         let tree = carried.tree;
         let (Mechanism::Joint { joint, .. }
         | Mechanism::Spring { joint, .. }
-        | Mechanism::Motor { joint, .. }) = part
+        | Mechanism::Motor { joint, .. }
+        | Mechanism::MotorDelay { joint, .. }) = part
         else {
             return false;
         };
         let Some(model) = tree.joint_index(joint).map(|joint| &mut self.joints[joint]) else { return false };
         match *part {
-            Mechanism::Joint { property, value, .. } if value >= 0.0 => {
-                *property_of(model, property) += value
+            Mechanism::Joint { property, value, width, .. } if value >= 0.0 => {
+                *property_of(model, property) += value;
+                model.friction_width = model.friction_width.max(width);
             }
             Mechanism::Spring { stiffness, reference, .. } => {
                 // Two springs are one: stiffnesses add, and so do their torques.
@@ -128,6 +130,7 @@ impl Exported {
                 model.motor_gain *= gain;
                 model.motor_bias += bias;
             }
+            Mechanism::MotorDelay { delay, .. } => model.motor_delay += delay,
             _ => return false,
         }
         true
@@ -140,7 +143,7 @@ impl Exported {
         part: &Mechanism,
     ) -> Result<(), (&'static str, Vec<String>)> {
         let tree = carried.tree;
-        let Mechanism::Transmission { joints, factors, property, value, crossing_only } = part else {
+        let Mechanism::Transmission { joints, factors, property, value, crossing_only, width } = part else {
             return Ok(());
         };
         let refused = |why| Err((why, joints.to_vec()));
@@ -171,6 +174,7 @@ impl Exported {
                 armature: 0.0,
                 damping: 0.0,
                 friction: 0.0,
+                friction_width: 0.0,
             });
             self.tendons.len() - 1
         });
@@ -178,7 +182,10 @@ impl Exported {
         match property {
             JointProperty::Armature => tendon.armature += value,
             JointProperty::Damping => tendon.damping += value,
-            JointProperty::Friction => tendon.friction += value,
+            JointProperty::Friction => {
+                tendon.friction += value;
+                tendon.friction_width = tendon.friction_width.max(*width);
+            }
         }
         Ok(())
     }

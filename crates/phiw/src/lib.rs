@@ -38,6 +38,7 @@ pub mod possible_bodies;
 pub mod predict;
 pub mod report_json;
 pub mod retarget;
+pub mod robot_file;
 pub mod session;
 pub mod simulate;
 pub mod summary;
