@@ -60,6 +60,25 @@ pub enum Mechanism {
     },
 }
 
+/// Friction of a servo that depends on more than its direction and in proportion to its speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ServoFriction {
+    /// torque·exp(−(|q̇|/speed)^exponent)·sign(q̇).
+    Stribeck {
+        /// At rest, on top of Coulomb friction \[N·m, N\].
+        torque: f64,
+        /// Where it has fallen to 1/e \[rad/s, m/s\].
+        speed: f64,
+        /// How sharply it falls.
+        exponent: f64,
+    },
+    /// share·|load|·sign(q̇).
+    Load {
+        /// Share of the torque that goes through the gear.
+        share: f64,
+    },
+}
+
 /// What in a simulator's model does what an effect does.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mechanisms {

@@ -6,7 +6,9 @@
 
 use crate::effect::QuadraticForm;
 use crate::fit::{Fit, TorqueError, merge, torque_error};
+use crate::mirrored::mirror_map;
 use crate::{Design, IdentificationError};
+pub use phiw_consistency::Ellipsoid;
 use phiw_consistency::{
     MatrixTerm, PriorSettings, Problem, PseudoInertia, Settings, Solution, possible_priors,
 };
@@ -62,6 +64,12 @@ pub enum Known {
     Mass(usize, f64),
     /// Mass of all bodies that move \[kg\].
     TotalMass(f64),
+    /// Of a body, by its index in the tree: all of its mass lies within an ellipsoid in its link's frame, as far
+    /// as its second moments tell (Wensing, Kim & Slotine 2018, equation 21).
+    Inside(usize, Ellipsoid),
+    /// Two bodies, by their indices in the tree, that are mirror images of each other by the plane y = 0 of the
+    /// world, with the robot in its configuration of zeros, wherever along y the plane is.
+    Mirrored(usize, usize),
 }
 
 /// A design fitted to possible bodies and dissipative effects.
@@ -228,6 +236,18 @@ impl<'a> Columns<'a> {
         }
         for known in &settings.known {
             problem = match *known {
+                Known::Inside(body, ellipsoid) => problem.with_ellipsoid(body, &ellipsoid)?,
+                Known::Mirrored(body, image) => {
+                    let mut mirrored = problem;
+                    for (place, row) in mirror_map(tree, body, image).iter().enumerate() {
+                        let own =
+                            |(column, value): (usize, &f64)| (PARAMETERS_PER_BODY * body + column, *value);
+                        let mut coefficients: Vec<(usize, f64)> = row.iter().enumerate().map(own).collect();
+                        coefficients.push((PARAMETERS_PER_BODY * image + place, -1.0));
+                        mirrored = mirrored.with_equality(&coefficients, 0.0)?;
+                    }
+                    mirrored
+                }
                 Known::Mass(body, mass) => {
                     problem.with_equality(&[(PARAMETERS_PER_BODY * body, 1.0)], mass)?
                 }

@@ -240,3 +240,35 @@ fn mjcf_is_known_by_its_first_element() {
         assert!(!is_mjcf(text), "{text}");
     }
 }
+
+/// Cut off, with bytes exchanged, and with numbers that are too large: an answer or a refusal, never a panic; and
+/// what is answered is a URDF that is read or refused in turn.
+#[test]
+fn a_damaged_file_is_read_or_refused() {
+    let mut random = RandomNumbers::new(7);
+    let words = ["1e308", "-1", "0", "nan", "", "true", "\"", "<", ">", "&a;", "ref", "free", "é"];
+    for _ in 0..3000 {
+        let mut text = ARM.to_owned();
+        for _ in 0..1 + random.index(3) {
+            let mut from = random.index(text.len());
+            while !text.is_char_boundary(from) {
+                from -= 1;
+            }
+            let mut to = (from + random.index(12)).min(text.len());
+            while !text.is_char_boundary(to) {
+                to -= 1;
+            }
+            text.replace_range(from..to.max(from), words[random.index(words.len())]);
+        }
+        if random.chance(0.1) {
+            let mut end = random.index(text.len());
+            while !text.is_char_boundary(end) {
+                end -= 1;
+            }
+            text.truncate(end);
+        }
+        if let Ok(reading) = read_mjcf(&text) {
+            let _ = read_urdf(&reading.urdf, &UrdfOptions::default());
+        }
+    }
+}

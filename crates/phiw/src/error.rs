@@ -196,8 +196,10 @@ pub enum Error {
         /// The engine.
         backend: &'static str,
     },
-    /// A mass is known of a link that no joint carries.
-    #[error("--mass names the link `{link}`, which no joint that moves carries; those are {links}")]
+    /// Something is known of a link that no joint carries.
+    #[error(
+        "the link `{link}` of --mass, --inside or --mirrored is carried by no joint that moves; those are {links}"
+    )]
     UnknownLink {
         /// What was named.
         link: String,

@@ -104,6 +104,26 @@ impl Exported {
         exported
     }
 
+    /// What MJCF can express but a table of drives cannot, in words: springs, motors that do not deliver their
+    /// command, shared transmissions.
+    pub fn beyond_a_drive(&self, carried: Carried<'_>) -> Vec<String> {
+        let mut beyond = LeftOut::default();
+        for (index, joint) in self.joints.iter().enumerate() {
+            let name = std::slice::from_ref(&carried.tree.joint(index).joint);
+            if joint.stiffness != 0.0 {
+                beyond.add("spring".to_owned(), name);
+            }
+            if joint.motor_gain != 1.0 || joint.motor_bias != 0.0 {
+                beyond.add("gain and bias of the motor".to_owned(), name);
+            }
+        }
+        for tendon in &self.tendons {
+            let names = tendon.joints.map(|(joint, _)| carried.tree.joint(joint).joint.clone());
+            beyond.add("shared transmission".to_owned(), &names);
+        }
+        beyond.in_words()
+    }
+
     /// Takes a part of one joint; `false` if MJCF has no such value.
     fn of_joint(&mut self, carried: Carried<'_>, part: &Mechanism) -> bool {
         let tree = carried.tree;

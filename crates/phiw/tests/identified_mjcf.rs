@@ -166,13 +166,13 @@ fn a_robot_of_mjcf_is_identified_like_that_of_its_urdf() {
             out: path(&format!("{name} out")),
             ..SessionArguments::default()
         };
-        let summary = identify(&arguments, &Console::silent()).unwrap().summary;
-        let text = std::fs::read_to_string(path(&format!("{name} out")).join("model.json")).unwrap();
-        (summary, serde_json::from_str::<Model>(&text).unwrap())
+        identify(&arguments, &Console::silent()).unwrap();
+        let text = |file: &str| std::fs::read_to_string(path(&format!("{name} out")).join(file)).unwrap();
+        (text("report.json"), serde_json::from_str::<Model>(&text("model.json")).unwrap())
     };
     let (_, of_urdf) = identified("robot.urdf", synthetic::URDF);
-    let (summary, of_mjcf) = identified("robot.xml", &mjcf);
-    assert!(summary.contains("armature of joint_2 (declare rotor_inertia)"), "{summary}");
+    let (report, of_mjcf) = identified("robot.xml", &mjcf);
+    assert!(report.contains("armature of joint_2 (declare rotor_inertia)"), "{report}");
     assert_eq!(of_urdf.joints, of_mjcf.joints);
     for (one, other) in of_urdf.residual_std.iter().zip(&of_mjcf.residual_std) {
         assert!((one - other).abs() < 1e-9 * one, "{one} {other}");
