@@ -41,8 +41,8 @@ impl EffectKind for TimeDelay {
         let delay = found.constant(DELAY) + found.value(0);
         format!("The torque of {} is stamped {:.2} ms late.", found.joints(), 1e3 * delay)
     }
-    /// A torque that is logged before it acts is a command, and its motor is late. One that is logged after it
-    /// has acted is late in the log alone: nothing in a simulator's robot does that.
+    /// A torque that is logged before it acts is a command, and its motor is late. One that is logged after
+    /// it has acted is late in the log alone: nothing in a simulator's robot does that.
     fn mechanisms(&self, found: &FittedEffect<'_>) -> Mechanisms {
         let late = found.constant(DELAY) + found.value(0);
         if late > 0.0 {

@@ -14,7 +14,8 @@ fn mechanisms(spec: &EffectSpec, name: &str, value: f64) -> phiw_effects::Mechan
     Catalogue::default().mechanisms(spec, &[parameter], &[value])
 }
 
-/// τ_log(t) = τ(t − d): with d < 0 the log is ahead of what acts, which is a command and a motor that is late.
+/// τ_log(t) = τ(t − d): with d < 0 the log is ahead of what acts, which is a command and a motor that is
+/// late.
 #[test]
 fn a_torque_that_is_logged_before_it_acts_is_a_late_motor() {
     let spec = EffectSpec::new("time_delay", &["shoulder", "elbow"]).with("delay", -0.004);

@@ -24,8 +24,8 @@ use rayon::prelude::*;
 pub struct ConsistentSettings {
     /// Weights of the prior that are tried, ascending. One is worth one nat of the likelihood for each unit
     /// of divergence if the samples were independent; they are not, so that the best is mostly above one.
-    /// Below the least of these nothing is gained on the robots of docs/results/consistent.md, and bodies come
-    /// so near to the edge of the possible that Rapier refuses one.
+    /// Below the least of these nothing is gained on the robots of docs/results/consistent.md, and bodies
+    /// come so near to the edge of the possible that Rapier refuses one.
     pub weights: Vec<f64>,
     /// The weight where there are too few training folds to leave one out.
     pub default_weight: f64,
@@ -64,11 +64,11 @@ pub enum Known {
     Mass(usize, f64),
     /// Mass of all bodies that move \[kg\].
     TotalMass(f64),
-    /// Of a body, by its index in the tree: all of its mass lies within an ellipsoid in its link's frame, as far
-    /// as its second moments tell (Wensing, Kim & Slotine 2018, equation 21).
+    /// Of a body, by its index in the tree: all of its mass lies within an ellipsoid in its link's frame, as
+    /// far as its second moments tell (Wensing, Kim & Slotine 2018, equation 21).
     Inside(usize, Ellipsoid),
-    /// Two bodies, by their indices in the tree, that are mirror images of each other by the plane y = 0 of the
-    /// world, with the robot in its configuration of zeros, wherever along y the plane is.
+    /// Two bodies, by their indices in the tree, that are mirror images of each other by the plane y = 0 of
+    /// the world, with the robot in its configuration of zeros, wherever along y the plane is.
     Mirrored(usize, usize),
 }
 

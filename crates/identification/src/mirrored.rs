@@ -14,9 +14,9 @@ fn placements(tree: &Tree) -> Vec<Placement<f64>> {
     placements
 }
 
-/// The matrix that makes a body's standard parameters those of its mirror image in another body's frame, by the
-/// plane y = 0 of the world through the middle between the two, with the robot at zero: mirrored limbs stand
-/// opposite each other there.
+/// The matrix that makes a body's standard parameters those of its mirror image in another body's frame, by
+/// the plane y = 0 of the world through the middle between the two, with the robot at zero: mirrored limbs
+/// stand opposite each other there.
 ///
 /// A reflection p' = R·p + t takes mass m, first moment h and second moment Σ = ∫ p·pᵀ dm to m, R·h + m·t and
 /// R·Σ·Rᵀ + (R·h)·tᵀ + t·(R·h)ᵀ + m·t·tᵀ; the inertia tensor is tr(Σ)·1 − Σ.

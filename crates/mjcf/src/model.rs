@@ -13,7 +13,8 @@ pub struct JointModel {
     pub damping: f64,
     /// \[N·m, N\].
     pub friction: f64,
-    /// Speed within which the friction turns as tanh(q̇/width) does \[rad/s, m/s\]; zero where it turns at once.
+    /// Speed within which the friction turns as tanh(q̇/width) does \[rad/s, m/s\]; zero where it turns at
+    /// once.
     pub friction_width: f64,
     /// \[N·m/rad, N/m\].
     pub stiffness: f64,

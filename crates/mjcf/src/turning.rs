@@ -1,17 +1,19 @@
 //! How friction turns at rest.
 //!
-//! MuJoCo holds friction loss by a soft constraint: near rest it is a damper, whose force reaches the friction
-//! at the speed `friction·R/b`, with `b = 2/(d·timeconst)`, `R = (1 − d)/d·A`, impedance d, and A the
-//! acceleration along the constraint under a unit of force (MuJoCo's documentation, "Computation", "Constraint
-//! model" and "Solver parameters"). With its defaults (0.02 s, 0.9) that speed is `floss·A/950`: on the wrist
-//! of a 30-kg arm 0.2 rad/s, as fast as it ever is. So d is chosen for the width that the friction truly has.
+//! MuJoCo holds friction loss by a soft constraint: near rest it is a damper, whose force reaches the
+//! friction at the speed `friction·R/b`, with `b = 2/(d·timeconst)`, `R = (1 − d)/d·A`, impedance d, and A
+//! the acceleration along the constraint under a unit of force (MuJoCo's documentation, "Computation",
+//! "Constraint model" and "Solver parameters"). With its defaults (0.02 s, 0.9) that speed is `floss·A/950`:
+//! on the wrist of a 30-kg arm 0.2 rad/s, as fast as it ever is. So d is chosen for the width that the
+//! friction truly has.
 
 use crate::RobotModel;
 use crate::write::TIMESTEP;
 use phiw_dynamics::dense::Cholesky;
 use phiw_dynamics::{DimensionError, Workspace};
 
-/// Time constant of the constraint \[s\] where friction is strong: the shortest that MuJoCo takes for its step.
+/// Time constant of the constraint \[s\] where friction is strong: the shortest that MuJoCo takes for its
+/// step.
 const TIME_CONSTANT: f64 = 2.0 * TIMESTEP;
 /// What friction that turns at once is given \[rad/s, m/s\].
 const LEAST_WIDTH: f64 = 1e-3;
@@ -65,8 +67,8 @@ impl Mobility {
 pub(crate) fn turning(friction: f64, width: f64, mobility: Option<f64>) -> String {
     let Some(mobility) = mobility.filter(|_| friction > 0.0) else { return String::new() };
     let end = (2.0 * std::f64::consts::LN_2 * width).max(LEAST_WIDTH);
-    // friction·(1 − d)/d·A·d·T/2 = end. The softer d, the less of the joint's acceleration is in the friction;
-    // T is longer only where no d would do: a heavy joint, that such friction takes long to stop.
+    // friction·(1 − d)/d·A·d·T/2 = end. The softer d, the less of the joint's acceleration is in the
+    // friction; T is longer only where no d would do: a heavy joint, that such friction takes long to stop.
     let reach = friction * mobility;
     let time_constant = (2.0 * end / (reach * (1.0 - SOFTEST))).max(TIME_CONSTANT);
     let impedance = (1.0 - 2.0 * end / (reach * time_constant)).min(HARDEST);

@@ -57,8 +57,8 @@ fn a_robot_that_we_have_written_is_read_as_it_was() {
     }
 }
 
-/// Classes in classes, degrees, every way to write an orientation, several joints in a body, positions that are not
-/// zero in the file's pose, frames, and inertias from geometry.
+/// Classes in classes, degrees, every way to write an orientation, several joints in a body, positions that
+/// are not zero in the file's pose, frames, and inertias from geometry.
 const ARM: &str = r#"<?xml version="1.0"?>
 <!-- by hand -->
 <mujoco model="arm">
@@ -241,8 +241,8 @@ fn mjcf_is_known_by_its_first_element() {
     }
 }
 
-/// Cut off, with bytes exchanged, and with numbers that are too large: an answer or a refusal, never a panic; and
-/// what is answered is a URDF that is read or refused in turn.
+/// Cut off, with bytes exchanged, and with numbers that are too large: an answer or a refusal, never a panic;
+/// and what is answered is a URDF that is read or refused in turn.
 #[test]
 fn a_damaged_file_is_read_or_refused() {
     let mut random = RandomNumbers::new(7);

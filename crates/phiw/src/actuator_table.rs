@@ -7,8 +7,8 @@ use std::fmt::Write;
 /// Name of the file.
 pub const FILE: &str = "actuators.csv";
 
-/// One line for each joint: armature, damping, friction loss, spring, motor, and the URDF's limits. An empty cell is
-/// a limit that the URDF does not give.
+/// One line for each joint: armature, damping, friction loss, spring, motor, and the URDF's limits. An empty
+/// cell is a limit that the URDF does not give.
 ///
 /// # Errors
 /// None is known: writing to a string does not fail.

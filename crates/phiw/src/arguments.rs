@@ -400,8 +400,8 @@ pub struct SessionArguments {
     /// Mass of all links that move, as weighed (kg).
     #[arg(long, value_name = "KG", value_parser = positive)]
     pub total_mass: Option<f64>,
-    /// Ellipsoids that hold all of a link's mass, what is fixed to it included: centre and half axes (m) in the
-    /// frame of its joint, six numbers between blanks: --inside 'upper_arm=0.2 0 0 0.3 0.1 0.1'.
+    /// Ellipsoids that hold all of a link's mass, what is fixed to it included: centre and half axes (m) in
+    /// the frame of its joint, six numbers between blanks: --inside 'upper_arm=0.2 0 0 0.3 0.1 0.1'.
     #[arg(long, value_name = "LINK=X Y Z A B C,…", value_delimiter = ',', value_parser = inside)]
     #[serde(default)]
     pub inside: Vec<(String, [f64; 6])>,

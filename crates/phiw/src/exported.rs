@@ -104,8 +104,8 @@ impl Exported {
         exported
     }
 
-    /// What MJCF can express but a table of drives cannot, in words: springs, motors that do not deliver their
-    /// command, shared transmissions.
+    /// What MJCF can express but a table of drives cannot, in words: springs, motors that do not deliver
+    /// their command, shared transmissions.
     pub fn beyond_a_drive(&self, carried: Carried<'_>) -> Vec<String> {
         let mut beyond = LeftOut::default();
         for (index, joint) in self.joints.iter().enumerate() {

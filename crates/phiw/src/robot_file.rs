@@ -13,8 +13,8 @@ pub struct RobotText {
     pub left_out: Vec<String>,
 }
 
-/// The URDF of a robot whose file has this text: the text itself, or what an MJCF file says as a URDF, with what
-/// it lacks in the comment at its head.
+/// The URDF of a robot whose file has this text: the text itself, or what an MJCF file says as a URDF, with
+/// what it lacks in the comment at its head.
 ///
 /// # Errors
 /// It is MJCF that is not read.

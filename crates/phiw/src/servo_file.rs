@@ -1,7 +1,7 @@
 //! Each joint as a servo of BAM (Better Actuator Models, Duclusaud & Passault 2024).
 //!
-//! BAM's model m1 has Coulomb and viscous friction, m2 Stribeck's besides, m3 friction of the load, m4 both; m5
-//! and m6 tell the directions of power apart, for which a log of torques has no counterpart here.
+//! BAM's model m1 has Coulomb and viscous friction, m2 Stribeck's besides, m3 friction of the load, m4 both;
+//! m5 and m6 tell the directions of power apart, for which a log of torques has no counterpart here.
 
 use crate::Error;
 use crate::exported::{Carried, Exported, LeftOut};
@@ -77,7 +77,8 @@ fn frictions(carried: Carried<'_>, joint: &str) -> Vec<ServoFriction> {
     .collect()
 }
 
-/// What of the model BAM has no field for, in words, and what it asks for that a log of torques does not tell.
+/// What of the model BAM has no field for, in words, and what it asks for that a log of torques does not
+/// tell.
 pub fn not_expressed(carried: Carried<'_>) -> Vec<String> {
     let exported = Exported::of(carried);
     let mut left_out = LeftOut::default();

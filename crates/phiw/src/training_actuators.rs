@@ -1,8 +1,8 @@
 //! Actuators for libraries in which controllers are trained: mjlab and Isaac Lab.
 //!
-//! Both make an actuator of a configuration whose gains are the trainer's own; what a joint has is the same for
-//! every kind of it. So the files hold a table of the joints' values by the libraries' names, and one function
-//! that makes configurations of whatever class is wanted.
+//! Both make an actuator of a configuration whose gains are the trainer's own; what a joint has is the same
+//! for every kind of it. So the files hold a table of the joints' values by the libraries' names, and one
+//! function that makes configurations of whatever class is wanted.
 
 use crate::exported::{Carried, Exported, header};
 use phiw_mjcf::JointModel;

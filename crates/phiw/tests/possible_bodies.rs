@@ -161,7 +161,8 @@ fn bodies_lie_inside_their_ellipsoids_and_mirror_each_other() {
     let x = (half_trace - xx - 0.2 * hx + 0.01 * m) / 0.04;
     let across = (half_trace - yy + half_trace - zz) / 0.0025;
     assert!(m - x - across > -1e-9 * m, "{m} {x} {across} {hy} {hz}");
-    // At zero the frames of these two are turned by half a radian against each other: their masses must agree.
+    // At zero the frames of these two are turned by half a radian against each other: their masses must
+    // agree.
     let found = bodies(&arguments("link_3", &[("link_2", "link_1")]));
     assert!((found[0][0] - found[1][0]).abs() < 1e-9, "{found:?}");
     let refused = identify(&arguments("tool", &[]), &Console::silent()).err().unwrap();

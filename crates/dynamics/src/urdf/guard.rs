@@ -6,8 +6,8 @@
 use super::UrdfError;
 use phiw_limits::Limits;
 
-/// Checks the text of a URDF, or of another description of a robot in XML, against the limits, before a parser
-/// sees it.
+/// Checks the text of a URDF, or of another description of a robot in XML, against the limits, before a
+/// parser sees it.
 ///
 /// # Errors
 /// [`UrdfError::TooMuch`].

@@ -1,11 +1,11 @@
 //! A plant with everything that MJCF has for a drive, carried into MuJoCo and driven along a motion.
 //!
-//! The plant is known: bodies, rotors, viscous and dry friction, a spring, a transmission that two joints share,
-//! and torques that come after their commands. A log of it is identified with all of that declared, and
-//! exported. MuJoCo's robot and our model then follow the same motion, each under the command that the plant
-//! needs for it and a weak loop of its own. The loop keeps a motion together whose dry friction would let the
-//! smallest difference grow; it is too weak to hide a mechanism that is missing, which
-//! [`compare`] shows by leaving each out.
+//! The plant is known: bodies, rotors, viscous and dry friction, a spring, a transmission that two joints
+//! share, and torques that come after their commands. A log of it is identified with all of that declared,
+//! and exported. MuJoCo's robot and our model then follow the same motion, each under the command that the
+//! plant needs for it and a weak loop of its own. The loop keeps a motion together whose dry friction would
+//! let the smallest difference grow; it is too weak to hide a mechanism that is missing, which [`compare`]
+//! shows by leaving each out.
 
 use super::export::{Identified, identified, possible_design};
 use super::python::Python;

@@ -179,7 +179,8 @@ fn robot_agrees(
 
 /// How far our own model goes another way than MuJoCo's, under the same torques from the same state: RMS over
 /// the joints of the position's error after [`STROKE_S`], over their travel. With friction it is told, not
-/// judged: MuJoCo's turns in a straight line, ours as a hyperbolic tangent, and nothing holds the two together.
+/// judged: MuJoCo's turns in a straight line, ours as a hyperbolic tangent, and nothing holds the two
+/// together.
 fn motion_error(identified: &Identified, motion: Motion, friction: bool) -> anyhow::Result<f64> {
     let Identified { tree, model, .. } = identified;
     let joints = tree.joint_count();

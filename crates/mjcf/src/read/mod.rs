@@ -1,8 +1,8 @@
 //! Robots from MJCF files, as URDF.
 //!
-//! Bodies, joints and their inertias are rewritten as a URDF, which the rest of the program reads, keeps beside
-//! the model and writes results into. What a URDF has no place for is named, not lost in silence: armature, springs,
-//! tendons, gravity of its own.
+//! Bodies, joints and their inertias are rewritten as a URDF, which the rest of the program reads, keeps
+//! beside the model and writes results into. What a URDF has no place for is named, not lost in silence:
+//! armature, springs, tendons, gravity of its own.
 
 mod bodies;
 mod defaults;
@@ -29,8 +29,8 @@ pub struct MjcfReading {
     pub urdf: String,
     /// Armature of the joints that have one, by name \[kg·m², kg\].
     pub armature: Vec<(String, f64)>,
-    /// What of the robot's dynamics a URDF cannot express, in words: armature, springs, tendons, closed loops,
-    /// gravity; and bodies whose inertia is unknown since only a mesh has it.
+    /// What of the robot's dynamics a URDF cannot express, in words: armature, springs, tendons, closed
+    /// loops, gravity; and bodies whose inertia is unknown since only a mesh has it.
     pub left_out: Vec<String>,
 }
 
