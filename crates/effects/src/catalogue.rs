@@ -1,7 +1,7 @@
 //! The catalogue finds kinds of effects by name, and builds them from a model's file.
 
 use crate::declaration::{cannot_act, joint_indices, nearest};
-use crate::{EffectKind, FittedEffect, Mechanisms};
+use crate::{EffectKind, FittedEffect, Mechanisms, ServoFriction};
 use crate::{coupling, drift, drive, efficiency, elasticity, external, friction, hysteresis};
 use crate::{position, position_map, sensing};
 use phiw_codegen::JointTorque;
@@ -83,6 +83,17 @@ impl Catalogue {
     ) -> Mechanisms {
         let found = FittedEffect::new(spec, parameters, fitted);
         self.kind(&spec.kind).map(|kind| kind.mechanisms(&found)).unwrap_or_default()
+    }
+
+    /// What an effect is among the frictions of a servo's model; none for most.
+    pub fn servo_friction(
+        &self,
+        spec: &EffectSpec,
+        parameters: &[EffectParameter],
+        fitted: &[f64],
+    ) -> Option<ServoFriction> {
+        let found = FittedEffect::new(spec, parameters, fitted);
+        self.kind(&spec.kind).ok().and_then(|kind| kind.servo_friction(&found))
     }
 
     /// The torques that an effect adds as formulas of the present motion, with its fitted values; none for

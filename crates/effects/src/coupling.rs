@@ -178,6 +178,7 @@ impl EffectKind for TransmissionCoupling {
                 property,
                 value: if crossing_only { value.abs() } else { value },
                 crossing_only,
+                width: found.constant(WIDTH),
             });
         }
         mechanisms

@@ -3,6 +3,7 @@
 use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, product, values};
+use crate::mechanism::ServoFriction;
 use phiw_codegen::{Expression, Function, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
@@ -235,6 +236,13 @@ impl EffectKind for Stribeck {
             found.constant(STRIBECK_VELOCITY)
         )
     }
+    fn servo_friction(&self, found: &FittedEffect<'_>) -> Option<ServoFriction> {
+        Some(ServoFriction::Stribeck {
+            torque: found.value(0),
+            speed: constant(found.constants(), STRIBECK_VELOCITY, STRIBECK_DEFAULTS.0),
+            exponent: constant(found.constants(), EXPONENT, STRIBECK_DEFAULTS.1),
+        })
+    }
     fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
         let speed = constant(found.constants(), STRIBECK_VELOCITY, STRIBECK_DEFAULTS.0);
         let exponent = constant(found.constants(), EXPONENT, STRIBECK_DEFAULTS.1);
@@ -291,6 +299,9 @@ impl EffectKind for LoadDependent {
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         let (joint, share) = (found.joints(), found.value(0));
         format!("The friction of {joint} grows with its load: {share:.3} of the torque that it carries.")
+    }
+    fn servo_friction(&self, found: &FittedEffect<'_>) -> Option<ServoFriction> {
+        Some(ServoFriction::Load { share: found.value(0) })
     }
     fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
         let load = |joint: &str| Expression::BodyTorque(joint.to_owned()).magnitude();

@@ -1,7 +1,8 @@
 //! The description of a kind of effect in the catalogue.
 
 use crate::FittedEffect;
-use crate::mechanism::{Mechanism, Mechanisms};
+use crate::friction::WIDTH;
+use crate::mechanism::{Mechanism, Mechanisms, ServoFriction};
 use phiw_codegen::{Expression, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
@@ -124,9 +125,15 @@ pub trait EffectKind: Send + Sync {
             joint: joint.clone(),
             property,
             value: found.value(0),
+            width: found.constant(WIDTH),
         };
         let parts = self.joint_property().into_iter().zip(found.joint_names()).map(of_joint);
         Mechanisms { parts: parts.collect(), left_out: Vec::new() }
+    }
+
+    /// What it is among the frictions of a servo's model, with its fitted values; none by default.
+    fn servo_friction(&self, _found: &FittedEffect<'_>) -> Option<ServoFriction> {
+        None
     }
 
     /// The torques that it adds as formulas of the present motion, with its fitted values, for code that is

@@ -23,4 +23,4 @@ pub use catalogue::{Catalogue, sentence};
 pub use columns::{Formula, OwnTorque, ParameterKind, smooth_sign};
 pub use fitted::FittedEffect;
 pub use kind::{Constants, EffectKind, JointRange, Signal, SignalRanges};
-pub use mechanism::{Mechanism, Mechanisms};
+pub use mechanism::{Mechanism, Mechanisms, ServoFriction};

@@ -13,6 +13,9 @@ pub enum Mechanism {
         property: JointProperty,
         /// Its value, in the property's unit.
         value: f64,
+        /// Speed within which a friction turns as tanh(q̇/width) does \[rad/s, m/s\]; zero where it turns at
+        /// once, and for what is no friction.
+        width: f64,
     },
     /// A spring between a joint and what it stands on.
     Spring {
@@ -32,6 +35,13 @@ pub enum Mechanism {
         /// Torque under no command \[N·m, N\].
         bias: f64,
     },
+    /// A motor whose torque comes after its command.
+    MotorDelay {
+        /// The joint.
+        joint: String,
+        /// Time from a command to its torque \[s\].
+        delay: f64,
+    },
     /// A transmission that turns with a sum of two joints' positions.
     Transmission {
         /// The joints.
@@ -45,6 +55,27 @@ pub enum Mechanism {
         /// Whether the effect is only what crosses from one joint to the other: the share that each joint
         /// feels of its own motion has to be taken off the joint's own property.
         crossing_only: bool,
+        /// As of a joint's property: speed of the sum within which a friction turns \[rad/s, m/s\].
+        width: f64,
+    },
+}
+
+/// Friction of a servo that depends on more than its direction and in proportion to its speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ServoFriction {
+    /// torque·exp(−(|q̇|/speed)^exponent)·sign(q̇).
+    Stribeck {
+        /// At rest, on top of Coulomb friction \[N·m, N\].
+        torque: f64,
+        /// Where it has fallen to 1/e \[rad/s, m/s\].
+        speed: f64,
+        /// How sharply it falls.
+        exponent: f64,
+    },
+    /// share·|load|·sign(q̇).
+    Load {
+        /// Share of the torque that goes through the gear.
+        share: f64,
     },
 }
 

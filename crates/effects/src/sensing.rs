@@ -3,6 +3,7 @@
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant};
+use crate::mechanism::{Mechanism, Mechanisms};
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::effect::{EffectParameter, Entry, Evaluator, Needs, Sample};
 use phiw_identification::{Effect, EffectSpec};
@@ -39,6 +40,19 @@ impl EffectKind for TimeDelay {
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         let delay = found.constant(DELAY) + found.value(0);
         format!("The torque of {} is stamped {:.2} ms late.", found.joints(), 1e3 * delay)
+    }
+    /// A torque that is logged before it acts is a command, and its motor is late. One that is logged after
+    /// it has acted is late in the log alone: nothing in a simulator's robot does that.
+    fn mechanisms(&self, found: &FittedEffect<'_>) -> Mechanisms {
+        let late = found.constant(DELAY) + found.value(0);
+        if late > 0.0 {
+            return Mechanisms {
+                parts: Vec::new(),
+                left_out: vec!["a torque that is logged late".to_owned()],
+            };
+        }
+        let delay = |joint: &String| Mechanism::MotorDelay { joint: joint.clone(), delay: -late };
+        Mechanisms { parts: found.joint_names().iter().map(delay).collect(), left_out: Vec::new() }
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let spec = spec(self.name(), tree, site, constants);

@@ -6,7 +6,9 @@
 
 use crate::effect::QuadraticForm;
 use crate::fit::{Fit, TorqueError, merge, torque_error};
+use crate::mirrored::mirror_map;
 use crate::{Design, IdentificationError};
+pub use phiw_consistency::Ellipsoid;
 use phiw_consistency::{
     MatrixTerm, PriorSettings, Problem, PseudoInertia, Settings, Solution, possible_priors,
 };
@@ -21,8 +23,9 @@ use rayon::prelude::*;
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConsistentSettings {
     /// Weights of the prior that are tried, ascending. One is worth one nat of the likelihood for each unit
-    /// of divergence if the samples were independent; they are not, so that the best is mostly above one. On
-    /// the six robots of docs/results/consistent.md it is between the ends of these.
+    /// of divergence if the samples were independent; they are not, so that the best is mostly above one.
+    /// Below the least of these nothing is gained on the robots of docs/results/consistent.md, and bodies
+    /// come so near to the edge of the possible that Rapier refuses one.
     pub weights: Vec<f64>,
     /// The weight where there are too few training folds to leave one out.
     pub default_weight: f64,
@@ -61,6 +64,12 @@ pub enum Known {
     Mass(usize, f64),
     /// Mass of all bodies that move \[kg\].
     TotalMass(f64),
+    /// Of a body, by its index in the tree: all of its mass lies within an ellipsoid in its link's frame, as
+    /// far as its second moments tell (Wensing, Kim & Slotine 2018, equation 21).
+    Inside(usize, Ellipsoid),
+    /// Two bodies, by their indices in the tree, that are mirror images of each other by the plane y = 0 of
+    /// the world, with the robot in its configuration of zeros, wherever along y the plane is.
+    Mirrored(usize, usize),
 }
 
 /// A design fitted to possible bodies and dissipative effects.
@@ -227,6 +236,18 @@ impl<'a> Columns<'a> {
         }
         for known in &settings.known {
             problem = match *known {
+                Known::Inside(body, ellipsoid) => problem.with_ellipsoid(body, &ellipsoid)?,
+                Known::Mirrored(body, image) => {
+                    let mut mirrored = problem;
+                    for (place, row) in mirror_map(tree, body, image).iter().enumerate() {
+                        let own =
+                            |(column, value): (usize, &f64)| (PARAMETERS_PER_BODY * body + column, *value);
+                        let mut coefficients: Vec<(usize, f64)> = row.iter().enumerate().map(own).collect();
+                        coefficients.push((PARAMETERS_PER_BODY * image + place, -1.0));
+                        mirrored = mirrored.with_equality(&coefficients, 0.0)?;
+                    }
+                    mirrored
+                }
                 Known::Mass(body, mass) => {
                     problem.with_equality(&[(PARAMETERS_PER_BODY * body, 1.0)], mass)?
                 }

@@ -22,6 +22,7 @@ mod kept_blocks;
 mod known_payload;
 mod log_file;
 mod log_set;
+mod mirrored;
 mod model_sources;
 mod pairs;
 mod predict;

@@ -1,7 +1,10 @@
 #![doc = include_str!("../README.md")]
 
 mod model;
+mod read;
+mod turning;
 mod write;
 
 pub use model::{FixedTendon, JointModel, RobotModel, impossible_bodies};
+pub use read::{MjcfReadError, MjcfReading, is_mjcf, read_mjcf};
 pub use write::{MjcfError, comment, write_mjcf};

@@ -13,6 +13,9 @@ pub struct JointModel {
     pub damping: f64,
     /// \[N·m, N\].
     pub friction: f64,
+    /// Speed within which the friction turns as tanh(q̇/width) does \[rad/s, m/s\]; zero where it turns at
+    /// once.
+    pub friction_width: f64,
     /// \[N·m/rad, N/m\].
     pub stiffness: f64,
     /// Where the spring is slack \[rad, m\].
@@ -21,6 +24,8 @@ pub struct JointModel {
     pub motor_gain: f64,
     /// Torque of the motor under no command \[N·m, N\].
     pub motor_bias: f64,
+    /// Time from a command to its torque \[s\].
+    pub motor_delay: f64,
 }
 
 impl Default for JointModel {
@@ -30,10 +35,12 @@ impl Default for JointModel {
             armature: 0.0,
             damping: 0.0,
             friction: 0.0,
+            friction_width: 0.0,
             stiffness: 0.0,
             spring_reference: 0.0,
             motor_gain: 1.0,
             motor_bias: 0.0,
+            motor_delay: 0.0,
         }
     }
 }
@@ -52,6 +59,8 @@ pub struct FixedTendon {
     pub damping: f64,
     /// Friction of the sum \[N·m, N\].
     pub friction: f64,
+    /// Speed of the sum within which the friction turns \[rad/s, m/s\].
+    pub friction_width: f64,
 }
 
 /// A robot as it is to be written.

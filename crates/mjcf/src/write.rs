@@ -1,5 +1,6 @@
 //! The text of an MJCF file.
 
+use crate::turning::{Mobility, turning};
 use crate::{FixedTendon, RobotModel};
 use phiw_dynamics::check::check_size;
 use phiw_dynamics::inertia::Inertia;
@@ -32,6 +33,10 @@ pub enum MjcfError {
     },
 }
 
+/// Time step of the file \[s\], MuJoCo's own default.
+pub(crate) const TIMESTEP: f64 = 0.002;
+/// Steps may be as short as this before a motor's memory of its commands is too short for its delay \[s\].
+const SHORTEST_TIMESTEP: f64 = 1e-4;
 /// A limit where a joint has one on its other side only \[rad, m\].
 const FAR: f64 = 1e9;
 
@@ -41,7 +46,7 @@ const FAR: f64 = 1e9;
 /// The lists do not fit the robot, or a number is not finite.
 pub fn write_mjcf(robot: &RobotModel<'_>) -> Result<String, MjcfError> {
     check(robot)?;
-    let mut file = File { robot, text: String::new() };
+    let mut file = File { robot, mobility: Mobility::of(robot)?, text: String::new() };
     file.write();
     Ok(file.text)
 }
@@ -58,18 +63,26 @@ fn check(robot: &RobotModel<'_>) -> Result<(), MjcfError> {
             ("the armature", joint.armature),
             ("the damping", joint.damping),
             ("the friction", joint.friction),
+            ("the friction's width", joint.friction_width),
             ("the stiffness", joint.stiffness),
             ("the spring's reference", joint.spring_reference),
             ("the motor's gain", joint.motor_gain),
             ("the motor's bias", joint.motor_bias),
+            ("the motor's delay", joint.motor_delay),
         ];
         if let Some((what, _)) = numbers.iter().find(|(_, number)| !number.is_finite()) {
             return Err(not_finite(what, &tree.joint(index).joint));
         }
     }
     for tendon in &robot.tendons {
-        let numbers =
-            [tendon.armature, tendon.damping, tendon.friction, tendon.joints[0].1, tendon.joints[1].1];
+        let numbers = [
+            tendon.armature,
+            tendon.damping,
+            tendon.friction,
+            tendon.friction_width,
+            tendon.joints[0].1,
+            tendon.joints[1].1,
+        ];
         if !numbers.iter().all(|number| number.is_finite()) {
             return Err(not_finite("a number", &tendon.name));
         }
@@ -83,6 +96,7 @@ fn check(robot: &RobotModel<'_>) -> Result<(), MjcfError> {
 
 struct File<'a> {
     robot: &'a RobotModel<'a>,
+    mobility: Mobility,
     text: String,
 }
 
@@ -97,7 +111,7 @@ impl File<'_> {
         self.text.push_str(&comment(&self.robot.header));
         self.push(format_args!(
             "<mujoco model=\"{}\">\n  <compiler angle=\"radian\" autolimits=\"false\" inertiafromgeom=\"false\" balanceinertia=\"false\"/>\n  \
-             <option gravity=\"{}\" integrator=\"implicitfast\"/>\n  <worldbody>\n",
+             <option timestep=\"{TIMESTEP}\" gravity=\"{}\" integrator=\"implicitfast\"/>\n  <worldbody>\n",
             Escaped(tree.name()),
             Numbers(&tree.gravity)
         ));
@@ -156,13 +170,15 @@ impl File<'_> {
         if limited && (lower.is_finite() || upper.is_finite()) {
             self.push(format_args!(" limited=\"true\" range=\"{} {}\"", lower.max(-FAR), upper.min(FAR)));
         }
-        let model = self.robot.tree.joint_index(&body.joint).map(|joint| self.robot.joints[joint]);
-        if let Some(model) = model.filter(|_| !body.mimic) {
+        let joint = self.robot.tree.joint_index(&body.joint).filter(|_| !body.mimic);
+        if let Some((joint, model)) = joint.map(|joint| (joint, self.robot.joints[joint])) {
             let attributes =
                 [("armature", model.armature), ("damping", model.damping), ("frictionloss", model.friction)];
             for (name, value) in attributes.iter().filter(|(_, value)| *value != 0.0) {
                 self.push(format_args!(" {name}=\"{value}\""));
             }
+            let mobility = self.mobility.along(&[(joint, 1.0)]);
+            self.text.push_str(&turning(model.friction, model.friction_width, mobility));
             if model.stiffness != 0.0 {
                 let (stiffness, reference) = (model.stiffness, model.spring_reference);
                 self.push(format_args!(" stiffness=\"{stiffness}\" springref=\"{reference}\""));
@@ -176,12 +192,14 @@ impl File<'_> {
             return;
         }
         self.push(format_args!("  <tendon>\n"));
-        for FixedTendon { name, joints, armature, damping, friction } in &self.robot.tendons {
+        for FixedTendon { name, joints, armature, damping, friction, friction_width } in &self.robot.tendons {
             self.push(format_args!("    <fixed name=\"{}\"", Escaped(name)));
             let attributes = [("armature", armature), ("damping", damping), ("frictionloss", friction)];
             for (name, value) in attributes.iter().filter(|(_, value)| **value != 0.0) {
                 self.push(format_args!(" {name}=\"{value}\""));
             }
+            let mobility = self.mobility.along(joints);
+            self.text.push_str(&turning(*friction, *friction_width, mobility));
             self.push(format_args!(">\n"));
             for &(joint, factor) in joints {
                 let joint = Escaped(&self.robot.tree.joint(joint).joint);
@@ -224,6 +242,11 @@ impl File<'_> {
             ));
             if model.motor_bias != 0.0 {
                 self.push(format_args!(" biastype=\"affine\" biasprm=\"{} 0 0\"", model.motor_bias));
+            }
+            if model.motor_delay > 0.0 {
+                let samples = (model.motor_delay / SHORTEST_TIMESTEP).ceil() + 2.0;
+                let delay = model.motor_delay;
+                self.push(format_args!(" delay=\"{delay}\" nsample=\"{samples}\" interp=\"linear\""));
             }
             let effort = body.limits.effort;
             if effort.is_finite() && effort > 0.0 {
@@ -275,7 +298,7 @@ fn quaternion(rotation: Mat3<f64>) -> [f64; 4] {
 }
 
 /// Numbers with all their digits, separated by spaces.
-struct Numbers<'a>(&'a [f64]);
+pub(crate) struct Numbers<'a>(pub &'a [f64]);
 
 impl Display for Numbers<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -287,7 +310,7 @@ impl Display for Numbers<'_> {
 }
 
 /// A name inside quotes of XML.
-struct Escaped<'a>(&'a str);
+pub(crate) struct Escaped<'a>(pub &'a str);
 
 impl Display for Escaped<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -106,6 +106,7 @@ fn mujoco_finds_the_torques_of_couplings_and_friction() {
                 armature: random.uniform(0.0, 0.1),
                 damping: random.uniform(0.0, 1.0),
                 friction: 0.0,
+                friction_width: 0.0,
             })
             .collect();
         check(&model, &mut random);
@@ -159,7 +160,56 @@ fn what_does_not_fit_the_robot_is_refused() {
     assert!(write_mjcf(&model).is_err());
     let mut model = RobotModel::new(&tree);
     let joints = [(0, 1.0), (2, 1.0)];
-    model.tendons =
-        vec![FixedTendon { name: "coupling".to_owned(), joints, armature: 0.0, damping: 1.0, friction: 0.0 }];
+    model.tendons = vec![FixedTendon {
+        name: "coupling".to_owned(),
+        joints,
+        armature: 0.0,
+        damping: 1.0,
+        friction: 0.0,
+        friction_width: 0.0,
+    }];
     assert!(write_mjcf(&model).unwrap_err().to_string().contains("joint 2"));
+}
+
+/// With MuJoCo's default softness the friction of a light joint is a damper up to 0.2 rad/s, and an exported
+/// arm moved another way than its model though all torques of fast states agreed.
+#[test]
+fn friction_turns_within_its_own_width_whatever_the_inertia() {
+    for (seed, width) in [(0, 0.002), (1, 0.01), (2, 0.05)] {
+        let tree = robot(seed, 1);
+        let mut model = RobotModel::new(&tree);
+        let friction = 3.0;
+        let q = [0.0];
+        let mut found = [0.0];
+        let mut bare = |model: &RobotModel<'_>, v: f64| {
+            let mut file = read(model)?.unwrap();
+            file.inverse_dynamics(&q, &[v], &[0.0], &mut found).unwrap();
+            Some(found[0])
+        };
+        model.joints[0] = JointModel { armature: 0.01, ..JointModel::default() };
+        let without = model.clone();
+        model.joints[0].friction = friction;
+        model.joints[0].friction_width = width;
+        // The area under 1 − tanh(v/w) is w·ln 2, that under a line twice as much over its end.
+        let end = 2.0 * 2.0_f64.ln() * width;
+        for share in [-1.5, -1.0, -0.5, 0.25, 0.75, 1.0, 2.0] {
+            let Some(whole) = bare(&model, share * end) else { return };
+            let own = whole - bare(&without, share * end).unwrap();
+            let expected = friction * share.clamp(-1.0, 1.0);
+            assert!((own - expected).abs() < 1e-6 * friction, "{own} {expected}, {share} of {end} rad/s");
+        }
+    }
+}
+
+#[test]
+fn a_motor_that_is_late_has_a_memory_as_long_as_its_delay() {
+    let tree = robot(1, 2);
+    let mut model = RobotModel::new(&tree);
+    model.joints[1].motor_delay = 0.0051;
+    let text = write_mjcf(&model).unwrap();
+    assert_eq!(text.matches(" delay=").count(), 1);
+    assert!(text.contains(r#"delay="0.0051" nsample="53" interp="linear""#), "{text}");
+    if let Some(read) = read(&model) {
+        read.unwrap();
+    }
 }

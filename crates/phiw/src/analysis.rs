@@ -4,7 +4,7 @@ use crate::session::Session;
 use crate::traces::Traces;
 use crate::{Error, fingerprint, possible_bodies, warnings};
 use phiw_identification::bandwidth::Bandwidth;
-use phiw_identification::consistent::{Consistent, ConsistentSettings, Known, consistent};
+use phiw_identification::consistent::{Consistent, ConsistentSettings, Ellipsoid, Known, consistent};
 use phiw_identification::effect::JointProperty;
 use phiw_identification::fitting::merge;
 use phiw_identification::model::DataFingerprint;
@@ -140,13 +140,21 @@ impl<'a> Analysis<'a> {
 /// What the user knows of the bodies.
 fn known(session: &Session) -> Result<Vec<Known>, Error> {
     let bodies = session.tree.bodies();
+    let body_of = |link: &String| {
+        let links = || bodies.iter().map(|body| body.link.as_str()).collect::<Vec<_>>().join(", ");
+        let body = bodies.iter().position(|body| body.link == *link);
+        body.ok_or_else(|| Error::UnknownLink { link: link.clone(), links: links() })
+    };
     let mut known = Vec::new();
     for (link, mass) in &session.arguments.mass {
-        let Some(body) = bodies.iter().position(|body| body.link == *link) else {
-            let links: Vec<&str> = bodies.iter().map(|body| body.link.as_str()).collect();
-            return Err(Error::UnknownLink { link: link.clone(), links: links.join(", ") });
-        };
-        known.push(Known::Mass(body, *mass));
+        known.push(Known::Mass(body_of(link)?, *mass));
+    }
+    for (link, [x, y, z, a, b, c]) in &session.arguments.inside {
+        let ellipsoid = Ellipsoid { center: [*x, *y, *z], half_axes: [*a, *b, *c] };
+        known.push(Known::Inside(body_of(link)?, ellipsoid));
+    }
+    for (link, image) in &session.arguments.mirrored {
+        known.push(Known::Mirrored(body_of(link)?, body_of(image)?));
     }
     let of_links: f64 = session.arguments.mass.iter().map(|(_, mass)| mass).sum();
     if let Some(total) = session.arguments.total_mass {

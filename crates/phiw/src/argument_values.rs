@@ -24,6 +24,32 @@ pub fn known_mass(text: &str) -> Result<(String, f64), String> {
     Ok((link.trim().to_owned(), positive(mass.trim())?))
 }
 
+/// `LINK=X Y Z A B C`: a centre, and half axes above zero.
+pub fn inside(text: &str) -> Result<(String, [f64; 6]), String> {
+    let wrong = || {
+        format!(
+            "`{text}` is not LINK=X Y Z A B C: centre and half axes of an ellipsoid (m), the latter above zero"
+        )
+    };
+    let (link, numbers) = text.split_once('=').ok_or_else(wrong)?;
+    let numbers: Vec<f64> =
+        numbers.split_whitespace().map(str::parse).collect::<Result<_, _>>().map_err(|_| wrong())?;
+    let numbers = <[f64; 6]>::try_from(numbers).map_err(|_| wrong())?;
+    let is_fine =
+        numbers.iter().all(|number| number.is_finite()) && numbers[3..].iter().all(|half| *half > 0.0);
+    if is_fine { Ok((link.trim().to_owned(), numbers)) } else { Err(wrong()) }
+}
+
+/// `NAME=NAME`, two names that differ.
+pub fn two_names(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=').map(|(one, other)| (one.trim(), other.trim())) {
+        Some((one, other)) if one != other && !one.is_empty() && !other.is_empty() => {
+            Ok((one.to_owned(), other.to_owned()))
+        }
+        _ => Err(format!("`{text}` is not LINK=LINK, two different links")),
+    }
+}
+
 /// A number from 0 to 1.
 pub fn share(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {

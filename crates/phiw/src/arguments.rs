@@ -1,7 +1,7 @@
 //! The command line.
 
 pub use crate::argument_values::held_joint;
-use crate::argument_values::{known_mass, positive, quoted, share};
+use crate::argument_values::{inside, known_mass, positive, quoted, share, two_names};
 pub use crate::export::ExportArguments;
 pub use crate::identify_arguments::IdentifyArguments;
 pub use crate::in_memory::InMemory;
@@ -166,7 +166,7 @@ pub struct SimulateArguments {
 /// Arguments of `phiw check`.
 #[derive(Clone, Debug, Args)]
 pub struct CheckArguments {
-    /// The robot's URDF.
+    /// The robot's URDF, or MuJoCo's MJCF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
     /// Logs: CSV, MCAP, ROS bags, LeRobot folders, npz.
@@ -225,7 +225,7 @@ impl CheckArguments {
 /// Arguments of `phiw retarget`.
 #[derive(Clone, Debug, Args)]
 pub struct RetargetArguments {
-    /// The robot's URDF.
+    /// The robot's URDF, or MuJoCo's MJCF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
     /// Recordings: C3D, TRC, BVH (LAFAN1), npz of AMASS or SMPL-X, or CSV of named points (`t`, `<point>.x`,
@@ -267,7 +267,7 @@ pub struct RetargetArguments {
 /// Arguments of `phiw next`.
 #[derive(Clone, Debug, Args)]
 pub struct NextArguments {
-    /// The robot's URDF.
+    /// The robot's URDF, or MuJoCo's MJCF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
     /// Folder of motions to choose from, as `phiw retarget` writes them: logs with q, qd and qdd.
@@ -372,7 +372,7 @@ impl MotionFormat {
 /// Robot, logs and declared model: what every command on measured logs takes.
 #[derive(Clone, Debug, Default, Args, Serialize, Deserialize)]
 pub struct SessionArguments {
-    /// The robot's URDF.
+    /// The robot's URDF, or MuJoCo's MJCF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
     /// Logs that the model is fitted to: CSV, MCAP, ROS bags, LeRobot folders, npz.
@@ -400,6 +400,16 @@ pub struct SessionArguments {
     /// Mass of all links that move, as weighed (kg).
     #[arg(long, value_name = "KG", value_parser = positive)]
     pub total_mass: Option<f64>,
+    /// Ellipsoids that hold all of a link's mass, what is fixed to it included: centre and half axes (m) in
+    /// the frame of its joint, six numbers between blanks: --inside 'upper_arm=0.2 0 0 0.3 0.1 0.1'.
+    #[arg(long, value_name = "LINK=X Y Z A B C,…", value_delimiter = ',', value_parser = inside)]
+    #[serde(default)]
+    pub inside: Vec<(String, [f64; 6])>,
+    /// Links that are mirror images of each other, left and right, with the robot at zero:
+    /// --mirrored left_thigh=right_thigh.
+    #[arg(long, value_name = "LINK=LINK,…", value_delimiter = ',', value_parser = two_names)]
+    #[serde(default)]
+    pub mirrored: Vec<(String, String)>,
     /// Cut-off of the low-pass over positions (Hz); by default chosen from the logs' spectra.
     #[arg(long, value_name = "HZ")]
     pub cutoff_hz: Option<f64>,
@@ -447,6 +457,15 @@ impl SessionArguments {
         option("--hold", list(self.hold.iter().map(held_in_words).collect()));
         option("--mass", list(self.mass.iter().map(|(link, mass)| format!("{link}={mass}")).collect()));
         option("--total-mass", number(self.total_mass));
+        let in_words = |numbers: &[f64; 6]| numbers.map(|number| number.to_string()).join(" ");
+        option(
+            "--inside",
+            list(self.inside.iter().map(|(link, numbers)| format!("{link}={}", in_words(numbers))).collect()),
+        );
+        option(
+            "--mirrored",
+            list(self.mirrored.iter().map(|(link, image)| format!("{link}={image}")).collect()),
+        );
         option("--cutoff-hz", number(self.cutoff_hz));
         option("--parallel-cutoff-hz", number(self.parallel_cutoff_hz));
         option("--out", paths(std::slice::from_ref(&self.out)));

@@ -9,7 +9,7 @@ use crate::console::Console;
 use crate::log_inputs::{read_map, said_of_logs, sources};
 use crate::output::check_folder;
 use crate::warnings::{file_name, of_log, snapped};
-use crate::{Error, session};
+use crate::{Error, robot_file, session};
 use phiw_dynamics::Tree;
 use phiw_identification::checks::{InputError, check_excitation, check_logs, robot_findings};
 use phiw_result_folder::{Disk, Lock, ResultFile, check_inputs, replace_folder};
@@ -64,6 +64,7 @@ pub fn check(arguments: &CheckArguments, console: &Console) -> Result<CheckOutco
     let refused = [check_logs(tree, &surveys, &[]).err(), check_excitation(tree, &surveys).err()];
     let refused: Vec<String> = refused.iter().flatten().map(InputError::to_string).collect();
     let mut notes = Vec::from_iter(snapped(robot.snapped));
+    notes.extend(robot_file::warning(&robot.left_out));
     notes.extend(map.iter().flat_map(|map| said_of_logs(map, &arguments.logs)));
     let checked = Checked { tree, surveys: &surveys, findings: &findings, notes: &notes, refused: &refused };
     let report = report_json::report(&checked);

@@ -55,6 +55,14 @@ pub enum Error {
         /// What is wrong with it.
         source: Box<UrdfError>,
     },
+    /// A robot's file is MJCF, and is not read.
+    #[error("{}: {source}", path.display())]
+    Mjcf {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: Box<phiw_mjcf::MjcfReadError>,
+    },
     /// A plan that cannot be made or used.
     #[error("{}: {source}", path.display())]
     Plan {
@@ -188,8 +196,10 @@ pub enum Error {
         /// The engine.
         backend: &'static str,
     },
-    /// A mass is known of a link that no joint carries.
-    #[error("--mass names the link `{link}`, which no joint that moves carries; those are {links}")]
+    /// Something is known of a link that no joint carries.
+    #[error(
+        "the link `{link}` of --mass, --inside or --mirrored is carried by no joint that moves; those are {links}"
+    )]
     UnknownLink {
         /// What was named.
         link: String,
@@ -406,6 +416,7 @@ impl Error {
             | Error::FactorsTwice { .. }
             | Error::FactorsMissing { .. }
             | Error::Urdf { .. }
+            | Error::Mjcf { .. }
             | Error::FloatingBase { .. }
             | Error::NotAModel { .. }
             | Error::Model { .. }

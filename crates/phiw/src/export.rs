@@ -9,6 +9,8 @@ use crate::identified_urdf::{self, identified_urdf};
 use crate::model_file::ModelFile;
 use crate::model_use::robot;
 use crate::output::check_folder;
+use crate::servo_file::{self, servo_file};
+use crate::training_actuators;
 use clap::Args;
 use phiw_dynamics::urdf::without_geometry;
 use phiw_effects::Catalogue;
@@ -40,6 +42,15 @@ pub struct ExportArguments {
     /// Armature, damping, friction loss and limits of each joint (actuators.csv).
     #[arg(long)]
     pub table: bool,
+    /// The joints as actuators of mjlab (mjlab_actuators.py).
+    #[arg(long)]
+    pub mjlab: bool,
+    /// The joints as actuators of Isaac Lab (isaaclab_actuators.py).
+    #[arg(long)]
+    pub isaaclab: bool,
+    /// The joints as servos of BAM, Better Actuator Models (bam.json).
+    #[arg(long)]
+    pub bam: bool,
     /// Folder for the files; it is made if it is absent.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -71,6 +82,9 @@ pub fn export(arguments: &ExportArguments) -> Result<ExportOutcome, Error> {
         URDF_FILE,
         identified_mjcf::FILE,
         actuator_table::FILE,
+        training_actuators::MJLAB_FILE,
+        training_actuators::ISAAC_LAB_FILE,
+        servo_file::FILE,
     ];
     let outputs: Vec<_> = names.iter().map(|name| arguments.out.join(name)).collect();
     check_inputs(std::slice::from_ref(&arguments.model), &outputs)?;
@@ -82,33 +96,45 @@ pub fn export(arguments: &ExportArguments) -> Result<ExportOutcome, Error> {
     file.own_design(&tree, &catalogue)?;
     let xml = file.model.urdf.as_deref().unwrap_or_default();
     let carried = Carried { tree: &tree, xml, model: &file.model, catalogue: &catalogue };
-    let all = !(arguments.c || arguments.rust || arguments.urdf || arguments.mjcf || arguments.table);
+    let ExportArguments { c, rust, urdf, mjcf, table, mjlab, isaaclab, bam, .. } = *arguments;
+    let all = ![c, rust, urdf, mjcf, table, mjlab, isaaclab, bam].contains(&true);
     let mut files = Vec::new();
     let mut lacking = Vec::new();
     let mut put = |name: &str, text: String, left_out: Vec<String>| {
         files.push(ResultFile::new(name, text));
         lacking.push((name.to_owned(), left_out));
     };
-    if all || arguments.c {
+    if all || c {
         put(generated_code::C_FILE, generated_code::c(carried)?, generated_code::not_expressed(carried));
     }
-    if all || arguments.rust {
+    if all || rust {
         put(
             generated_code::RUST_FILE,
             generated_code::rust(carried)?,
             generated_code::not_expressed(carried),
         );
     }
-    if all || arguments.urdf {
+    if all || urdf {
         let text = without_geometry(&identified_urdf(carried)?);
         let text = text.map_err(|source| Error::IdentifiedUrdf(Box::new(source)))?;
         put(URDF_FILE, text, identified_urdf::not_expressed(carried));
     }
-    if all || arguments.mjcf {
+    if all || mjcf {
         put(identified_mjcf::FILE, identified_mjcf(carried)?, identified_mjcf::not_expressed(carried));
     }
-    if all || arguments.table {
-        put(actuator_table::FILE, actuator_table(carried)?, identified_mjcf::not_expressed(carried));
+    if all || table {
+        put(actuator_table::FILE, actuator_table(carried)?, actuator_table::not_expressed(carried));
+    }
+    if all || mjlab {
+        let left_out = training_actuators::not_expressed(carried);
+        put(training_actuators::MJLAB_FILE, training_actuators::mjlab(carried), left_out);
+    }
+    if all || isaaclab {
+        let left_out = training_actuators::not_expressed(carried);
+        put(training_actuators::ISAAC_LAB_FILE, training_actuators::isaac_lab(carried), left_out);
+    }
+    if all || bam {
+        put(servo_file::FILE, servo_file(carried)?, servo_file::not_expressed(carried));
     }
     replace_folder(&Disk, &place, &files)?;
     Ok(ExportOutcome {

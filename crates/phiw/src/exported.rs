@@ -104,19 +104,41 @@ impl Exported {
         exported
     }
 
+    /// What MJCF can express but a table of drives cannot, in words: springs, motors that do not deliver
+    /// their command, shared transmissions.
+    pub fn beyond_a_drive(&self, carried: Carried<'_>) -> Vec<String> {
+        let mut beyond = LeftOut::default();
+        for (index, joint) in self.joints.iter().enumerate() {
+            let name = std::slice::from_ref(&carried.tree.joint(index).joint);
+            if joint.stiffness != 0.0 {
+                beyond.add("spring".to_owned(), name);
+            }
+            if joint.motor_gain != 1.0 || joint.motor_bias != 0.0 {
+                beyond.add("gain and bias of the motor".to_owned(), name);
+            }
+        }
+        for tendon in &self.tendons {
+            let names = tendon.joints.map(|(joint, _)| carried.tree.joint(joint).joint.clone());
+            beyond.add("shared transmission".to_owned(), &names);
+        }
+        beyond.in_words()
+    }
+
     /// Takes a part of one joint; `false` if MJCF has no such value.
     fn of_joint(&mut self, carried: Carried<'_>, part: &Mechanism) -> bool {
         let tree = carried.tree;
         let (Mechanism::Joint { joint, .. }
         | Mechanism::Spring { joint, .. }
-        | Mechanism::Motor { joint, .. }) = part
+        | Mechanism::Motor { joint, .. }
+        | Mechanism::MotorDelay { joint, .. }) = part
         else {
             return false;
         };
         let Some(model) = tree.joint_index(joint).map(|joint| &mut self.joints[joint]) else { return false };
         match *part {
-            Mechanism::Joint { property, value, .. } if value >= 0.0 => {
-                *property_of(model, property) += value
+            Mechanism::Joint { property, value, width, .. } if value >= 0.0 => {
+                *property_of(model, property) += value;
+                model.friction_width = model.friction_width.max(width);
             }
             Mechanism::Spring { stiffness, reference, .. } => {
                 // Two springs are one: stiffnesses add, and so do their torques.
@@ -128,6 +150,7 @@ impl Exported {
                 model.motor_gain *= gain;
                 model.motor_bias += bias;
             }
+            Mechanism::MotorDelay { delay, .. } => model.motor_delay += delay,
             _ => return false,
         }
         true
@@ -140,7 +163,7 @@ impl Exported {
         part: &Mechanism,
     ) -> Result<(), (&'static str, Vec<String>)> {
         let tree = carried.tree;
-        let Mechanism::Transmission { joints, factors, property, value, crossing_only } = part else {
+        let Mechanism::Transmission { joints, factors, property, value, crossing_only, width } = part else {
             return Ok(());
         };
         let refused = |why| Err((why, joints.to_vec()));
@@ -171,6 +194,7 @@ impl Exported {
                 armature: 0.0,
                 damping: 0.0,
                 friction: 0.0,
+                friction_width: 0.0,
             });
             self.tendons.len() - 1
         });
@@ -178,7 +202,10 @@ impl Exported {
         match property {
             JointProperty::Armature => tendon.armature += value,
             JointProperty::Damping => tendon.damping += value,
-            JointProperty::Friction => tendon.friction += value,
+            JointProperty::Friction => {
+                tendon.friction += value;
+                tendon.friction_width = tendon.friction_width.max(*width);
+            }
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ use phiw_mjcf::{RobotModel, impossible_bodies, write_mjcf};
 pub const FILE: &str = "identified.xml";
 
 /// The robot with the identified inertial parameters, and what of the effects MuJoCo has: armature, damping,
-/// friction loss, springs, motors, fixed tendons for couplings.
+/// friction loss, springs, motors and their delay, fixed tendons for couplings.
 ///
 /// # Errors
 /// A parameter is not finite.
@@ -16,7 +16,13 @@ pub fn identified_mjcf(carried: Carried<'_>) -> Result<String, Error> {
     let tree = carried.model.consistent_tree(carried.tree)?;
     let exported = Exported::of(carried);
     let mut lines = header(carried, FILE, &exported.left_out);
-    lines.push("Friction loss turns at rest at once; geometry is in identified.urdf.".to_owned());
+    lines.push("At rest friction loss is a soft constraint, as wide as the model's friction turns (0.001 rad/s at least)".to_owned());
+    lines.push("with the time step of this file; geometry is in identified.urdf.".to_owned());
+    if exported.joints.iter().any(|joint| joint.motor_delay > 0.0) {
+        lines.push(
+            "Its motors are late: a MuJoCo that knows no delay of an actuator refuses the file.".to_owned(),
+        );
+    }
     lines.extend(refusal(carried)?);
     let robot = RobotModel { tree: &tree, joints: exported.joints, tendons: exported.tendons, header: lines };
     write_mjcf(&robot).map_err(Error::IdentifiedMjcf)

@@ -26,6 +26,8 @@ impl Args for IdentifyArguments {
             "hold",
             "mass",
             "total_mass",
+            "inside",
+            "mirrored",
             "cutoff_hz",
             "map",
             "parallel_cutoff_hz",

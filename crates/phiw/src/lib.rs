@@ -38,11 +38,14 @@ pub mod possible_bodies;
 pub mod predict;
 pub mod report_json;
 pub mod retarget;
+pub mod robot_file;
+mod servo_file;
 pub mod session;
 pub mod simulate;
 pub mod summary;
 pub mod threads;
 pub mod traces;
+mod training_actuators;
 pub mod warnings;
 
 pub use error::Error;

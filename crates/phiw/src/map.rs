@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Arguments of `phiw map`.
 #[derive(Clone, Debug, Default, Args)]
 pub struct MapArguments {
-    /// The robot's URDF.
+    /// The robot's URDF, or MuJoCo's MJCF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
     /// A log: CSV, MCAP, ROS bag, LeRobot folder, npz, HDF5 or MAT-file.

@@ -11,6 +11,7 @@ use crate::arguments::RetargetArguments;
 use crate::console::Console;
 use crate::input::read_text;
 use crate::output::check_folder;
+use crate::robot_file::as_urdf;
 use batch::stem;
 use phiw_bspline_retarget::human::{MapError, MarkerMap};
 use phiw_bspline_retarget::markers::{MarkerRecording, read_recording};
@@ -43,7 +44,7 @@ pub fn retarget(arguments: &RetargetArguments, console: &Console) -> Result<Reta
     let _place = Lock::acquire(&arguments.out, "phiw retarget")?;
     remove_partial_files(&Disk, &arguments.out);
     let limits = Limits::default();
-    let urdf = read_text(&arguments.urdf, limits.urdf_bytes)?;
+    let urdf = as_urdf(read_text(&arguments.urdf, limits.urdf_bytes)?, &arguments.urdf)?.urdf;
     let options = UrdfOptions { held: arguments.hold.clone(), ..UrdfOptions::default() };
     let reading = read_urdf(&urdf, &options)
         .map_err(|source| Error::Urdf { path: arguments.urdf.clone(), source: Box::new(source) })?;

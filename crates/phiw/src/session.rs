@@ -4,6 +4,7 @@ use crate::Error;
 use crate::arguments::SessionArguments;
 use crate::in_memory::text_of;
 use crate::log_inputs::{read_map, train_and_validate};
+use crate::robot_file::{RobotText, as_urdf};
 use phiw_dynamics::urdf::{Finding, UrdfOptions, UrdfReading, read_urdf};
 use phiw_dynamics::{DimensionError, JointType, Tree};
 use phiw_effects::{Catalogue, SignalRanges};
@@ -29,6 +30,8 @@ pub struct Session {
     pub held: Vec<(String, f64)>,
     /// Number of angles and axes of the URDF that were made exact (see [`UrdfOptions::snap`]).
     pub snapped: usize,
+    /// What of an MJCF file a URDF cannot express, in words.
+    pub left_out: Vec<String>,
     /// Declared effects in the syntax of `--declare`, each kind united, `rigid_body` left out.
     pub declared: Vec<String>,
     /// The kinds that there are.
@@ -81,9 +84,9 @@ impl Session {
         logs: LogSet,
         arguments: SessionArguments,
     ) -> Self {
-        let RobotOfUrdf { tree, xml, findings, held, snapped } = robot;
+        let RobotOfUrdf { tree, xml, findings, held, snapped, left_out } = robot;
         let catalogue = Catalogue::default();
-        Session { tree, xml, findings, held, snapped, declared, catalogue, logs, arguments }
+        Session { tree, xml, findings, held, snapped, left_out, declared, catalogue, logs, arguments }
     }
 
     /// The same error, with the training logs' names if it is about all of them.
@@ -196,6 +199,8 @@ pub(crate) struct RobotOfUrdf {
     pub held: Vec<(String, f64)>,
     /// Number of angles and axes that were made exact.
     pub snapped: usize,
+    /// What of an MJCF file a URDF cannot express, in words.
+    pub left_out: Vec<String>,
 }
 
 impl RobotOfUrdf {
@@ -209,7 +214,9 @@ impl RobotOfUrdf {
 /// The robot of a session.
 pub(crate) fn read_robot(arguments: &SessionArguments) -> Result<RobotOfUrdf, Error> {
     let given = arguments.in_memory.urdf.as_ref();
-    robot_of(text_of(given, &arguments.urdf, Limits::default().urdf_bytes)?, arguments)
+    let text = text_of(given, &arguments.urdf, Limits::default().urdf_bytes)?;
+    let RobotText { urdf, left_out } = as_urdf(text, &arguments.urdf)?;
+    Ok(RobotOfUrdf { left_out, ..robot_of(urdf, arguments)? })
 }
 
 /// The robot of a session, given the text of its URDF.
@@ -222,5 +229,5 @@ pub(crate) fn robot_of(xml: String, arguments: &SessionArguments) -> Result<Robo
         return Err(Error::FloatingBase { path: path() });
     }
     let UrdfReading { tree, findings, held, snapped } = reading;
-    Ok(RobotOfUrdf { tree, xml, findings, held, snapped })
+    Ok(RobotOfUrdf { tree, xml, findings, held, snapped, left_out: Vec::new() })
 }

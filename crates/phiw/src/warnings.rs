@@ -1,5 +1,6 @@
 //! What a reader should know before trusting a number.
 
+use crate::robot_file;
 use crate::session::Session;
 use phiw_identification::Identified;
 use phiw_telemetry::segments::GapReason;
@@ -21,6 +22,7 @@ pub fn all(session: &Session, identified: &Identified) -> Vec<String> {
         })
         .collect();
     warnings.extend(snapped(session.snapped));
+    warnings.extend(robot_file::warning(&session.left_out));
     warnings.extend(twice_in_training(logs.training()));
     warnings.extend(logs.surveys().iter().flat_map(of_log));
     warnings.extend(crate::check::warnings(&session.tree, logs.surveys()));

@@ -71,13 +71,21 @@ fn exported_c_gives_the_torques_of_the_possible_bodies_and_their_effects() {
         ["viscous_friction", "coulomb_friction", "rotor_inertia", "torque_offset", "load_dependent_friction"];
     let folder = identified(&declare);
     export(folder.path(), &[]).success();
-    let names =
-        ["actuators.csv", "bodies.urdf", "identified.xml", "inverse_dynamics.c", "inverse_dynamics.rs"];
+    let names = [
+        "actuators.csv",
+        "bam.json",
+        "bodies.urdf",
+        "identified.xml",
+        "inverse_dynamics.c",
+        "inverse_dynamics.rs",
+        "isaaclab_actuators.py",
+        "mjlab_actuators.py",
+    ];
     assert_eq!(files(folder.path()), names);
     let text = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     assert!(!text("carried/bodies.urdf").contains("package://"));
     assert!(text("out/identified.urdf").contains("package://"));
-    assert!(text("carried/actuators.csv").lines().nth(3).unwrap().ends_with(",0,0,30,4"));
+    assert!(text("carried/actuators.csv").lines().nth(3).unwrap().ends_with(",30,4"));
 
     let model: Model = serde_json::from_str(&text("out/model.json")).unwrap();
     let tree = read_urdf(synthetic::URDF, &UrdfOptions::default()).unwrap().tree;
@@ -158,4 +166,64 @@ fn a_wrong_model_writes_nothing() {
     let said = String::from_utf8_lossy(&failed.get_output().stderr).into_owned();
     assert!(said.contains("out/model.json") && said.trim().lines().count() == 1, "{said}");
     assert!(!folder.path().join("carried/inverse_dynamics.c").exists());
+}
+
+/// Puts a made-up class in the place of a library's, and prints what a file makes of it.
+const CONFIGURATIONS: &str = r#"
+import json, runpy, sys
+class Kind(dict):
+    max_delay = 0
+    def __init__(self, **fields): super().__init__(fields)
+made = runpy.run_path(sys.argv[1])["configurations"](Kind, 0.002, stiffness=20.0)
+print(json.dumps(list(made.values()) if isinstance(made, dict) else list(made)))
+"#;
+
+#[test]
+fn training_libraries_and_bam_are_given_what_each_joint_has() {
+    let declare =
+        ["viscous_friction", "coulomb_friction", "rotor_inertia", "load_dependent_friction:joint_2"];
+    let folder = identified(&declare);
+    // A delay that was found is put into the file: the log has none.
+    let path = folder.path().join("out/model.json");
+    let mut model: Model = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    let mut effect = model.effects[0].clone();
+    effect.spec = phiw_identification::EffectSpec::new("time_delay", &["joint_1"]).with("delay", 0.0);
+    effect.parameters[0].name = "delay".to_owned();
+    model.effects.push(effect);
+    model.consistent.as_mut().unwrap().effects.push(vec![-0.0061]);
+    std::fs::write(&path, serde_json::to_string(&model).unwrap()).unwrap();
+    let done = export(folder.path(), &["--mjlab", "--isaaclab", "--bam"]).success();
+    assert_eq!(files(folder.path()), ["bam.json", "isaaclab_actuators.py", "mjlab_actuators.py"]);
+    let said = String::from_utf8_lossy(&done.get_output().stdout).into_owned();
+    assert!(said.contains("mjlab_actuators.py cannot express load_dependent_friction of joint_2"), "{said}");
+    assert!(said.contains("bam.json cannot express actuator, kt and R of every servo"), "{said}");
+    let value = |kind: &str, joint: &str| {
+        let is_it = |spec: &phiw_identification::EffectSpec| spec.kind == kind && spec.joints == [joint];
+        let at = model.effects.iter().position(|effect| is_it(&effect.spec)).unwrap();
+        model.consistent_effect(at, 0).unwrap()
+    };
+    let text = std::fs::read_to_string(folder.path().join("carried/bam.json")).unwrap();
+    let bam: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let servo = &bam["joints"]["joint_2"];
+    assert_eq!(servo["model"], "m3");
+    assert_eq!(servo["friction_base"], value("coulomb_friction", "joint_2"));
+    assert_eq!(servo["load_friction_base"], 0.5 * value("load_dependent_friction", "joint_2"));
+    assert_eq!(bam["joints"]["joint_1"]["command_delay"], 0.0061);
+    assert_eq!(bam["joints"]["joint_1"]["model"], "m1");
+
+    for (file, friction, damping, lag) in [
+        ("mjlab_actuators.py", "frictionloss", "viscous_damping", "delay_max_lag"),
+        ("isaaclab_actuators.py", "friction", "viscous_friction", "max_delay"),
+    ] {
+        let file = folder.path().join("carried").join(file);
+        let ran = std::process::Command::new("python3").args(["-c", CONFIGURATIONS]).arg(&file).output();
+        let Ok(ran) = ran else { return println!("skipped: no python3") };
+        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+        let made: serde_json::Value = serde_json::from_slice(&ran.stdout).unwrap();
+        assert_eq!(made[1][friction], value("coulomb_friction", "joint_2"));
+        assert_eq!(made[1][damping], value("viscous_friction", "joint_2"));
+        assert_eq!(made[1]["armature"], value("rotor_inertia", "joint_2"));
+        assert_eq!(made[1]["stiffness"], 20.0);
+        assert_eq!((&made[0][lag], made[1].get(lag)), (&serde_json::Value::from(3), None));
+    }
 }

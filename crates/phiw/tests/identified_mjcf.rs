@@ -146,3 +146,39 @@ fn meshes_that_are_nowhere_stop_nothing() {
     }
     assert!(text(&folder, "identified.urdf").contains("package://nowhere/arm.dae"));
 }
+
+/// MuJoCo's own files are as good as URDFs wherever a robot is asked for.
+#[test]
+fn a_robot_of_mjcf_is_identified_like_that_of_its_urdf() {
+    let tree = synthetic::tree();
+    let mut robot = phiw_mjcf::RobotModel::new(&tree);
+    robot.joints[1].armature = 0.2;
+    let mjcf = phiw_mjcf::write_mjcf(&robot).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    synthetic::recording(1, 40.0).write_csv(&path("train.csv")).unwrap();
+    let identified = |name: &str, text: &str| {
+        std::fs::write(path(name), text).unwrap();
+        let arguments = SessionArguments {
+            urdf: path(name),
+            train: vec![path("train.csv")],
+            declare: vec!["viscous_friction".to_owned()],
+            out: path(&format!("{name} out")),
+            ..SessionArguments::default()
+        };
+        identify(&arguments, &Console::silent()).unwrap();
+        let text = |file: &str| std::fs::read_to_string(path(&format!("{name} out")).join(file)).unwrap();
+        (text("report.json"), serde_json::from_str::<Model>(&text("model.json")).unwrap())
+    };
+    let (_, of_urdf) = identified("robot.urdf", synthetic::URDF);
+    let (report, of_mjcf) = identified("robot.xml", &mjcf);
+    assert!(report.contains("armature of joint_2 (declare rotor_inertia)"), "{report}");
+    assert_eq!(of_urdf.joints, of_mjcf.joints);
+    for (one, other) in of_urdf.residual_std.iter().zip(&of_mjcf.residual_std) {
+        assert!((one - other).abs() < 1e-9 * one, "{one} {other}");
+    }
+    // The model is kept with a URDF, which can be read again.
+    let kept = of_mjcf.urdf.unwrap();
+    assert!(kept.contains("left out: armature of joint_2"));
+    assert_eq!(read_urdf(&kept, &UrdfOptions::default()).unwrap().tree.joint_count(), 3);
+}

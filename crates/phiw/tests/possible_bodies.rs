@@ -131,3 +131,40 @@ fn known_masses_are_those_of_the_bodies() {
     assert!(refused(&[("tool", 1.0)], None).contains("those are link_1, link_2, link_3"));
     assert!(refused(&[("link_2", 3.0)], Some(2.0)).contains("leaves nothing"));
 }
+
+/// Where a link's mass must lie, and which links are mirror images, holds for the bodies that are written.
+#[test]
+fn bodies_lie_inside_their_ellipsoids_and_mirror_each_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("robot.urdf"), synthetic::URDF).unwrap();
+    synthetic::recording(1, 20.0).write_csv(&path("train.csv")).unwrap();
+    let arguments = |inside: &str, mirrored: &[(&str, &str)]| SessionArguments {
+        urdf: path("robot.urdf"),
+        train: vec![path("train.csv")],
+        declare: vec!["viscous_friction".to_owned()],
+        inside: vec![(inside.to_owned(), [0.1, 0.0, 0.0, 0.2, 0.05, 0.05])],
+        mirrored: mirrored.iter().map(|&(link, image)| (link.to_owned(), image.to_owned())).collect(),
+        out: path("out"),
+        ..SessionArguments::default()
+    };
+    let bodies = |arguments: &SessionArguments| {
+        let outcome = identify(arguments, &Console::silent()).unwrap();
+        assert!(outcome.report.phiw.unwrap().consistency.unwrap().certified);
+        let tree = read_urdf_file(path("out/identified.urdf"), &UrdfOptions::default()).unwrap().tree;
+        assert_eq!(impossible_bodies(&tree.inertial_parameters()), [0; 0]);
+        tree.bodies().iter().map(|body| body.inertial).collect::<Vec<_>>()
+    };
+    let [m, hx, hy, hz, xx, _, yy, _, _, zz] = bodies(&arguments("link_3", &[]))[2];
+    let half_trace = 0.5 * (xx + yy + zz);
+    // ∫ 1 − Σ((r − c)/a)² dm ≥ 0, with the second moments about the joint's origin.
+    let x = (half_trace - xx - 0.2 * hx + 0.01 * m) / 0.04;
+    let across = (half_trace - yy + half_trace - zz) / 0.0025;
+    assert!(m - x - across > -1e-9 * m, "{m} {x} {across} {hy} {hz}");
+    // At zero the frames of these two are turned by half a radian against each other: their masses must
+    // agree.
+    let found = bodies(&arguments("link_3", &[("link_2", "link_1")]));
+    assert!((found[0][0] - found[1][0]).abs() < 1e-9, "{found:?}");
+    let refused = identify(&arguments("tool", &[]), &Console::silent()).err().unwrap();
+    assert!(refused.to_string().contains("those are link_1, link_2, link_3"));
+}

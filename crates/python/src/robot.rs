@@ -4,6 +4,7 @@ use crate::arrays::{Array, Doubles, Pickled, States, array, same_count};
 use crate::batch::{LANES, Lane, put};
 use crate::hold::hold;
 use crate::kernel::{over_arrays, wrong_size};
+use phiw::robot_file::{RobotText, as_urdf};
 use phiw_dynamics::inertia::PARAMETER_NAMES;
 use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
 use phiw_dynamics::scalar::Lanes;
@@ -377,11 +378,15 @@ impl Robot {
         floating_base: bool,
     ) -> PyResult<Self> {
         let options = UrdfOptions { held: hold.clone(), floating_base, ..UrdfOptions::default() };
+        let file = path.clone().unwrap_or_else(|| PathBuf::from("the MJCF text"));
+        let RobotText { urdf: xml, left_out } =
+            as_urdf(xml, &file).map_err(|error| PyValueError::new_err(error.to_string()))?;
         let UrdfReading { tree, findings, held, .. } = read_urdf(&xml, &options).map_err(|error| {
             let place = path.as_ref().map_or("the URDF".to_owned(), |path| path.display().to_string());
             PyValueError::new_err(format!("{place}: {error}"))
         })?;
-        let findings = findings.iter().map(|finding| finding.to_string()).collect();
+        let left_out = left_out.into_iter().map(|line| format!("left out of the MJCF file: {line}"));
+        let findings = findings.iter().map(|finding| finding.to_string()).chain(left_out).collect();
         let regressor = JointTorqueRegressor::new(&tree);
         Ok(Robot { tree, xml, path, hold, held, findings, floating_base, regressor })
     }

@@ -18,8 +18,15 @@ impl MjcfFile {
     /// # Errors
     /// MuJoCo is not found, or refuses the text; [`MujocoError::Layout`] if it has other bodies or joints.
     pub fn read(text: &str, tree: &Tree) -> Result<Self, MujocoError> {
-        let joints = tree.bodies().len();
-        let sizes = Sizes { positions: joints, velocities: joints, bodies: joints };
+        Self::read_sized(text, tree.bodies().len(), tree.bodies().len())
+    }
+
+    /// Reads the text of a file with this many joints and bodies, of hinges and slides alone.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_sized(text: &str, joints: usize, bodies: usize) -> Result<Self, MujocoError> {
+        let sizes = Sizes { positions: joints, velocities: joints, bodies };
         Ok(MjcfFile { simulation: Simulation::of_text(text, sizes)?, joints })
     }
 

@@ -6,16 +6,17 @@
 use super::UrdfError;
 use phiw_limits::Limits;
 
-/// Checks the text against the limits.
+/// Checks the text of a URDF, or of another description of a robot in XML, against the limits, before a
+/// parser sees it.
 ///
 /// # Errors
 /// [`UrdfError::TooMuch`].
-pub(super) fn check(text: &str, limits: &Limits) -> Result<(), UrdfError> {
+pub fn check(text: &str, limits: &Limits) -> Result<(), UrdfError> {
     let size = text.len() as u64;
     if size > limits.urdf_bytes {
         return Err(UrdfError::TooMuch {
             line: 1,
-            what: format!("the URDF has {size} bytes, more than {}", limits.urdf_bytes),
+            what: format!("the file has {size} bytes, more than {}", limits.urdf_bytes),
         });
     }
     let bytes = text.as_bytes();

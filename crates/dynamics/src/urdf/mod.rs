@@ -26,6 +26,7 @@ mod write;
 pub use bodies_only::without_geometry;
 pub use error::UrdfError;
 pub use finding::Finding;
+pub use guard::check as check_xml;
 pub use write::{JointFriction, write_identified_urdf};
 
 use crate::Tree;

@@ -1,5 +1,6 @@
 //! The files of an identified robot: what MuJoCo, Pinocchio and Rapier make of them.
 
+use super::driven;
 use super::generated::{self, Run};
 use super::python::Python;
 use crate::consistent::robots::{Robot, robots};
@@ -15,7 +16,7 @@ use phiw_dynamics::{AnalyticBackend, DynamicsBackend, Tree, Workspace, World};
 use phiw_effects::Catalogue;
 use phiw_identification::effect::JointProperty;
 use phiw_identification::reproduction::{Plant, ReproductionSettings, Window, reproduce};
-use phiw_identification::{EffectCatalogue, Model, predict};
+use phiw_identification::{Design, EffectCatalogue, Model, predict};
 use phiw_sim_rapier::RapierBackend;
 use phiw_telemetry::Block;
 use serde::{Deserialize, Serialize};
@@ -32,6 +33,8 @@ const LATEST: &str = "mujoco\n";
 const TOLERANCE: f64 = 1e-9;
 /// The same of generated code.
 const CODE_TOLERANCE: f64 = 1e-12;
+/// The largest error of a motion without friction, over its travel.
+const MOTION_TOLERANCE: f64 = 1e-3;
 /// Time between two rows of a motion \[s\], and its length \[s\].
 const PERIOD: f64 = 1e-3;
 const STROKE_S: f64 = 0.5;
@@ -65,6 +68,9 @@ struct Answer {
     least: f64,
     #[serde(default)]
     motion: Option<Motion>,
+    /// The same motion with no dry friction in the file.
+    #[serde(default)]
+    without_friction: Option<Motion>,
 }
 
 /// A motion that MuJoCo has made of the file, a row each [`PERIOD`].
@@ -84,9 +90,11 @@ struct Motions {
 }
 
 /// An identified robot.
-struct Identified {
-    tree: Tree,
-    model: Model,
+pub(super) struct Identified {
+    /// With its possible bodies.
+    pub(super) tree: Tree,
+    pub(super) model: Model,
+    /// `identified.urdf`.
     urdf: String,
 }
 
@@ -103,7 +111,7 @@ pub fn compare(python: &str, workspace: &Path, seed: u64) -> anyhow::Result<bool
     }
     println!("Identified with {}; {STATES} states, {POSES} poses, seed {seed}\n", DECLARED.join(", "));
     println!(
-        "| robot | possible bodies | program, file | largest difference of a torque | least eigenvalue of M(q) over the largest | motion, error over travel |\n|---|--:|---|--:|--:|--:|"
+        "| robot | possible bodies | program, file | largest difference of a torque | least eigenvalue of M(q) over the largest | motion, error over travel | the same without friction |\n|---|--:|---|--:|--:|--:|--:|"
     );
     let (mut agrees, mut times) = (true, Vec::new());
     for robot in robots(&workspace.join("../shared/data/logs"))? {
@@ -113,6 +121,7 @@ pub fn compare(python: &str, workspace: &Path, seed: u64) -> anyhow::Result<bool
         "\n| robot | joints | lines of C | C, largest difference | Rust, largest difference | ours, bodies alone, ns | C, ns | Rust, ns |\n|---|--:|--:|--:|--:|--:|--:|--:|"
     );
     times.iter().for_each(|line| println!("{line}"));
+    agrees &= driven::compare(&pythons, seed)?;
     let verdict = if agrees { "All agree" } else { "NOT all agree" };
     println!("\n{verdict} to {TOLERANCE:.0e}; every M(q) must be positive definite, every body possible.");
     Ok(agrees)
@@ -125,8 +134,8 @@ fn robot_agrees(
     times: &mut Vec<String>,
 ) -> anyhow::Result<bool> {
     let folder = tempfile::tempdir()?;
-    let identified = identified(robot, folder.path())?;
-    let Identified { tree, model, urdf } = &identified;
+    let identified = identified(robot, &DECLARED, folder.path())?;
+    let Identified { tree, urdf, .. } = &identified;
     let files = read_urdf(urdf, &UrdfOptions::default())?.tree;
     let impossible = phiw_mjcf::impossible_bodies(&files).len();
     let bodies = files.bodies().len();
@@ -134,7 +143,7 @@ fn robot_agrees(
     let joints = tree.joint_count();
     // Other programs take a URDF's angles as they are written.
     let of_urdf = torques_of_urdf(&identified, &files, &motions)?;
-    let of_model = torques_of_model(tree, model, &motions)?;
+    let of_model = torques_of_model(&identified, &motions)?;
     let mut answers = vec![in_rapier(&files, &motions)?];
     write_case(folder.path(), tree, &motions)?;
     for python in pythons {
@@ -153,24 +162,33 @@ fn robot_agrees(
         let ours = if answer.reader.ends_with("MJCF") { &of_model } else { &of_urdf };
         ensure!(answer.torque.len() == ours.len(), "{} answers with other torques", answer.reader);
         let difference = difference(ours, &answer.torque, joints);
-        let motion = answer.motion.map(|motion| motion_error(&identified, motion)).transpose()?;
-        let told = motion.map_or(String::new(), |error| format!("{:.2} %", 100.0 * error));
-        println!("{name} | {difference:.1e} | {:.1e} | {told} |", answer.least);
+        let error = |motion: Option<Motion>, friction| {
+            motion.map(|motion| motion_error(&identified, motion, friction)).transpose()
+        };
+        let with_friction = error(answer.motion, true)?;
+        let without = error(answer.without_friction, false)?;
+        let told =
+            |error: Option<f64>| error.map_or(String::new(), |error| format!("{:.3} %", 100.0 * error));
+        let motions = format!("{} | {}", told(with_friction), told(without));
+        println!("{name} | {difference:.1e} | {:.1e} | {motions} |", answer.least);
         agrees &= difference < TOLERANCE && answer.least > 0.0;
+        agrees &= without.is_none_or(|error| error < MOTION_TOLERANCE);
     }
     Ok(agrees)
 }
 
 /// How far our own model goes another way than MuJoCo's, under the same torques from the same state: RMS over
-/// the joints of the position's error after [`STROKE_S`], over their travel. It is told, not judged: MuJoCo's
-/// friction is soft, and ours turns within a width.
-fn motion_error(identified: &Identified, motion: Motion) -> anyhow::Result<f64> {
+/// the joints of the position's error after [`STROKE_S`], over their travel. With friction it is told, not
+/// judged: MuJoCo's turns in a straight line, ours as a hyperbolic tangent, and nothing holds the two
+/// together.
+fn motion_error(identified: &Identified, motion: Motion, friction: bool) -> anyhow::Result<f64> {
     let Identified { tree, model, .. } = identified;
     let joints = tree.joint_count();
-    let (design, mut parameters) = model.design(tree, &Catalogue::default())?;
-    for effect in 0..design.effects().len() {
-        for (at, parameter) in design.effect_parameters(effect).enumerate() {
-            parameters[parameter] = model.consistent_effect(effect, at).context("an effect of the model")?;
+    let catalogue = Catalogue::default();
+    let (design, mut parameters) = possible_design(identified)?;
+    for (effect, spec) in model.effects.iter().map(|effect| &effect.spec).enumerate() {
+        if !friction && catalogue.joint_property(spec) == Some(JointProperty::Friction) {
+            parameters[design.effect_parameters(effect)].fill(0.0);
         }
     }
     let Motion { q, v, torque } = motion;
@@ -186,6 +204,18 @@ fn motion_error(identified: &Identified, motion: Motion) -> anyhow::Result<f64> 
         || Ok(Plant::new(Box::new(AnalyticBackend::new(tree.clone()))).with_effects(&design, &parameters)?);
     let growth = reproduce(&plant, &[window], &travel, None, &settings)?;
     growth.share_of_travel.last().copied().context("a horizon")
+}
+
+/// The model's design with the effects of its possible bodies.
+pub(super) fn possible_design(identified: &Identified) -> anyhow::Result<(Design, Vec<f64>)> {
+    let Identified { tree, model, .. } = identified;
+    let (design, mut parameters) = model.design(tree, &Catalogue::default())?;
+    for effect in 0..design.effects().len() {
+        for (at, parameter) in design.effect_parameters(effect).enumerate() {
+            parameters[parameter] = model.consistent_effect(effect, at).context("an effect of the model")?;
+        }
+    }
+    Ok((design, parameters))
 }
 
 /// Notes how generated code compares; whether its torques are ours.
@@ -231,12 +261,12 @@ fn nanoseconds(tree: &Tree, motions: &Motions) -> anyhow::Result<f64> {
 }
 
 /// Identifies the robot; its files go into `out` of the folder, and beside it as the script reads them.
-fn identified(robot: &Robot, folder: &Path) -> anyhow::Result<Identified> {
+pub(super) fn identified(robot: &Robot, declared: &[&str], folder: &Path) -> anyhow::Result<Identified> {
     let arguments = SessionArguments {
         urdf: robot.urdf.clone(),
         train: robot.train.clone(),
         validate: robot.validate.clone(),
-        declare: DECLARED.map(str::to_owned).to_vec(),
+        declare: declared.iter().map(|kind| (*kind).to_owned()).collect(),
         out: folder.join("out"),
         ..SessionArguments::default()
     };
@@ -315,14 +345,10 @@ fn torques_of_urdf(identified: &Identified, files: &Tree, motions: &Motions) -> 
 
 /// All of the model: its possible bodies, and the columns of its effects. Bodies go round base parameters,
 /// whose map leaves out what motion hardly tells.
-fn torques_of_model(tree: &Tree, model: &Model, motions: &Motions) -> anyhow::Result<Vec<f64>> {
-    let (design, mut parameters) = model.design(tree, &Catalogue::default())?;
+fn torques_of_model(identified: &Identified, motions: &Motions) -> anyhow::Result<Vec<f64>> {
+    let tree = &identified.tree;
+    let (design, mut parameters) = possible_design(identified)?;
     parameters[..design.base().count()].fill(0.0);
-    for effect in 0..design.effects().len() {
-        for (at, parameter) in design.effect_parameters(effect).enumerate() {
-            parameters[parameter] = model.consistent_effect(effect, at).context("an effect of the model")?;
-        }
-    }
     let joints = tree.joint_count();
     let bodies = torques(&mut AnalyticBackend::new(tree.clone()), motions)?;
     let mut torques = Vec::with_capacity(motions.q.len());
@@ -352,7 +378,14 @@ fn in_rapier(read: &Tree, motions: &Motions) -> anyhow::Result<Answer> {
     for pose in motions.poses.chunks(joints) {
         least = least.min(least_eigenvalue(&mut backend, pose)?);
     }
-    Ok(Answer { reader: "Rapier, URDF".to_owned(), refused: None, torque, least, motion: None })
+    Ok(Answer {
+        reader: "Rapier, URDF".to_owned(),
+        refused: None,
+        torque,
+        least,
+        motion: None,
+        without_friction: None,
+    })
 }
 
 /// The least eigenvalue over the largest of the mass matrix, whose columns are what unit accelerations need.

@@ -66,10 +66,12 @@ class InMujoco:
         return 0.5 * (matrix + matrix.T)
 
 
-    def motion(self, start):
+    def motion(self, start, with_friction):
         """Half a stroke of every joint under the torques that it needs, without a controller: positions, velocities
-        and torques, a row each PERIOD."""
+        and torques, a row each PERIOD. Without friction it is what the bodies and dampers do by themselves."""
         mujoco, model = self.mujoco, self.model
+        if not with_friction:
+            model.dof_frictionloss[:] = 0
         flags = mujoco.mjtDisableBit
         free = int(flags.mjDSBL_LIMIT) | int(flags.mjDSBL_CONTACT)
         model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, PERIOD / STEPS
@@ -139,7 +141,8 @@ def answer(reader, file, joints, states, poses):
     torques = [robot.torque(*state).tolist() for state in zip(*states)]
     found = {"torque": sum(torques, []), "least": least_eigenvalue([robot.mass_matrix(q) for q in poses])}
     if file.suffix == ".xml":
-        found["motion"] = robot.motion(states[0][0])
+        found["motion"] = robot.motion(states[0][0], True)
+        found["without_friction"] = robot.motion(states[0][0], False)
     return found
 
 

@@ -35,6 +35,7 @@ mod c3d;
 mod case;
 mod comparison;
 mod consistency;
+mod driven;
 mod export;
 mod formats;
 mod generated;

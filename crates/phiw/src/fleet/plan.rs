@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 /// Arguments of `phiw plan`.
 #[derive(Clone, Debug, Default, Args)]
 pub struct PlanArguments {
-    /// The robot's URDF.
+    /// The robot's URDF, or MuJoCo's MJCF.
     #[arg(long, value_name = "ROBOT.urdf")]
     pub urdf: PathBuf,
     /// Logs that the model is fitted to: CSV, MCAP, ROS bags, LeRobot folders, npz.
