@@ -3,13 +3,19 @@
 use super::body_prior::BodyPrior;
 use super::in_order::{Colour, InOrder};
 use super::likelihood::column;
+use super::misfit::{TorqueMisfit, misfits};
 use super::profile::{Minimum, Profile};
 use super::sensitivity::Sensitivity;
 use super::settings::NewtonSettings;
+use super::smoothing::{Belief, Smoothed};
 use super::{Estimate, Estimator, Evidence};
-use crate::{EstimationError, RobotModel};
-use faer::Mat;
+use crate::{EstimationError, MotionLog, RobotModel};
+use faer::prelude::Solve;
+use faer::{Mat, Side};
 use phiw_identification::Design;
+use phiw_regressor::factor::Factor;
+use phiw_regressor::least_squares::{Group, GroupedFactor};
+use rayon::prelude::*;
 
 /// [`super::MotionLikelihood`] without being told the noise: its size, its correlation from a period to the
 /// next, and how much of what the log's torque has beside the command moved the robot are found with the
@@ -70,6 +76,12 @@ pub struct ConcentratedSettings {
     /// delivers its command better than to some thousandths, and without a floor a log without noise would
     /// leave no digits for the bodies.
     pub least_noise: f64,
+    /// Times that the motion of encoders is found anew under the estimate, and the estimate after it
+    /// (`smoothing.rs`). Default: 6.
+    pub smoothings: usize,
+    /// What is left of how an acceleration decays within a period, as a torque over the noise's: the belief's
+    /// friction and inertia are not exact. Default: 0.1.
+    pub decay_error: f64,
     /// How minima are found.
     pub newton: NewtonSettings,
 }
@@ -87,6 +99,8 @@ impl Default for ConcentratedSettings {
             settled: 0.005,
             largest_correlation: 0.98,
             least_noise: 3e-3,
+            smoothings: 6,
+            decay_error: 0.1,
             newton: NewtonSettings::default(),
         }
     }
@@ -125,15 +139,39 @@ impl ConcentratedLikelihood {
         evidence: &Evidence,
         parameters: &[f64],
     ) -> Result<Vec<TorqueNoise>, EstimationError> {
-        let parts = self.parts(design, evidence)?;
-        let colours = parts.colours(self, parameters);
-        let std = parts.profile(self, &colours)?.noise(&column(parameters));
-        let noise = |(colour, std): (&Colour, f64)| TorqueNoise {
+        let noise = |(colour, std): (&Colour, &f64)| TorqueNoise {
             std: std / (1.0 - colour.correlation * colour.correlation).sqrt(),
             correlation: colour.correlation,
             felt: colour.felt,
         };
-        Ok(colours.iter().zip(std).map(noise).collect())
+        self.looked_at(design, evidence, parameters, |_, colours, std| {
+            Ok(colours.iter().zip(std).map(noise).collect())
+        })
+    }
+
+    /// The least standard deviation of each parameter at the truth that any estimate without a prior can have,
+    /// one to which the noise is known and the motion exact (Cramér and Rao's bound: the observed information
+    /// of the motions that were measured). NaN where nothing is known of one.
+    ///
+    /// # Errors
+    /// The evidence is not of this design, or its rows were not taken in order.
+    pub fn bound(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        truth: &[f64],
+        noise: &[TorqueNoise],
+    ) -> Result<Vec<f64>, EstimationError> {
+        let parts = self.parts(design, evidence)?;
+        let colour = |noise: &TorqueNoise| Colour { correlation: noise.correlation, felt: noise.felt };
+        let colours: Vec<Colour> = noise.iter().map(colour).collect();
+        let news = |noise: &TorqueNoise| noise.std * (1.0 - noise.correlation * noise.correlation).sqrt();
+        let std: Vec<f64> = noise.iter().map(news).collect();
+        let information = parts.profile(self, &colours)?.information(&column(truth), &std);
+        let unknown = vec![f64::NAN; truth.len()];
+        let Ok(factor) = information.llt(Side::Lower) else { return Ok(unknown) };
+        let covariance = factor.solve(Mat::<f64>::identity(truth.len(), truth.len()));
+        Ok((0..truth.len()).map(|k| covariance[(k, k)].sqrt()).collect())
     }
 
     fn parts<'a>(&self, design: &Design, evidence: &'a Evidence) -> Result<Parts<'a>, EstimationError> {
@@ -149,14 +187,98 @@ impl ConcentratedLikelihood {
             }
         });
         let sensitivities = Sensitivity::all(design, evidence, &self.standing_on)?;
-        let variance = |group: &phiw_regressor::least_squares::Group| {
+        let variance = |group: &Group| {
             let rows = group.factor.rows().max(1) as f64;
             let square = group.factor.right_hand_side_sum_of_squares() / rows;
             (self.settings.least_noise.powi(2) * square).max(f64::MIN_POSITIVE)
         };
         let least_variance = evidence.factor().groups().iter().map(variance).collect();
-        Ok(Parts { in_order, prior, map, sensitivities, least_variance })
+        Ok(Parts { in_order, prior, map, sensitivities, least_variance, spread: None })
     }
+
+    /// What evidence of encoders is of once their motion is as it most likely was under parameters `w`, or as
+    /// it may have been; none where it is not of encoders alone.
+    fn smoothed(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        (w, colours, std): (&[f64], &[Colour], &[f64]),
+        which: Which,
+    ) -> Result<Option<(Evidence, Spread)>, EstimationError> {
+        if evidence.encoder_logs.is_empty() || !self.standing_on.is_empty() {
+            return Ok(None);
+        }
+        let belief = Belief {
+            design,
+            foreseen: &evidence.foreseen,
+            w,
+            colours,
+            std,
+            instant_every_s: evidence.settings.instant_every_s,
+            decay_error: self.settings.decay_error,
+        };
+        let smooth = |(index, log): (usize, &MotionLog)| belief.smoothed(log, index as u64);
+        let smoothed: Result<Vec<_>, EstimationError> =
+            evidence.encoder_logs.par_iter().enumerate().map(smooth).collect();
+        let mut again = Evidence::none(design, evidence.settings)?;
+        let mut spread: Option<Spread> = None;
+        for smoothed in smoothed? {
+            let Some(Smoothed { most_likely, drawn, spread: factors, noise }) = smoothed else {
+                return Ok(None);
+            };
+            again.add(design, if which == Which::MostLikely { &most_likely } else { &drawn })?;
+            match &mut spread {
+                None => spread = Some(Spread { factors, noise }),
+                Some(known) => {
+                    for (known, own) in known.factors.iter_mut().zip(&factors) {
+                        known.merge(own)?;
+                    }
+                    known.noise.iter_mut().flatten().zip(noise.iter().flatten()).for_each(|(a, b)| *a += b);
+                }
+            }
+        }
+        Ok(spread.map(|spread| (again, spread)))
+    }
+
+    /// What the tests of an estimate look at: the evidence, or where it is of encoders alone, a motion that
+    /// their readings leave possible; and the noise under parameters `w`.
+    fn looked_at<T>(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        w: &[f64],
+        look: impl Fn(&Parts<'_>, &[Colour], &[f64]) -> Result<T, EstimationError>,
+    ) -> Result<T, EstimationError> {
+        let mut own: Option<Evidence> = None;
+        for _ in 0..DRAWS {
+            let parts = self.parts(design, own.as_ref().unwrap_or(evidence))?;
+            let colours = parts.colours(self, w);
+            let std = parts.profile(self, &colours)?.noise(&column(w));
+            let drawn = self.smoothed(design, evidence, (w, &colours, &std), Which::Drawn)?;
+            let Some((drawn, _)) = drawn else { break };
+            own = Some(drawn);
+        }
+        let parts = self.parts(design, own.as_ref().unwrap_or(evidence))?;
+        let colours = parts.colours(self, w);
+        let std = parts.profile(self, &colours)?.noise(&column(w));
+        look(&parts, &colours, &std)
+    }
+}
+
+/// Which of the motions that readings leave possible.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Which {
+    MostLikely,
+    Drawn,
+}
+
+/// Times that a motion is drawn anew under the noise of the last, before it is looked at.
+const DRAWS: usize = 3;
+
+/// What the spread of motions that encoders leave possible adds to the squares of each torque.
+struct Spread {
+    factors: Vec<Factor>,
+    noise: Vec<[f64; 3]>,
 }
 
 /// What all rounds share.
@@ -166,11 +288,13 @@ struct Parts<'a> {
     map: Mat<f64>,
     sensitivities: Vec<Sensitivity>,
     least_variance: Vec<f64>,
+    spread: Option<Spread>,
 }
 
 impl Parts<'_> {
     fn colours(&self, estimator: &ConcentratedLikelihood, w: &[f64]) -> Vec<Colour> {
-        self.in_order.colours(w, &self.least_variance, estimator.settings.largest_correlation)
+        let beside = self.spread.as_ref().map_or(&[][..], |spread| &spread.noise);
+        self.in_order.colours(w, &self.least_variance, estimator.settings.largest_correlation, beside)
     }
 
     fn profile(
@@ -178,8 +302,17 @@ impl Parts<'_> {
         estimator: &ConcentratedLikelihood,
         colours: &[Colour],
     ) -> Result<Profile<'_>, EstimationError> {
-        let factor = self.in_order.whitened(colours)?;
-        let gram = |group: &phiw_regressor::least_squares::Group| {
+        let mut factor = self.in_order.whitened(colours)?;
+        let rows = factor.groups().iter().map(|group| group.factor.rows() as f64).collect();
+        if let Some(spread) = &self.spread {
+            let group = |(group, own): (&Group, &Factor)| Group {
+                parameters: group.parameters.clone(),
+                factor: own.clone(),
+            };
+            let groups = factor.groups().iter().zip(&spread.factors).map(group).collect();
+            factor = factor.merge(&GroupedFactor::new(factor.parameter_count(), groups)?)?;
+        }
+        let gram = |group: &Group| {
             let size = group.factor.parameters();
             let r = group.factor.as_mat().get(.., ..size);
             r.transpose() * r
@@ -187,6 +320,7 @@ impl Parts<'_> {
         Ok(Profile {
             grams: factor.groups().iter().map(gram).collect(),
             factor,
+            rows,
             sensitivities: &self.sensitivities,
             map: &self.map,
             prior: &self.prior,
@@ -257,6 +391,17 @@ impl Estimator for ConcentratedLikelihood {
             }
             colours = next;
         }
+        for _ in 0..settings.smoothings {
+            let w = &parts.map * &x;
+            let w = w.col_as_slice(0);
+            let std = parts.profile(self, &colours)?.noise(&column(w));
+            let smoothed = self.smoothed(design, evidence, (w, &colours, &std), Which::MostLikely)?;
+            let Some((again, spread)) = smoothed else { break };
+            let own = Parts { spread: Some(spread), ..self.parts(design, &again)? };
+            let found = own.profile(self, &colours)?.minimum(x, settings.newton.most_steps);
+            (x, covariance) = (found.x, found.covariance);
+            colours = own.colours(self, (&own.map * &x).col_as_slice(0));
+        }
         let w = &parts.map * &x;
         let covariance = covariance.map(|own: Mat<f64>| &parts.map * own * parts.map.transpose());
         let deviation = |k: usize| covariance.as_ref().map_or(f64::NAN, |own| own[(k, k)].max(0.0).sqrt());
@@ -264,6 +409,17 @@ impl Estimator for ConcentratedLikelihood {
             parameters: w.col_as_slice(0).to_vec(),
             standard_deviations: (0..w.nrows()).map(deviation).collect(),
             covariance,
+        })
+    }
+
+    fn misfit(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        parameters: &[f64],
+    ) -> Result<Option<Vec<TorqueMisfit>>, EstimationError> {
+        self.looked_at(design, evidence, parameters, |parts, colours, _| {
+            misfits(parts.in_order, parameters, colours).map(Some)
         })
     }
 

@@ -28,9 +28,9 @@ mod cell;
 mod table;
 
 use crate::environment;
-use crate::paper::{RunArguments, Setup};
+use crate::paper::{NoiseIn, RunArguments, Setup};
 use anyhow::Context;
-use cell::{Cell, ControllerName, EstimatorName, NoiseIn, SensorName};
+use cell::{Cell, ControllerName, EstimatorName, SensorName};
 use phiw::console::Console;
 use rayon::prelude::*;
 

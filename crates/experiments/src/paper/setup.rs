@@ -1,6 +1,8 @@
 //! Everything that all runs share, and what of it decides their results.
 
-use super::arguments::{Detector, EstimatorName, Initial, Method, PriorName, RelaxationName, RunArguments};
+use super::arguments::{
+    Detector, EstimatorName, Initial, Method, NoiseIn, PriorName, RelaxationName, RunArguments,
+};
 use super::method;
 use super::motions::Motions;
 use super::run_file;
@@ -28,7 +30,7 @@ use phiw_growth::{ScoreTest, TraceResidual};
 use phiw_identification::model::{parameter_name, standard_unit};
 use phiw_plant::{PlantEffect, Sensors, Timing};
 use phiw_regressor::factor::Factor;
-use phiw_simulated_robot::{FeedForward, SimulatedRobot};
+use phiw_simulated_robot::{FeedForward, KnownOfController, SimulatedRobot};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -100,6 +102,9 @@ pub struct Settings {
     pub detector: Detector,
     /// Torque noise over the torque limit.
     pub noise: f64,
+    /// Where it is.
+    #[serde(default)]
+    pub noise_in: NoiseIn,
     /// Iterations.
     pub iterations: usize,
     /// How many initial models.
@@ -201,6 +206,7 @@ impl Setup {
             relaxation,
             detector: arguments.detector,
             noise: arguments.noise,
+            noise_in: arguments.noise_in,
             iterations: arguments.iterations,
             initial: arguments.initial,
             parameters: parameter_facts(&robot, &truth)?,
@@ -242,9 +248,15 @@ impl Setup {
         noise: f64,
         secret: Option<&PlantEffect>,
     ) -> Box<dyn Experiment> {
-        let mut experiment = self.experiment(backend, standing, noise);
+        let (in_motion, in_log) = self.settings.noise_in.shares(noise);
+        let mut experiment = self.experiment(backend, standing, in_motion);
         // What is held out is measured without noise, and exactly.
         if noise > 0.0 {
+            experiment.measuring.torque_noise = in_log;
+            experiment.measuring.logged = self.settings.noise_in.logged();
+            if self.settings.method == Some(Method::Printed) {
+                experiment.measuring.controller = KnownOfController::Nothing;
+            }
             experiment.measuring.encoders =
                 method::encoders(self.settings.method, experiment.timing.control_period_s);
         }
@@ -280,11 +292,7 @@ impl Setup {
     /// Who estimates, in a run that begins with `initial`.
     pub fn estimator(&self, initial: &RobotModel) -> Box<dyn Estimator> {
         match self.settings.estimator {
-            EstimatorName::Concentrated => {
-                let standing_on = self.subject.standing.as_ref().map(Standing::foot_bodies);
-                let concentrated = ConcentratedLikelihood::new(initial.clone());
-                Box::new(concentrated.standing_on(standing_on.unwrap_or_default()))
-            }
+            EstimatorName::Concentrated => Box::new(self.concentrated(initial)),
             EstimatorName::LeastSquares => Box::new(LeastSquares),
             EstimatorName::Weighted => Box::new(WeightedLeastSquares),
             EstimatorName::Likelihood => {
@@ -297,6 +305,12 @@ impl Setup {
         }
     }
 
+    /// The likelihood that is told no noise.
+    fn concentrated(&self, initial: &RobotModel) -> ConcentratedLikelihood {
+        let standing_on = self.subject.standing.as_ref().map(Standing::foot_bodies);
+        ConcentratedLikelihood::new(initial.clone()).standing_on(standing_on.unwrap_or_default())
+    }
+
     /// The likelihood of motions under the noise of the plant.
     pub fn likelihood(&self) -> MotionLikelihood {
         // Without noise there is no likelihood.
@@ -305,14 +319,19 @@ impl Setup {
         MotionLikelihood::new(self.subject.torque_noise(share)).standing_on(standing_on.unwrap_or_default())
     }
 
-    /// Who looks for what the model lacks by the likelihood, if that is how parameters are estimated.
-    pub fn score_test(&self) -> Option<ScoreTest> {
-        (self.settings.estimator == EstimatorName::Likelihood).then(|| ScoreTest::new(self.likelihood()))
+    /// Who looks for what the model lacks by the likelihood, if that is how parameters are estimated, in a run
+    /// that begins with `initial`.
+    pub fn score_test(&self, initial: &RobotModel) -> Option<ScoreTest> {
+        match self.settings.estimator {
+            EstimatorName::Likelihood => Some(ScoreTest::new(self.likelihood())),
+            EstimatorName::Concentrated => Some(ScoreTest::of_unknown_noise(self.concentrated(initial))),
+            EstimatorName::LeastSquares | EstimatorName::Weighted => None,
+        }
     }
 
     /// Who looks for what the model lacks.
-    pub fn growth(&self) -> Box<dyn Growth> {
-        match self.score_test().filter(|_| self.settings.detector == Detector::Score) {
+    pub fn growth(&self, initial: &RobotModel) -> Box<dyn Growth> {
+        match self.score_test(initial).filter(|_| self.settings.detector == Detector::Score) {
             Some(test) => Box::new(test),
             None => Box::new(TraceResidual::default()),
         }
