@@ -77,11 +77,15 @@ pub struct ConcentratedSettings {
     /// leave no digits for the bodies.
     pub least_noise: f64,
     /// Times that the motion of encoders is found anew under the estimate, and the estimate after it
-    /// (`smoothing.rs`). Default: 6.
+    /// (`smoothing.rs`); after two of them the estimate is carried on along their path. Default: 5.
     pub smoothings: usize,
     /// What is left of how an acceleration decays within a period, as a torque over the noise's: the belief's
     /// friction and inertia are not exact. Default: 0.1.
     pub decay_error: f64,
+    /// Standard deviation of a reading of an encoder, over that of rounding to its step. Default: 1.
+    pub reading_error: f64,
+    /// Time between instants at which a smoothing looks at inertias anew \[s\]. Default: 0.1.
+    pub smoothing_instant_s: f64,
     /// How minima are found.
     pub newton: NewtonSettings,
 }
@@ -99,8 +103,10 @@ impl Default for ConcentratedSettings {
             settled: 0.005,
             largest_correlation: 0.98,
             least_noise: 3e-3,
-            smoothings: 6,
+            smoothings: 5,
             decay_error: 0.1,
+            reading_error: 1.0,
+            smoothing_instant_s: 0.1,
             newton: NewtonSettings::default(),
         }
     }
@@ -214,8 +220,9 @@ impl ConcentratedLikelihood {
             w,
             colours,
             std,
-            instant_every_s: evidence.settings.instant_every_s,
+            instant_every_s: self.settings.smoothing_instant_s,
             decay_error: self.settings.decay_error,
+            reading_error: self.settings.reading_error,
         };
         let smooth = |(index, log): (usize, &MotionLog)| belief.smoothed(log, index as u64);
         let smoothed: Result<Vec<_>, EstimationError> =
@@ -254,7 +261,8 @@ impl ConcentratedLikelihood {
             let parts = self.parts(design, own.as_ref().unwrap_or(evidence))?;
             let colours = parts.colours(self, w);
             let std = parts.profile(self, &colours)?.noise(&column(w));
-            let drawn = self.smoothed(design, evidence, (w, &colours, &std), Which::Drawn)?;
+            let from = own.as_ref().unwrap_or(evidence);
+            let drawn = self.smoothed(design, from, (w, &colours, &std), Which::Drawn)?;
             let Some((drawn, _)) = drawn else { break };
             own = Some(drawn);
         }
@@ -331,6 +339,32 @@ impl Parts<'_> {
     }
 }
 
+/// Where a path of steps that shrink slowly leads, from three points of it (SQUAREM: Varadhan & Roland 2008),
+/// distances counted in standard deviations; the last point where bodies would not be possible there.
+fn extrapolated(
+    [first, second, third]: [&Mat<f64>; 3],
+    covariance: &Mat<f64>,
+    prior: &BodyPrior,
+) -> Mat<f64> {
+    let (step, bend) = (second - first, third - second - (second - first));
+    let length = |along: &Mat<f64>| {
+        let square = |k: usize| along[(k, 0)].powi(2) / covariance[(k, k)].max(f64::MIN_POSITIVE);
+        (0..along.nrows()).map(square).sum::<f64>().sqrt()
+    };
+    let mut share = (length(&step) / length(&bend)).clamp(1.0, LONGEST_SHARE);
+    while share > 1.0 {
+        let trial = first + &step * faer::Scale(2.0 * share) + &bend * faer::Scale(share * share);
+        if prior.divergence(&trial).is_finite() {
+            return trial;
+        }
+        share = if share > 1.1 { 0.5 * (share + 1.0) } else { 1.0 };
+    }
+    third.clone()
+}
+
+/// Longest extrapolation, in steps.
+const LONGEST_SHARE: f64 = 4.0;
+
 /// Gives all torques the median correlation.
 fn in_common(colours: &mut [Colour]) {
     let mut all: Vec<f64> = colours.iter().map(|colour| colour.correlation).collect();
@@ -360,6 +394,7 @@ impl Estimator for ConcentratedLikelihood {
         let mut x = parts.prior.start(&present.standard, &present_parameters[rigid..]);
         let mut colours = vec![Colour { correlation: 0.0, felt: 0.0 }; design.rows().len()];
         let mut covariance = None;
+        let mut std_of_noise = Vec::new();
         let settings = &self.settings;
         let common = settings.tempered_rounds + settings.rounds_in_common;
         let rounds = common + settings.rounds.max(1);
@@ -391,16 +426,30 @@ impl Estimator for ConcentratedLikelihood {
             }
             colours = next;
         }
+        let mut last: Option<Evidence> = None;
+        let mut path = vec![x.clone()];
         for _ in 0..settings.smoothings {
             let w = &parts.map * &x;
             let w = w.col_as_slice(0);
-            let std = parts.profile(self, &colours)?.noise(&column(w));
-            let smoothed = self.smoothed(design, evidence, (w, &colours, &std), Which::MostLikely)?;
+            let std = match &last {
+                None => parts.profile(self, &colours)?.noise(&column(w)),
+                Some(_) => std_of_noise.clone(),
+            };
+            let present = last.as_ref().unwrap_or(evidence);
+            let smoothed = self.smoothed(design, present, (w, &colours, &std), Which::MostLikely)?;
             let Some((again, spread)) = smoothed else { break };
             let own = Parts { spread: Some(spread), ..self.parts(design, &again)? };
             let found = own.profile(self, &colours)?.minimum(x, settings.newton.most_steps);
             (x, covariance) = (found.x, found.covariance);
-            colours = own.colours(self, (&own.map * &x).col_as_slice(0));
+            path.push(x.clone());
+            if let ([first, second, third], Some(covariance)) = (path.as_slice(), &covariance) {
+                x = extrapolated([first, second, third], covariance, &own.prior);
+                path = vec![x.clone()];
+            }
+            let w = &own.map * &x;
+            colours = own.colours(self, w.col_as_slice(0));
+            std_of_noise = own.profile(self, &colours)?.noise(&w);
+            last = Some(again);
         }
         let w = &parts.map * &x;
         let covariance = covariance.map(|own: Mat<f64>| &parts.map * own * parts.map.transpose());

@@ -40,6 +40,8 @@ pub(super) struct Belief<'a> {
     pub instant_every_s: f64,
     /// Standard deviation of A·ȧ + F·a over a period, over that of the noise.
     pub decay_error: f64,
+    /// Standard deviation of a reading, over that of rounding.
+    pub reading_error: f64,
 }
 
 /// A motion as it most likely was, and how it may have been beside.
@@ -96,7 +98,7 @@ impl Belief<'_> {
             for joint in 0..n {
                 let ([q0, v0], [q1, v1]) = (value(period, joint), value(period + 1, joint));
                 let (products, left) = readings.of_period(period, joint, [q0, v0, q1, v1]);
-                let precision = readings.noise[joint].max(f64::MIN_POSITIVE).powi(-2);
+                let precision = (self.reading_error * readings.noise[joint]).max(f64::MIN_POSITIVE).powi(-2);
                 let first = unknown(period, joint);
                 let place = |index: usize| first + index % 2 + if index < 2 { 0 } else { 2 * n };
                 for row in 0..CUBIC {

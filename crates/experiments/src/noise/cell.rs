@@ -9,7 +9,8 @@ use phiw_curriculum::{
     Curriculum, CurriculumError, CurriculumRun, CurriculumSettings, Experiment, Trial, unreliable_model,
 };
 use phiw_estimation::{
-    ConcentratedLikelihood, Estimator, LeastSquares, MotionLikelihood, Robot, RobotModel, RowsAt, TorqueNoise,
+    ConcentratedLikelihood, ConcentratedSettings, Estimator, LeastSquares, MotionLikelihood, Robot,
+    RobotModel, RowsAt, TorqueNoise,
 };
 use phiw_simulated_robot::{Encoders, KnownOfController, Measuring, SimulatedRobot};
 use rand::Rng;
@@ -66,7 +67,7 @@ pub enum EstimatorName {
 }
 
 /// A cell.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Cell {
     /// Where the noise is.
     pub noise_in: NoiseIn,
@@ -76,8 +77,8 @@ pub struct Cell {
     pub sensors: SensorName,
     /// Who estimates.
     pub estimator: EstimatorName,
-    /// Weight of the prior.
-    pub prior_weight: Option<f64>,
+    /// What the estimator decides that finds the noise out.
+    pub settings: ConcentratedSettings,
     /// What the log says of the controller.
     pub controller: ControllerName,
 }
@@ -202,11 +203,8 @@ impl Cell {
         };
         match self.estimator {
             EstimatorName::Concentrated => {
-                let mut estimator = ConcentratedLikelihood::new(initial.clone());
-                if let Some(weight) = self.prior_weight {
-                    estimator.settings.prior_weight = weight;
-                }
-                Box::new(estimator)
+                let settings = self.settings.clone();
+                Box::new(ConcentratedLikelihood { settings, ..ConcentratedLikelihood::new(initial.clone()) })
             }
             EstimatorName::Likelihood => told(1.0),
             EstimatorName::LikelihoodLow => told(0.8),
