@@ -6,6 +6,7 @@ mod bayesian;
 mod body_prior;
 mod command;
 mod concentrated;
+mod concentrated_settings;
 mod encoders;
 mod error;
 mod estimator;
@@ -31,7 +32,8 @@ mod stored;
 mod torques;
 
 pub use bayesian::{BayesianLeastSquares, LogNoise};
-pub use concentrated::{ConcentratedLikelihood, ConcentratedSettings, TorqueNoise};
+pub use concentrated::{ConcentratedLikelihood, TorqueNoise};
+pub use concentrated_settings::ConcentratedSettings;
 pub use error::EstimationError;
 pub use estimator::{Estimate, Estimator};
 pub use evidence::{Evidence, EvidenceSettings, Instant, RowsAt, grouped_factor};

@@ -324,7 +324,7 @@ pub enum Error {
         /// The log.
         path: PathBuf,
         /// What is wrong with it.
-        source: EstimationError,
+        source: Box<EstimationError>,
     },
     /// A joint that no motion moves.
     #[error(

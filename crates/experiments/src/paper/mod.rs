@@ -34,6 +34,7 @@ mod arguments;
 mod arm;
 mod detection;
 mod ending;
+mod estimators;
 mod figures;
 mod jobs;
 mod method;

@@ -8,7 +8,6 @@ use super::motions::Motions;
 use super::run_file;
 use super::subject::{Subject, SubjectName};
 use super::tasks::two_tasks;
-use super::whole_body::Standing;
 use crate::plant::case;
 use crate::plant::engine::Engine;
 use crate::plant::secret::SecretKind;
@@ -16,17 +15,12 @@ use anyhow::{Context, ensure};
 use phiw::console::Console;
 use phiw_curriculum::Experiment;
 use phiw_curriculum::constraint::ZmpConstraint;
-use phiw_curriculum::growth::Growth;
 use phiw_curriculum::motion::{Motion, MotionDataset};
 use phiw_curriculum::relaxation::Relaxation;
 use phiw_curriculum::selection::MotionCandidates;
 use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
 use phiw_dynamics::{Workspace, World};
-use phiw_estimation::{
-    ConcentratedLikelihood, Estimator, Evidence, LeastSquares, MotionLikelihood, MotionLog, ParameterPrior,
-    Robot, RobotModel, RowsAt, WeightedLeastSquares,
-};
-use phiw_growth::{ScoreTest, TraceResidual};
+use phiw_estimation::{Evidence, MotionLog, Robot, RobotModel, RowsAt};
 use phiw_identification::model::{parameter_name, standard_unit};
 use phiw_plant::{PlantEffect, Sensors, Timing};
 use phiw_regressor::factor::Factor;
@@ -149,7 +143,7 @@ const VALIDATION_SEED: u64 = u64::MAX;
 /// The stream of the secrets of a seed.
 const SECRET_STREAM: u64 = 1;
 /// What stands for rounding where there is no noise, over the torque limit.
-const NOISELESS: f64 = 1e-3;
+pub(super) const NOISELESS: f64 = 1e-3;
 
 impl Setup {
     /// Reads robot and motions, retargets what is not there, and measures the validation motions. `console`
@@ -286,54 +280,6 @@ impl Setup {
             noise_correlation: 0.0,
             measuring: Default::default(),
             build: Box::new(move |tree, world| backend.build(tree, world)),
-        }
-    }
-
-    /// Who estimates, in a run that begins with `initial`.
-    pub fn estimator(&self, initial: &RobotModel) -> Box<dyn Estimator> {
-        match self.settings.estimator {
-            EstimatorName::Concentrated => Box::new(self.concentrated(initial)),
-            EstimatorName::LeastSquares => Box::new(LeastSquares),
-            EstimatorName::Weighted => Box::new(WeightedLeastSquares),
-            EstimatorName::Likelihood => {
-                let likelihood = self.likelihood();
-                Box::new(match self.settings.prior {
-                    PriorName::None => likelihood,
-                    PriorName::Initial => likelihood.believing(ParameterPrior::unreliable(initial.clone())),
-                })
-            }
-        }
-    }
-
-    /// The likelihood that is told no noise.
-    fn concentrated(&self, initial: &RobotModel) -> ConcentratedLikelihood {
-        let standing_on = self.subject.standing.as_ref().map(Standing::foot_bodies);
-        ConcentratedLikelihood::new(initial.clone()).standing_on(standing_on.unwrap_or_default())
-    }
-
-    /// The likelihood of motions under the noise of the plant.
-    pub fn likelihood(&self) -> MotionLikelihood {
-        // Without noise there is no likelihood.
-        let share = if self.settings.noise > 0.0 { self.settings.noise } else { NOISELESS };
-        let standing_on = self.subject.standing.as_ref().map(Standing::foot_bodies);
-        MotionLikelihood::new(self.subject.torque_noise(share)).standing_on(standing_on.unwrap_or_default())
-    }
-
-    /// Who looks for what the model lacks by the likelihood, if that is how parameters are estimated, in a run
-    /// that begins with `initial`.
-    pub fn score_test(&self, initial: &RobotModel) -> Option<ScoreTest> {
-        match self.settings.estimator {
-            EstimatorName::Likelihood => Some(ScoreTest::new(self.likelihood())),
-            EstimatorName::Concentrated => Some(ScoreTest::of_unknown_noise(self.concentrated(initial))),
-            EstimatorName::LeastSquares | EstimatorName::Weighted => None,
-        }
-    }
-
-    /// Who looks for what the model lacks.
-    pub fn growth(&self, initial: &RobotModel) -> Box<dyn Growth> {
-        match self.score_test(initial).filter(|_| self.settings.detector == Detector::Score) {
-            Some(test) => Box::new(test),
-            None => Box::new(TraceResidual::default()),
         }
     }
 

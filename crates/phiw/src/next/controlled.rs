@@ -43,7 +43,10 @@ impl ControlledLogs {
                 return Ok(None);
             }
             let own = logged.motions(settings);
-            motions.push(own.map_err(|source| Error::LogForNext { path: survey.path.clone(), source })?);
+            motions.push(own.map_err(|source| Error::LogForNext {
+                path: survey.path.clone(),
+                source: Box::new(source),
+            })?);
         }
         Ok(Some(ControlledLogs { motions }))
     }
