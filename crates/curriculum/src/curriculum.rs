@@ -12,7 +12,7 @@ use crate::relaxation::{ConditionRelaxation, Relaxation};
 use crate::selection::{MotionCandidates, Selection, SmallestCondition, Triangle};
 use crate::{CurriculumError, CurriculumRun, Experiment, IterationRecord};
 use phiw_estimation::{
-    Estimate, Estimator, Evidence, EvidenceSettings, MotionLog, Robot, RobotModel, RowsAt,
+    Estimate, Estimator, Evidence, EvidenceSettings, MotionLog, Robot, RobotModel, RowsAt, TorqueMisfit,
 };
 use phiw_identification::EffectSpec;
 use rand::SeedableRng;
@@ -135,12 +135,13 @@ impl<'a> Curriculum<'a> {
         let trial = self.experiment.perform(self.robot, &run.model, motion, &mut noise)?;
         let mut next = run.clone();
         next.first_alpha = Some(plan.first_alpha);
-        let mut estimate = None;
+        let (mut estimate, mut misfit) = (None, Vec::new());
         // A base that tilts is not the fixed base of the columns: the log of a fall is of another robot.
         if trial.fell_at_s.is_some() {
             next.excluded.push(plan.choice.motion);
         } else {
             let learning = self.learn(&mut next, &trial.measured)?;
+            misfit = self.misfit(&learning)?;
             next.model = learning.model;
             next.evidence = Some(learning.evidence);
             estimate = Some(learning.estimate);
@@ -179,6 +180,7 @@ impl<'a> Curriculum<'a> {
                 .map(|std| Some(*std).filter(|std| std.is_finite()))
                 .collect(),
             choice: plan.choice,
+            misfit,
         });
         next.ended = self.end.reason(&next.history);
         *run = next;
@@ -260,6 +262,13 @@ impl<'a> Curriculum<'a> {
             &learning.evidence,
             &learning.estimate.parameters,
         )?)
+    }
+
+    /// Whether the estimator's story of the noise holds, torque by torque.
+    fn misfit(&self, learning: &Learning) -> Result<Vec<TorqueMisfit>, CurriculumError> {
+        let design = self.robot.design_of(&learning.model)?;
+        let Learning { evidence, estimate, .. } = learning;
+        Ok(self.estimator.misfit(&design, evidence, &estimate.parameters)?.unwrap_or_default())
     }
 
     /// The same with other `effects` beside the declared ones, fitted to all logs again.

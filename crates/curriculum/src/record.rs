@@ -3,7 +3,7 @@
 use crate::end::EndReason;
 use crate::growth::Rivalry;
 use crate::selection::Choice;
-use phiw_estimation::{Evidence, MotionLog, RobotModel};
+use phiw_estimation::{Evidence, MotionLog, RobotModel, TorqueMisfit};
 use serde::{Deserialize, Serialize};
 
 /// One iteration.
@@ -45,6 +45,10 @@ pub struct IterationRecord {
     pub model: RobotModel,
     /// Standard deviations of its parameter vector; `null` where the estimator does not know.
     pub standard_deviations: Vec<Option<f64>>,
+    /// Whether what the model leaves of each torque is noise, as the estimator tests it; empty where it has no
+    /// test, or the log did not count.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub misfit: Vec<TorqueMisfit>,
 }
 
 /// A run of a curriculum: all that is needed to go on with it, to the last bit.

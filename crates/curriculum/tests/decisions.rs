@@ -130,6 +130,7 @@ fn record(cond: Option<f64>, change: Option<f64>, uncertainty: Option<f64>) -> I
         separates: None,
         model: RobotModel { standard: Vec::new(), effects: Vec::new() },
         standard_deviations: Vec::new(),
+        misfit: Vec::new(),
     }
 }
 

@@ -119,7 +119,15 @@ impl Evidence {
     /// them, `rate_hz` of each torque a second \[Hz\].
     pub fn of_factor(factor: GroupedFactor, rate_hz: Option<f64>) -> Self {
         let settings = super::RowsAt::Stamps.into();
-        Evidence { settings, factor, instants: Vec::new(), foreseen: Vec::new(), rate_hz, in_order: None }
+        Evidence {
+            settings,
+            factor,
+            instants: Vec::new(),
+            foreseen: Vec::new(),
+            rate_hz,
+            in_order: None,
+            encoder_logs: Vec::new(),
+        }
     }
 
     /// The same of rows that have been weighted and taken together, over these `parameters` of `count`: what

@@ -1,15 +1,21 @@
 //! Maximum likelihood of a motion that noise moves, where nobody knows the noise.
 
 use super::body_prior::BodyPrior;
+use super::concentrated_settings::ConcentratedSettings;
 use super::in_order::{Colour, InOrder};
 use super::likelihood::column;
+use super::misfit::{TorqueMisfit, misfits};
 use super::profile::{Minimum, Profile};
 use super::sensitivity::Sensitivity;
-use super::settings::NewtonSettings;
+use super::smoothing::{Belief, Smoothed};
 use super::{Estimate, Estimator, Evidence};
-use crate::{EstimationError, RobotModel};
-use faer::Mat;
+use crate::{EstimationError, MotionLog, RobotModel};
+use faer::prelude::Solve;
+use faer::{Mat, Side};
 use phiw_identification::Design;
+use phiw_regressor::factor::Factor;
+use phiw_regressor::least_squares::{Group, GroupedFactor};
+use rayon::prelude::*;
 
 /// [`super::MotionLikelihood`] without being told the noise: its size, its correlation from a period to the
 /// next, and how much of what the log's torque has beside the command moved the robot are found with the
@@ -37,59 +43,6 @@ pub struct ConcentratedLikelihood {
     pub standing_on: Vec<usize>,
     /// What it decides.
     pub settings: ConcentratedSettings,
-}
-
-/// What [`ConcentratedLikelihood`] decides.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ConcentratedSettings {
-    /// Weight of the prior: nats of −log L a unit of divergence. Default: 1.
-    pub prior_weight: f64,
-    /// How round the bodies are that are believed at first: least second moment about the centre of mass
-    /// along any axis, over the mean of all axes. Default: 0.4.
-    pub roundness: f64,
-    /// Rounds at first in which the prior weighs more, each a step nearer to its own weight, and the noise
-    /// counts as white: the path leads from what was believed to the estimate through possible bodies.
-    /// Default: 6.
-    pub tempered_rounds: usize,
-    /// How many times more it weighs in one of these than in the next. Default: 4.
-    pub tempering: f64,
-    /// Rounds after these that take the torques' median correlation for all: under a bad belief the residual
-    /// of a single torque is no noise yet, and may keep the estimate from ever leaving it. Default: 4.
-    pub rounds_in_common: usize,
-    /// Rounds after these at most, each torque with its own correlation. Default: 6.
-    pub rounds: usize,
-    /// Newton steps of a round at most, but of the last: what is found anew a moment later need not be
-    /// found exactly. Default: 8.
-    pub steps_a_round: usize,
-    /// Change of a correlation from which on another round is worth it. Default: 0.005.
-    pub settled: f64,
-    /// Largest correlation of the noise. Default: 0.98: rows of a noise that is nearly a constant say nothing
-    /// of weights.
-    pub largest_correlation: f64,
-    /// Least standard deviation of a torque's noise over the RMS of its command. Default: 3·10⁻³. No drive
-    /// delivers its command better than to some thousandths, and without a floor a log without noise would
-    /// leave no digits for the bodies.
-    pub least_noise: f64,
-    /// How minima are found.
-    pub newton: NewtonSettings,
-}
-
-impl Default for ConcentratedSettings {
-    fn default() -> Self {
-        ConcentratedSettings {
-            prior_weight: 1.0,
-            roundness: 0.4,
-            tempered_rounds: 6,
-            tempering: 4.0,
-            rounds_in_common: 4,
-            rounds: 6,
-            steps_a_round: 8,
-            settled: 0.005,
-            largest_correlation: 0.98,
-            least_noise: 3e-3,
-            newton: NewtonSettings::default(),
-        }
-    }
 }
 
 /// The noise of a torque, as found.
@@ -125,15 +78,39 @@ impl ConcentratedLikelihood {
         evidence: &Evidence,
         parameters: &[f64],
     ) -> Result<Vec<TorqueNoise>, EstimationError> {
-        let parts = self.parts(design, evidence)?;
-        let colours = parts.colours(self, parameters);
-        let std = parts.profile(self, &colours)?.noise(&column(parameters));
-        let noise = |(colour, std): (&Colour, f64)| TorqueNoise {
+        let noise = |(colour, std): (&Colour, &f64)| TorqueNoise {
             std: std / (1.0 - colour.correlation * colour.correlation).sqrt(),
             correlation: colour.correlation,
             felt: colour.felt,
         };
-        Ok(colours.iter().zip(std).map(noise).collect())
+        self.looked_at(design, evidence, parameters, |_, colours, std| {
+            Ok(colours.iter().zip(std).map(noise).collect())
+        })
+    }
+
+    /// The least standard deviation of each parameter at the truth that any estimate without a prior can have,
+    /// one to which the noise is known and the motion exact (Cramér and Rao's bound: the observed information
+    /// of the motions that were measured). NaN where nothing is known of one.
+    ///
+    /// # Errors
+    /// The evidence is not of this design, or its rows were not taken in order.
+    pub fn bound(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        truth: &[f64],
+        noise: &[TorqueNoise],
+    ) -> Result<Vec<f64>, EstimationError> {
+        let parts = self.parts(design, evidence)?;
+        let colour = |noise: &TorqueNoise| Colour { correlation: noise.correlation, felt: noise.felt };
+        let colours: Vec<Colour> = noise.iter().map(colour).collect();
+        let news = |noise: &TorqueNoise| noise.std * (1.0 - noise.correlation * noise.correlation).sqrt();
+        let std: Vec<f64> = noise.iter().map(news).collect();
+        let information = parts.profile(self, &colours)?.information(&column(truth), &std);
+        let unknown = vec![f64::NAN; truth.len()];
+        let Ok(factor) = information.llt(Side::Lower) else { return Ok(unknown) };
+        let covariance = factor.solve(Mat::<f64>::identity(truth.len(), truth.len()));
+        Ok((0..truth.len()).map(|k| covariance[(k, k)].sqrt()).collect())
     }
 
     fn parts<'a>(&self, design: &Design, evidence: &'a Evidence) -> Result<Parts<'a>, EstimationError> {
@@ -149,14 +126,100 @@ impl ConcentratedLikelihood {
             }
         });
         let sensitivities = Sensitivity::all(design, evidence, &self.standing_on)?;
-        let variance = |group: &phiw_regressor::least_squares::Group| {
+        let variance = |group: &Group| {
             let rows = group.factor.rows().max(1) as f64;
             let square = group.factor.right_hand_side_sum_of_squares() / rows;
             (self.settings.least_noise.powi(2) * square).max(f64::MIN_POSITIVE)
         };
         let least_variance = evidence.factor().groups().iter().map(variance).collect();
-        Ok(Parts { in_order, prior, map, sensitivities, least_variance })
+        Ok(Parts { in_order, prior, map, sensitivities, least_variance, spread: None })
     }
+
+    /// What evidence of encoders is of once their motion is as it most likely was under parameters `w`, or as
+    /// it may have been; none where it is not of encoders alone.
+    fn smoothed(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        (w, colours, std): (&[f64], &[Colour], &[f64]),
+        which: Which,
+    ) -> Result<Option<(Evidence, Spread)>, EstimationError> {
+        if evidence.encoder_logs.is_empty() || !self.standing_on.is_empty() {
+            return Ok(None);
+        }
+        let belief = Belief {
+            design,
+            foreseen: &evidence.foreseen,
+            w,
+            colours,
+            std,
+            instant_every_s: self.settings.smoothing_instant_s,
+            decay_error: self.settings.decay_error,
+            reading_error: self.settings.reading_error,
+        };
+        let smooth = |(index, log): (usize, &MotionLog)| belief.smoothed(log, index as u64);
+        let smoothed: Result<Vec<_>, EstimationError> =
+            evidence.encoder_logs.par_iter().enumerate().map(smooth).collect();
+        let mut again = Evidence::none(design, evidence.settings)?;
+        let mut spread: Option<Spread> = None;
+        for smoothed in smoothed? {
+            let Some(Smoothed { most_likely, drawn, spread: factors, noise }) = smoothed else {
+                return Ok(None);
+            };
+            again.add(design, if which == Which::MostLikely { &most_likely } else { &drawn })?;
+            match &mut spread {
+                None => spread = Some(Spread { factors, noise }),
+                Some(known) => {
+                    for (known, own) in known.factors.iter_mut().zip(&factors) {
+                        known.merge(own)?;
+                    }
+                    known.noise.iter_mut().flatten().zip(noise.iter().flatten()).for_each(|(a, b)| *a += b);
+                }
+            }
+        }
+        Ok(spread.map(|spread| (again, spread)))
+    }
+
+    /// What the tests of an estimate look at: the evidence, or where it is of encoders alone, a motion that
+    /// their readings leave possible; and the noise under parameters `w`.
+    fn looked_at<T>(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        w: &[f64],
+        look: impl Fn(&Parts<'_>, &[Colour], &[f64]) -> Result<T, EstimationError>,
+    ) -> Result<T, EstimationError> {
+        let mut own: Option<Evidence> = None;
+        for _ in 0..DRAWS {
+            let parts = self.parts(design, own.as_ref().unwrap_or(evidence))?;
+            let colours = parts.colours(self, w);
+            let std = parts.profile(self, &colours)?.noise(&column(w));
+            let from = own.as_ref().unwrap_or(evidence);
+            let drawn = self.smoothed(design, from, (w, &colours, &std), Which::Drawn)?;
+            let Some((drawn, _)) = drawn else { break };
+            own = Some(drawn);
+        }
+        let parts = self.parts(design, own.as_ref().unwrap_or(evidence))?;
+        let colours = parts.colours(self, w);
+        let std = parts.profile(self, &colours)?.noise(&column(w));
+        look(&parts, &colours, &std)
+    }
+}
+
+/// Which of the motions that readings leave possible.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Which {
+    MostLikely,
+    Drawn,
+}
+
+/// Times that a motion is drawn anew under the noise of the last, before it is looked at.
+const DRAWS: usize = 3;
+
+/// What the spread of motions that encoders leave possible adds to the squares of each torque.
+struct Spread {
+    factors: Vec<Factor>,
+    noise: Vec<[f64; 3]>,
 }
 
 /// What all rounds share.
@@ -166,11 +229,13 @@ struct Parts<'a> {
     map: Mat<f64>,
     sensitivities: Vec<Sensitivity>,
     least_variance: Vec<f64>,
+    spread: Option<Spread>,
 }
 
 impl Parts<'_> {
     fn colours(&self, estimator: &ConcentratedLikelihood, w: &[f64]) -> Vec<Colour> {
-        self.in_order.colours(w, &self.least_variance, estimator.settings.largest_correlation)
+        let beside = self.spread.as_ref().map_or(&[][..], |spread| &spread.noise);
+        self.in_order.colours(w, &self.least_variance, estimator.settings.largest_correlation, beside)
     }
 
     fn profile(
@@ -178,8 +243,17 @@ impl Parts<'_> {
         estimator: &ConcentratedLikelihood,
         colours: &[Colour],
     ) -> Result<Profile<'_>, EstimationError> {
-        let factor = self.in_order.whitened(colours)?;
-        let gram = |group: &phiw_regressor::least_squares::Group| {
+        let mut factor = self.in_order.whitened(colours)?;
+        let rows = factor.groups().iter().map(|group| group.factor.rows() as f64).collect();
+        if let Some(spread) = &self.spread {
+            let group = |(group, own): (&Group, &Factor)| Group {
+                parameters: group.parameters.clone(),
+                factor: own.clone(),
+            };
+            let groups = factor.groups().iter().zip(&spread.factors).map(group).collect();
+            factor = factor.merge(&GroupedFactor::new(factor.parameter_count(), groups)?)?;
+        }
+        let gram = |group: &Group| {
             let size = group.factor.parameters();
             let r = group.factor.as_mat().get(.., ..size);
             r.transpose() * r
@@ -187,6 +261,7 @@ impl Parts<'_> {
         Ok(Profile {
             grams: factor.groups().iter().map(gram).collect(),
             factor,
+            rows,
             sensitivities: &self.sensitivities,
             map: &self.map,
             prior: &self.prior,
@@ -196,6 +271,32 @@ impl Parts<'_> {
         })
     }
 }
+
+/// Where a path of steps that shrink slowly leads, from three points of it (SQUAREM: Varadhan & Roland 2008),
+/// distances counted in standard deviations; the last point where bodies would not be possible there.
+fn extrapolated(
+    [first, second, third]: [&Mat<f64>; 3],
+    covariance: &Mat<f64>,
+    prior: &BodyPrior,
+) -> Mat<f64> {
+    let (step, bend) = (second - first, third - second - (second - first));
+    let length = |along: &Mat<f64>| {
+        let square = |k: usize| along[(k, 0)].powi(2) / covariance[(k, k)].max(f64::MIN_POSITIVE);
+        (0..along.nrows()).map(square).sum::<f64>().sqrt()
+    };
+    let mut share = (length(&step) / length(&bend)).clamp(1.0, LONGEST_SHARE);
+    while share > 1.0 {
+        let trial = first + &step * faer::Scale(2.0 * share) + &bend * faer::Scale(share * share);
+        if prior.divergence(&trial).is_finite() {
+            return trial;
+        }
+        share = if share > 1.1 { 0.5 * (share + 1.0) } else { 1.0 };
+    }
+    third.clone()
+}
+
+/// Longest extrapolation, in steps.
+const LONGEST_SHARE: f64 = 4.0;
 
 /// Gives all torques the median correlation.
 fn in_common(colours: &mut [Colour]) {
@@ -226,6 +327,7 @@ impl Estimator for ConcentratedLikelihood {
         let mut x = parts.prior.start(&present.standard, &present_parameters[rigid..]);
         let mut colours = vec![Colour { correlation: 0.0, felt: 0.0 }; design.rows().len()];
         let mut covariance = None;
+        let mut std_of_noise = Vec::new();
         let settings = &self.settings;
         let common = settings.tempered_rounds + settings.rounds_in_common;
         let rounds = common + settings.rounds.max(1);
@@ -257,6 +359,31 @@ impl Estimator for ConcentratedLikelihood {
             }
             colours = next;
         }
+        let mut last: Option<Evidence> = None;
+        let mut path = vec![x.clone()];
+        for _ in 0..settings.smoothings {
+            let w = &parts.map * &x;
+            let w = w.col_as_slice(0);
+            let std = match &last {
+                None => parts.profile(self, &colours)?.noise(&column(w)),
+                Some(_) => std_of_noise.clone(),
+            };
+            let present = last.as_ref().unwrap_or(evidence);
+            let smoothed = self.smoothed(design, present, (w, &colours, &std), Which::MostLikely)?;
+            let Some((again, spread)) = smoothed else { break };
+            let own = Parts { spread: Some(spread), ..self.parts(design, &again)? };
+            let found = own.profile(self, &colours)?.minimum(x, settings.newton.most_steps);
+            (x, covariance) = (found.x, found.covariance);
+            path.push(x.clone());
+            if let ([first, second, third], Some(covariance)) = (path.as_slice(), &covariance) {
+                x = extrapolated([first, second, third], covariance, &own.prior);
+                path = vec![x.clone()];
+            }
+            let w = &own.map * &x;
+            colours = own.colours(self, w.col_as_slice(0));
+            std_of_noise = own.profile(self, &colours)?.noise(&w);
+            last = Some(again);
+        }
         let w = &parts.map * &x;
         let covariance = covariance.map(|own: Mat<f64>| &parts.map * own * parts.map.transpose());
         let deviation = |k: usize| covariance.as_ref().map_or(f64::NAN, |own| own[(k, k)].max(0.0).sqrt());
@@ -264,6 +391,17 @@ impl Estimator for ConcentratedLikelihood {
             parameters: w.col_as_slice(0).to_vec(),
             standard_deviations: (0..w.nrows()).map(deviation).collect(),
             covariance,
+        })
+    }
+
+    fn misfit(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        parameters: &[f64],
+    ) -> Result<Option<Vec<TorqueMisfit>>, EstimationError> {
+        self.looked_at(design, evidence, parameters, |parts, colours, _| {
+            misfits(parts.in_order, parameters, colours).map(Some)
         })
     }
 

@@ -10,7 +10,10 @@
 //! period, a speed that alternates from knot to knot is not seen by them: the accelerations are then held to
 //! their mean over the neighbouring periods, each within the spread that the readings show.
 
+use crate::banded::Banded;
+use crate::readings::{ROUNDING, Readings, hermite};
 use crate::{EstimationError, MotionLog};
+use phiw_dynamics::check::check_size;
 use phiw_telemetry::Recording;
 
 /// Periods on either side over which the mean acceleration is taken.
@@ -18,18 +21,17 @@ const NEIGHBOURS: usize = 5;
 /// Standard deviation of what an acceleration changes by within a period, over that of the acceleration: a
 /// forearm behind a large gear loses a third to friction.
 const CHANGE: f64 = 0.3;
-/// Standard deviation of rounding to a step, over the step: 1/√12.
-const ROUNDING: f64 = 0.288_675_134_594_812_9;
 
 impl MotionLog {
     /// From a recording of encoders alone, read every `recording` period or less often than every `period_s`
-    /// \[s\], for which a command is held; the first row is that of a command. `step` is the encoders' step
-    /// \[rad, m\]. The torques are those recorded nearest to each command.
+    /// \[s\], for which a command is held; the first row is that of a command. `steps` are those of each
+    /// joint's encoder \[rad, m\]. The torques are those recorded nearest to each command.
     ///
     /// # Errors
     /// It is shorter than three periods.
-    pub fn of_encoders(recording: &Recording, period_s: f64, step: f64) -> Result<Self, EstimationError> {
+    pub fn of_encoders(recording: &Recording, period_s: f64, steps: &[f64]) -> Result<Self, EstimationError> {
         let joints = recording.joints.len();
+        check_size("steps of the encoders", steps.len(), joints)?;
         let (Some(&first), Some(&last)) = (recording.t.first(), recording.t.last()) else {
             return Err(EstimationError::Log("it has no rows"));
         };
@@ -41,7 +43,7 @@ impl MotionLog {
         let places: Vec<f64> = recording.t.iter().map(|t| (t - first) / period_s).collect();
         let mut log = MotionLog { joints, period_s, ..MotionLog::default() };
         (log.q, log.qd) = (vec![0.0; rows * joints], vec![0.0; rows * joints]);
-        for joint in 0..joints {
+        for (joint, &step) in steps.iter().enumerate() {
             let angles: Vec<f64> = recording.q.iter().skip(joint).step_by(joints).copied().collect();
             let knots = Spline { places: &places, angles: &angles, periods }.fit(step);
             for (row, knot) in knots.chunks_exact(2).enumerate() {
@@ -49,6 +51,7 @@ impl MotionLog {
                 log.qd[row * joints + joint] = knot[1] / period_s;
             }
         }
+        log.readings = Some(Readings::of(recording, &places, periods, steps));
         let mut nearest = 0;
         for row in 0..rows {
             let away = |sample: usize| (places[sample] - row as f64).abs();
@@ -76,21 +79,19 @@ impl Spline<'_> {
         let expected = self.expected();
         let spread = self.spread(&expected, step);
         let noise = (ROUNDING * step).max(1e-9 * spread).max(1e-12);
-        let mut system = Banded::new(2 * (self.periods + 1));
+        let mut system = Banded::new(2 * (self.periods + 1), 4);
         for (&place, &angle) in self.places.iter().zip(self.angles) {
             let first = (place.max(0.0) as usize).min(self.periods - 1);
-            let x = place - first as f64;
-            let y = 1.0 - x;
-            let shares = [(1.0 + 2.0 * x) * y * y, x * y * y, x * x * (1.0 + 2.0 * y), -x * x * y];
-            system.add(2 * first, shares, angle, 1.0);
+            let shares = hermite(place - first as f64);
+            system.add(2 * first, &shares, angle, 1.0);
         }
         let weight = |spread: f64| if spread > 0.0 { (noise / spread).powi(2) } else { 1.0 };
         for (period, &acceleration) in expected.iter().enumerate() {
             // The mean acceleration, times the period's square, and how far it changes within the period.
-            system.add(2 * period, [0.0, -1.0, 0.0, 1.0], acceleration, weight(spread));
-            system.add(2 * period, [12.0, 6.0, -12.0, 6.0], 0.0, weight(CHANGE * spread));
+            system.add(2 * period, &[0.0, -1.0, 0.0, 1.0], acceleration, weight(spread));
+            system.add(2 * period, &[12.0, 6.0, -12.0, 6.0], 0.0, weight(CHANGE * spread));
         }
-        system.solve()
+        system.solve().1
     }
 
     /// Angles at the knots, of the readings nearest to them.
@@ -135,62 +136,6 @@ impl Spline<'_> {
     }
 }
 
-/// Unknowns that one equation has: two of each of two knots.
-const WIDTH: usize = 4;
-
-/// Normal equations of neighbouring unknowns.
-struct Banded {
-    /// Diagonal and what is left of it, of each row.
-    rows: Vec<[f64; WIDTH]>,
-    right: Vec<f64>,
-}
-
-impl Banded {
-    fn new(size: usize) -> Self {
-        Banded { rows: vec![[0.0; WIDTH]; size], right: vec![0.0; size] }
-    }
-
-    /// weight·(Σ shares·unknowns − value)².
-    fn add(&mut self, first: usize, shares: [f64; WIDTH], value: f64, weight: f64) {
-        for (low, left) in shares.iter().enumerate() {
-            for (high, right) in shares.iter().enumerate().skip(low) {
-                self.rows[first + high][high - low] += weight * left * right;
-            }
-            self.right[first + low] += weight * left * value;
-        }
-    }
-
-    /// By Cholesky's factor within the band.
-    fn solve(self) -> Vec<f64> {
-        let Banded { mut rows, right: mut x } = self;
-        for row in 0..rows.len() {
-            let reach = row.min(WIDTH - 1);
-            for back in (0..=reach).rev() {
-                let column = row - back;
-                // Both rows have entries from `row − reach` on.
-                let known: f64 = (back + 1..=reach)
-                    .filter(|other| other - back < WIDTH)
-                    .map(|other| rows[row][other] * rows[column][other - back])
-                    .sum();
-                let rest = rows[row][back] - known;
-                rows[row][back] = match back {
-                    0 => rest.max(f64::MIN_POSITIVE).sqrt(),
-                    _ => rest / rows[column][0],
-                };
-            }
-            let known: f64 = (1..=reach).map(|back| rows[row][back] * x[row - back]).sum();
-            x[row] = (x[row] - known) / rows[row][0];
-        }
-        for row in (0..rows.len()).rev() {
-            x[row] /= rows[row][0];
-            for back in 1..=row.min(WIDTH - 1) {
-                x[row - back] -= rows[row][back] * x[row];
-            }
-        }
-        x
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -227,7 +172,7 @@ mod tests {
         let bits = std::f64::consts::TAU / f64::from(1 << 17);
         for (readings, step, worst) in [(10, bits, 5e-3), (10, bits * 1e-3, 1e-4), (1, bits, 5e-2)] {
             let (recording, _, speeds) = jumping(readings, step);
-            let log = MotionLog::of_encoders(&recording, 0.01, step)?;
+            let log = MotionLog::of_encoders(&recording, 0.01, &[step])?;
             assert_eq!(log.tau[5], 5.0);
             let error = log.qd.iter().zip(&speeds).skip(5).take(380).map(|(a, b)| (a - b).abs());
             let error = error.fold(0.0, f64::max);

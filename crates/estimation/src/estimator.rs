@@ -1,6 +1,6 @@
 //! What an estimator is asked, and what it answers.
 
-use crate::{EstimationError, Evidence, RobotModel};
+use crate::{EstimationError, Evidence, RobotModel, TorqueMisfit};
 use faer::Mat;
 use phiw_identification::Design;
 
@@ -44,6 +44,20 @@ pub trait Estimator: Send + Sync {
     /// assumes none.
     fn torque_noise(&self) -> Option<&[f64]> {
         None
+    }
+
+    /// Whether the estimator's story of the noise holds at `parameters`, torque by torque; none from an
+    /// estimator that has no test.
+    ///
+    /// # Errors
+    /// The evidence is not of this design.
+    fn misfit(
+        &self,
+        _design: &Design,
+        _evidence: &Evidence,
+        _parameters: &[f64],
+    ) -> Result<Option<Vec<TorqueMisfit>>, EstimationError> {
+        Ok(None)
     }
 
     /// −log L of parameters, but for a constant that is the same for all models of the same logs; none from

@@ -77,6 +77,8 @@ pub struct Evidence {
     pub(super) rate_hz: Option<f64>,
     /// The rows with those before them, where the settings ask for them.
     pub(super) in_order: Option<InOrder>,
+    /// Logs of encoders, where rows are asked for in order: their motion is found again under a better belief.
+    pub(super) encoder_logs: Vec<MotionLog>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -91,14 +93,16 @@ struct StoredEvidence {
     rate_hz: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     rows_in_order: Option<StoredFactor>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    encoder_logs: Vec<MotionLog>,
 }
 
 impl From<Evidence> for StoredEvidence {
     fn from(evidence: Evidence) -> Self {
-        let Evidence { settings, factor, instants, foreseen, rate_hz, in_order } = evidence;
+        let Evidence { settings, factor, instants, foreseen, rate_hz, in_order, encoder_logs } = evidence;
         let rows_in_order = in_order.map(|in_order| StoredFactor::from(in_order.factor()));
         let factor = StoredFactor::from(&factor);
-        StoredEvidence { settings, factor, instants, foreseen, rate_hz, rows_in_order }
+        StoredEvidence { settings, factor, instants, foreseen, rate_hz, rows_in_order, encoder_logs }
     }
 }
 
@@ -106,10 +110,12 @@ impl TryFrom<StoredEvidence> for Evidence {
     type Error = IdentificationError;
 
     fn try_from(stored: StoredEvidence) -> Result<Self, IdentificationError> {
-        let StoredEvidence { settings, factor, instants, foreseen, rate_hz, rows_in_order } = stored;
+        let StoredEvidence { settings, factor, instants, foreseen, rate_hz, rows_in_order, encoder_logs } =
+            stored;
         let in_order: Option<GroupedFactor> = rows_in_order.map(TryInto::try_into).transpose()?;
         let in_order = in_order.map(InOrder::of_factor);
-        Ok(Evidence { settings, factor: factor.try_into()?, instants, foreseen, rate_hz, in_order })
+        let factor = factor.try_into()?;
+        Ok(Evidence { settings, factor, instants, foreseen, rate_hz, in_order, encoder_logs })
     }
 }
 
@@ -135,7 +141,8 @@ impl Evidence {
         }
         let asked = settings.in_order && settings.rows_at == RowsAt::Periods;
         let in_order = asked.then(|| InOrder::none(design)).transpose()?;
-        Ok(Evidence { settings, factor, instants: Vec::new(), foreseen, rate_hz: None, in_order })
+        let (instants, encoder_logs) = (Vec::new(), Vec::new());
+        Ok(Evidence { settings, factor, instants, foreseen, rate_hz: None, in_order, encoder_logs })
     }
 
     /// The same for a robot that moves without noise: all columns are those of a period's mean motion.
@@ -143,11 +150,17 @@ impl Evidence {
         Evidence { foreseen: Vec::new(), ..self }
     }
 
+    /// The same of logs with so many rows a second \[Hz\].
+    pub fn at_rate(self, rate_hz: f64) -> Self {
+        Evidence { rate_hz: Some(rate_hz), ..self }
+    }
+
     /// Takes in a log.
     ///
     /// # Errors
     /// It is not of this robot, or has no derivatives where [`RowsAt`] asks for them.
     pub fn add(&mut self, design: &Design, measured: &MotionLog) -> Result<(), EstimationError> {
+        let is_first = self.is_empty();
         let block = match self.settings.rows_at {
             RowsAt::Stamps => measured.at_stamps()?,
             RowsAt::Periods => measured.over_periods(),
@@ -160,6 +173,11 @@ impl Evidence {
         self.factor = self.factor.merge(&factor)?;
         if let Some(in_order) = &mut self.in_order {
             in_order.add(design, &self.foreseen, measured)?;
+            match measured.readings.is_some() && (is_first || !self.encoder_logs.is_empty()) {
+                true => self.encoder_logs.push(measured.clone()),
+                // Of others the motion was measured: all logs are taken as they are.
+                false => self.encoder_logs.clear(),
+            }
         }
         Ok(())
     }
@@ -193,7 +211,7 @@ impl Evidence {
 }
 
 /// Evenly spaced samples, each in the middle of those that it stands for.
-fn instants(block: &Block, period_s: f64, every_s: f64) -> Vec<Instant> {
+pub(super) fn instants(block: &Block, period_s: f64, every_s: f64) -> Vec<Instant> {
     let stride = ((every_s / period_s).round() as usize).max(1);
     let stretches = block.len().div_ceil(stride);
     let stretch = |index: usize| {

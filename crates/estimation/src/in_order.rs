@@ -65,6 +65,22 @@ impl InOrder {
         InOrder { factor, parameters }
     }
 
+    /// Of a torque: its factor, half the number of its columns, and the parameters of Φ's.
+    pub fn torque(&self, torque: usize) -> (&Group, usize, Vec<usize>) {
+        let group = &self.factor.groups()[torque];
+        let half = group.factor.columns() / 2;
+        let first = self.factor.parameter_count() / 2;
+        let own = group.parameters[half..2 * half - BESIDE].iter();
+        (group, half, own.map(|parameter| parameter - first).collect())
+    }
+
+    /// Whether the log's torque has anything beside the command, but rounding.
+    pub fn differs(&self, torque: usize) -> bool {
+        let factor = &self.factor.groups()[torque].factor;
+        let beside = factor.as_mat().col(factor.columns() - BESIDE);
+        beside.squared_norm_l2() > DIFFERS * factor.right_hand_side_sum_of_squares()
+    }
+
     pub fn factor(&self) -> &GroupedFactor {
         &self.factor
     }
@@ -152,9 +168,12 @@ impl InOrder {
 
     /// The colour of each torque's noise under parameters `w`: the felt share and the correlation that leave
     /// least, found one after the other until they stay. `least` is the variance of each torque's noise that
-    /// nothing is believed to fall short of, and that is white: a residual below it has no colour.
-    pub fn colours(&self, w: &[f64], least: &[f64], largest: f64) -> Vec<Colour> {
-        let colour = |(group, least): (&Group, &f64)| {
+    /// nothing is believed to fall short of, and that is white: a residual below it has no colour. `beside`
+    /// are the squares and products of each torque's residual that the rows do not show
+    /// ([`super::smoothing::Smoothed::noise`]).
+    pub fn colours(&self, w: &[f64], least: &[f64], largest: f64, beside: &[[f64; 3]]) -> Vec<Colour> {
+        let colour = |(torque, (group, least)): (usize, (&Group, &f64))| {
+            let [before, across, after] = beside.get(torque).copied().unwrap_or_default();
             let least = least * group.factor.rows() as f64;
             let half = group.factor.columns() / 2;
             let own = half - BESIDE;
@@ -172,7 +191,15 @@ impl InOrder {
                 }
             });
             let parts = group.factor.as_mat() * map;
-            let product = |a: usize, b: usize| parts.col(a).transpose() * parts.col(b);
+            let product = |a: usize, b: usize| {
+                let unseen = match (a, b) {
+                    (0, 0) => before,
+                    (0, 1) | (1, 0) => across,
+                    (1, 1) => after,
+                    _ => 0.0,
+                };
+                parts.col(a).transpose() * parts.col(b) + unseen
+            };
             let command = group.factor.right_hand_side_sum_of_squares();
             let mut colour = Colour { correlation: 0.0, felt: 0.0 };
             let logs_differ = product(3, 3) > DIFFERS * command;
@@ -197,7 +224,7 @@ impl InOrder {
             }
             colour
         };
-        self.factor.groups().iter().zip(least).map(colour).collect()
+        self.factor.groups().iter().zip(least).enumerate().map(colour).collect()
     }
 }
 

@@ -1,6 +1,6 @@
 //! What the robot did: the measured Qⁱ and fⁱ.
 
-use crate::EstimationError;
+use crate::{EstimationError, Readings};
 use phiw_telemetry::{Block, Recording};
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +29,9 @@ pub struct MotionLog {
     /// What the controller was asked for at each row; none where the log does not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub asked: Option<Asked>,
+    /// The encoders' readings that positions and velocities were made of; none where these were measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub readings: Option<Readings>,
 }
 
 /// What a controller was asked for. Arrays are row-major, `[row × joints]`.
@@ -66,6 +69,7 @@ impl MotionLog {
             still: Vec::new(),
             command: Vec::new(),
             asked: None,
+            readings: None,
         })
     }
 

@@ -16,6 +16,8 @@ use phiw_regressor::least_squares::{Group, GroupedFactor};
 /// The objective over x: standard parameters, then effects.
 pub(super) struct Profile<'a> {
     pub factor: GroupedFactor,
+    /// Rows of each torque: those of the factor that are of a spread are none.
+    pub rows: Vec<f64>,
     /// RᵀR of each torque: for steps only, so half the digits are enough.
     pub grams: Vec<Mat<f64>>,
     pub sensitivities: &'a [Sensitivity],
@@ -41,15 +43,14 @@ pub(super) struct Minimum {
 impl Profile<'_> {
     /// Rows of each torque, and S_j with the least that it can be.
     fn squares(&self, w: &Mat<f64>) -> Vec<(f64, f64, Mat<f64>)> {
-        let of_group = |(group, least): (&Group, &f64)| {
+        let of_group = |((group, least), &rows): ((&Group, &f64), &f64)| {
             let size = group.factor.parameters();
             let r = group.factor.as_mat();
             let own = Mat::from_fn(size, 1, |row, _| w[(group.parameters[row], 0)]);
             let left = r.get(.., ..size) * own - r.get(.., size..);
-            let rows = group.factor.rows() as f64;
             (rows, left.squared_norm_l2() + rows * least, left)
         };
-        self.factor.groups().iter().zip(&self.least_variance).map(of_group).collect()
+        self.factor.groups().iter().zip(&self.least_variance).zip(&self.rows).map(of_group).collect()
     }
 
     /// Standard deviation of each torque's noise.
@@ -57,10 +58,26 @@ impl Profile<'_> {
         self.squares(w).iter().map(|(rows, square, _)| (square / rows.max(1.0)).sqrt()).collect()
     }
 
+    /// Observed information at `w` of the torques' noise with the standard deviations `std`, which are known.
+    pub fn information(&self, w: &Mat<f64>, std: &[f64]) -> Mat<f64> {
+        let responses: Vec<Option<Response>> =
+            self.sensitivities.iter().map(|sensitivity| Response::of(sensitivity, w)).collect();
+        let mut information = log_determinant_curvature(self.sensitivities, &responses, w.nrows(), 1)
+            * faer::Scale(self.instants_weight());
+        for ((group, gram), std) in self.factor.groups().iter().zip(&self.grams).zip(std) {
+            for (row, &parameter) in group.parameters.iter().enumerate() {
+                for (column, &other) in group.parameters.iter().enumerate() {
+                    information[(parameter, other)] += gram[(row, column)] / (std * std);
+                }
+            }
+        }
+        information
+    }
+
     /// Weight of the instants: they stand for all rows, of which those that follow no other are not
     /// counted.
     fn instants_weight(&self) -> f64 {
-        let rows = self.factor.groups().iter().map(|group| group.factor.rows()).max().unwrap_or(0) as f64;
+        let rows = self.rows.iter().copied().fold(0.0, f64::max);
         let all: f64 = self.sensitivities.iter().map(|sensitivity| sensitivity.weight).sum();
         if all > 0.0 { rows / all } else { 0.0 }
     }

@@ -4,7 +4,10 @@ use crate::contest::{Contender, ScoreTestSettings, Winner};
 use phiw_curriculum::CurriculumError;
 use phiw_curriculum::growth::{Found, Growth};
 use phiw_effects::{Catalogue, Constants, EffectKind, JointRange, SignalRanges};
-use phiw_estimation::{Estimator, Evidence, Gain, MotionLikelihood, MotionLog, Robot, RobotModel, RowsAt};
+use phiw_estimation::{
+    ConcentratedLikelihood, Estimator, Evidence, EvidenceSettings, Gain, MotionLikelihood, MotionLog, Robot,
+    RobotModel, RowsAt,
+};
 use phiw_identification::EffectSpec;
 use std::sync::Arc;
 
@@ -25,12 +28,49 @@ pub struct ScoreTest {
     pub catalogue: Arc<Catalogue>,
     /// When an effect is believed.
     pub settings: ScoreTestSettings,
+    /// Finds the noise that the estimator counts on, in the logs that are asked about; none where its own is
+    /// known.
+    pub noise: Option<ConcentratedLikelihood>,
 }
 
 impl ScoreTest {
     /// For a curriculum with this estimator.
     pub fn new(estimator: MotionLikelihood) -> Self {
-        ScoreTest { estimator, catalogue: Arc::default(), settings: ScoreTestSettings::default() }
+        ScoreTest {
+            estimator,
+            catalogue: Arc::default(),
+            settings: ScoreTestSettings::default(),
+            noise: None,
+        }
+    }
+
+    /// For a curriculum whose estimator is told no noise.
+    pub fn of_unknown_noise(estimator: ConcentratedLikelihood) -> Self {
+        let likelihood = MotionLikelihood::new(Vec::new()).standing_on(estimator.standing_on.clone());
+        ScoreTest { noise: Some(estimator), ..ScoreTest::new(likelihood) }
+    }
+
+    /// The same with the noise that `model`, which has been fitted to them, leaves of these logs.
+    ///
+    /// # Errors
+    /// The logs are not of this robot.
+    pub fn knowing(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        logs: &[MotionLog],
+    ) -> Result<Self, CurriculumError> {
+        let Some(concentrated) = &self.noise else { return Ok(self.clone()) };
+        let design = robot.design_of(model)?;
+        let settings = EvidenceSettings { in_order: true, ..RowsAt::Periods.into() };
+        let mut evidence = Evidence::none(&design, settings)?;
+        for log in logs {
+            evidence.add(&design, log)?;
+        }
+        let noise = concentrated.noise(&design, &evidence, &model.parameters(robot)?)?;
+        let torque_noise = noise.iter().map(|noise| noise.std).collect();
+        let estimator = MotionLikelihood { torque_noise, ..self.estimator.clone() };
+        Ok(ScoreTest { estimator, noise: None, ..self.clone() })
     }
 
     /// Every effect of the catalogue on every joint that a fit leaves something of, each with the constants
@@ -166,6 +206,23 @@ impl Growth for ScoreTest {
         _doubted: bool,
         refuted: &[EffectSpec],
     ) -> Result<Found, CurriculumError> {
+        self.knowing(robot, model, logs)?.found(robot, model, logs, refuted)
+    }
+
+    fn least_gain(&self) -> f64 {
+        self.settings.least_merit
+    }
+}
+
+impl ScoreTest {
+    /// What a test whose noise is known finds.
+    fn found(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        logs: &[MotionLog],
+        refuted: &[EffectSpec],
+    ) -> Result<Found, CurriculumError> {
         let mut found = Found::default();
         if logs.iter().map(MotionLog::duration_s).sum::<f64>() < self.settings.least_s {
             return Ok(found);
@@ -193,10 +250,6 @@ impl Growth for ScoreTest {
             }
         }
         Ok(found)
-    }
-
-    fn least_gain(&self) -> f64 {
-        self.settings.least_merit
     }
 }
 

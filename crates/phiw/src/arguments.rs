@@ -299,6 +299,13 @@ pub struct NextArguments {
     /// do not tell is taken from it.
     #[arg(long, value_name = "SHARE", default_value_t = 0.3, value_parser = positive)]
     pub urdf_error: f64,
+    /// How the logs are estimated from. The first needs logs that say what the controller commanded
+    /// (`tau_cmd.<joint>`) or was asked for (`qref.<joint>`); where one does not, the second is taken.
+    #[arg(long, default_value = "unknown-noise")]
+    pub estimator: NextEstimator,
+    /// Commands a second of the robot's controller (Hz); by default seen in the logs.
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    pub command_hz: Option<f64>,
     /// The part that the support is reduced by, 0 to 1; by default from cond(Φ), as in the paper's equation
     /// (20).
     #[arg(long, value_name = "ALPHA", value_parser = share)]
@@ -338,6 +345,16 @@ impl NextArguments {
             ..SessionArguments::default()
         }
     }
+}
+
+/// How `phiw next` estimates from logs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum NextEstimator {
+    /// The likelihood of a motion that noise moves, which finds the noise out with the parameters.
+    #[default]
+    UnknownNoise,
+    /// Equation (4) of the filtered logs, with the URDF as prior: the noise is taken to be in the log alone.
+    LeastSquares,
 }
 
 /// How velocities and accelerations come about.

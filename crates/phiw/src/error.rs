@@ -328,6 +328,14 @@ pub enum Error {
         /// What is wrong with it.
         source: Box<CurriculumError>,
     },
+    /// A log of which no motions at the controller's rate can be made.
+    #[error("{}: {source} (--estimator least-squares takes any log)", path.display())]
+    LogForNext {
+        /// The log.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: Box<EstimationError>,
+    },
     /// A joint that no motion moves.
     #[error(
         "{}: joint `{joint}` moves by {travel:.1e} {unit} in all motions, so none can tell anything of it; add motions that move it, \
@@ -439,6 +447,7 @@ impl Error {
             | Error::NoMotion
             | Error::NoMotions { .. }
             | Error::Motion { .. }
+            | Error::LogForNext { .. }
             | Error::JointStandsStill { .. }
             | Error::Support { .. }
             | Error::Stance { .. }

@@ -1,5 +1,6 @@
 //! `phiw next`: which motion a real robot should run next, given what has been measured so far.
 
+mod controlled;
 mod estimate;
 mod motions;
 mod plan_file;

@@ -146,6 +146,7 @@ fn record(condition_number: f64, model: &RobotModel) -> IterationRecord {
         separates: None,
         model: model.clone(),
         standard_deviations: Vec::new(),
+        misfit: Vec::new(),
     }
 }
 

@@ -4,8 +4,8 @@ use crate::arrays::{Doubles, array};
 use crate::robot::Robot;
 use crate::work::{InputError, raised, run};
 use phiw::arguments::{
-    CheckArguments, Derivatives, ExplainArguments, InMemory, MotionFormat, NextArguments, PredictArguments,
-    RetargetArguments, SessionArguments,
+    CheckArguments, Derivatives, ExplainArguments, InMemory, MotionFormat, NextArguments, NextEstimator,
+    PredictArguments, RetargetArguments, SessionArguments,
 };
 use phiw::identify::Results;
 use phiw_identification::Interruption;
@@ -181,6 +181,8 @@ pub fn next_motion<'py>(
         declare: options.declare,
         hold: robot.get().hold.clone(),
         urdf_error: options.urdf_error,
+        estimator: NextEstimator::default(),
+        command_hz: None,
         alpha: options.alpha,
         cutoff_hz: options.cutoff_hz,
         parallel_cutoff_hz: options.parallel_cutoff_hz,

@@ -4,8 +4,9 @@
 use phiw_curriculum::CurriculumError;
 use phiw_curriculum::motion::Motion;
 use phiw_dynamics::Tree;
-use phiw_estimation::{Asked, MotionLog};
+use phiw_estimation::{Asked, Logged, MotionLog};
 use phiw_plant::{Clock, Derivatives, History, PlantRun, Sensors, Timing};
+use phiw_telemetry::Recording;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -97,7 +98,8 @@ impl Measuring {
             None => MotionLog::from_recording(&run.recording)?,
             Some(encoders) => {
                 let step = std::f64::consts::TAU * 0.5_f64.powi(i32::from(encoders.bits));
-                let mut log = MotionLog::of_encoders(&run.recording, timing.control_period_s, step)?;
+                let steps = vec![step; run.recording.joints.len()];
+                let mut log = MotionLog::of_encoders(&run.recording, timing.control_period_s, &steps)?;
                 log.tau = torques(&run.history, &run.history.command, &log);
                 log
             }
@@ -113,6 +115,25 @@ impl Measuring {
             self.disturb(&mut log, tree, &mut own);
         }
         Ok(log)
+    }
+
+    /// What a logger writes down beside each reading: the torque and the command that are in force, and what
+    /// the controller is asked for.
+    pub(crate) fn logged(&self, readings: &Recording, measured: &MotionLog) -> Logged {
+        let (joints, last) = (measured.joints, measured.rows().saturating_sub(1));
+        let held = |values: &[f64]| -> Vec<f64> {
+            let row =
+                |t: &f64| (((t - readings.t[0]) / measured.period_s + 1e-6) as usize).min(last) * joints;
+            readings.t.iter().flat_map(|t| values[row(t)..row(t) + joints].iter().copied()).collect()
+        };
+        let command = match (self.controller, measured.command.as_slice()) {
+            (KnownOfController::Commands, []) => Some(held(&measured.tau)),
+            (KnownOfController::Commands, command) => Some(held(command)),
+            _ => None,
+        };
+        let reference = measured.asked.as_ref().map(|asked| held(&asked.q));
+        let recording = Recording { tau: held(&measured.tau), ..readings.clone() };
+        Logged { recording, command, reference }
     }
 
     /// Adds the errors of the logged torques.

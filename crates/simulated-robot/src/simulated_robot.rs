@@ -5,7 +5,7 @@ use crate::{Controller, Measuring};
 use phiw_curriculum::motion::Motion;
 use phiw_curriculum::{CurriculumError, Experiment, Trial};
 use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
-use phiw_estimation::{Asked, KnownEffect, MotionLog, Robot, RobotModel};
+use phiw_estimation::{Asked, KnownEffect, Logged, MotionLog, Robot, RobotModel};
 use phiw_identification::effect::JointProperty;
 use phiw_plant::{Friction, History, Plant, PlantEffect, PlantRun, PlantSetup, Sensors, Timing};
 use rand::Rng;
@@ -199,6 +199,40 @@ impl Experiment for SimulatedRobot {
         rng: &mut dyn Rng,
     ) -> Result<Trial, CurriculumError> {
         let run = self.run(robot, model, motion, rng)?;
+        self.trial(&run, robot, model, motion, rng)
+    }
+
+    fn known_torque_noise(&self) -> Option<Vec<f64>> {
+        Some(self.torque_noise())
+    }
+}
+
+impl SimulatedRobot {
+    /// A trial, and what a logger on the robot writes down of it: a row for each reading of the encoders.
+    ///
+    /// # Errors
+    /// As [`Experiment::perform`].
+    pub fn perform_logged(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        motion: &Motion,
+        rng: &mut dyn Rng,
+    ) -> Result<(Trial, Logged), CurriculumError> {
+        let run = self.run(robot, model, motion, rng)?;
+        let trial = self.trial(&run, robot, model, motion, rng)?;
+        let logged = self.measuring.logged(&run.recording, &trial.measured);
+        Ok((trial, logged))
+    }
+
+    fn trial(
+        &self,
+        run: &PlantRun,
+        robot: &Robot,
+        model: &RobotModel,
+        motion: &Motion,
+        rng: &mut dyn Rng,
+    ) -> Result<Trial, CurriculumError> {
         // A robot that falls at once has no log.
         let measured = match run.recording.len() {
             0 | 1 => MotionLog {
@@ -208,7 +242,7 @@ impl Experiment for SimulatedRobot {
             },
             _ => MotionLog {
                 still: self.still(&run.history),
-                ..self.measuring.log(&run, &self.tree, &self.timing, rng)?
+                ..self.measuring.log(run, &self.tree, &self.timing, rng)?
             },
         };
         let measured = match self.measuring.controller == KnownOfController::Reference && measured.rows() > 1
@@ -216,11 +250,8 @@ impl Experiment for SimulatedRobot {
             true => MotionLog { asked: Some(self.asked(robot, model, motion, &measured)?), ..measured },
             false => measured,
         };
-        Ok(Trial { measured, fell_at_s: run.fell_at_s, tracking_error: run.tracking_error })
-    }
-
-    fn known_torque_noise(&self) -> Option<Vec<f64>> {
-        Some(self.torque_noise())
+        let tracking_error = run.tracking_error.clone();
+        Ok(Trial { measured, fell_at_s: run.fell_at_s, tracking_error })
     }
 }
 

@@ -179,6 +179,7 @@ fn record(cond: f64, change: f64) -> IterationRecord {
         separates: None,
         model,
         standard_deviations: Vec::new(),
+        misfit: Vec::new(),
     }
 }
 

@@ -86,6 +86,27 @@ fn the_noise_is_found_with_the_parameters() {
     }
 }
 
+/// A spline of the readings alone does not know that slow noise hardly changes from a period to the next: with
+/// encoders, slow noise made the parameters twice as wrong as exact sensors did.
+#[test]
+fn slow_noise_and_encoders_ask_for_the_motion_under_the_belief() {
+    let measuring = Measuring { encoders: Some(Encoders::new(13, 1e-3)), ..Measuring::default() };
+    let arm = Arm::new(0.05);
+    let (design, evidence) = measure(&arm, measuring);
+    let truth = arm.truth.parameters(&arm.robot).unwrap();
+    let initial = unreliable_model(&arm.truth, 5);
+    let start = initial.parameters(&arm.robot).unwrap();
+    let error = |smoothings: usize| {
+        let mut estimator = ConcentratedLikelihood::new(initial.clone());
+        estimator.settings.smoothings = smoothings;
+        let found = estimator.estimate(&design, &evidence, &initial, &start).unwrap();
+        rms(&found.parameters, &truth)
+    };
+    let (spline, smoothed) = (error(0), error(5));
+    println!("spline {spline}, smoothed {smoothed}, at first {}", rms(&start, &truth));
+    assert!(smoothed < 0.8 * spline, "{smoothed} from {spline}");
+}
+
 /// What was delivered beside the command is in the log, and moved the robot: little is left that is not
 /// known.
 #[test]

@@ -129,6 +129,8 @@ pub(crate) struct Columns {
 }
 
 impl Columns {
+    /// `torque` says what is needed of the torques, and which signal stands in their place.
+    ///
     /// # Errors
     /// A column that is missing or there twice, or a map that does not fit.
     pub fn find(
@@ -136,7 +138,7 @@ impl Columns {
         table: &dyn Table,
         map: Option<&LogMap>,
         joints: &[String],
-        torque: TorqueColumns,
+        (torque, torque_signal): (TorqueColumns, Signal),
     ) -> Result<Self, LogError> {
         let header = table.header();
         let lookup = Lookup { path, header: &header, columns: table.columns(), map, joints };
@@ -149,12 +151,12 @@ impl Columns {
         };
         let torques = match torque {
             TorqueColumns::Absent => vec![None; joints.len()],
-            _ => all(Signal::Torque)?,
+            _ => all(torque_signal)?,
         };
         let has_torque = torque == TorqueColumns::Required || torques.iter().any(Option::is_some);
         let mut of_place = vec![t];
         let mut missing = Vec::new();
-        let required = [(Signal::Position, all(Signal::Position)?), (Signal::Torque, torques)];
+        let required = [(Signal::Position, all(Signal::Position)?), (torque_signal, torques)];
         for (signal, found) in required.into_iter().take(1 + usize::from(has_torque)) {
             for (joint, found) in joints.iter().zip(found) {
                 match found {

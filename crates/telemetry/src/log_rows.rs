@@ -4,7 +4,7 @@ use crate::LogError;
 use crate::columns::{Columns, Layout, TorqueColumns};
 use crate::gap::GapReason;
 use crate::log_source::LogSource;
-use crate::map::{Expression, LogFacts, LogPart};
+use crate::map::{Expression, LogFacts, LogPart, Signal};
 use crate::reader::{Row, Rows, unusable};
 use phiw_log_formats::{OpenOptions, Step, Table, is_missing};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -32,6 +32,15 @@ pub(crate) fn open_log(
     source: &LogSource,
     joints: &[String],
     torque: TorqueColumns,
+) -> Result<LogRows, LogError> {
+    open_log_of(source, joints, (torque, Signal::Torque))
+}
+
+/// The same with another signal in the torques' place.
+pub(crate) fn open_log_of(
+    source: &LogSource,
+    joints: &[String],
+    torque: (TorqueColumns, Signal),
 ) -> Result<LogRows, LogError> {
     let LogSource { path, map, part, columns: in_memory, .. } = source;
     let map = map.as_deref();

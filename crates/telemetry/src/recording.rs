@@ -155,6 +155,7 @@ impl Recording {
             velocity: self.qd.is_some(),
             acceleration: self.qdd.is_some(),
             temperature: self.temp.is_some(),
+            ..LogColumns::default()
         }
     }
 

@@ -16,6 +16,10 @@ pub struct LogColumns {
     pub acceleration: bool,
     /// `temp.<joint>`.
     pub temperature: bool,
+    /// `qref.<joint>`: what the controller was asked for.
+    pub reference: bool,
+    /// `tau_cmd.<joint>`: what it commanded.
+    pub command: bool,
 }
 
 impl LogColumns {
@@ -25,6 +29,8 @@ impl LogColumns {
             (self.velocity, "qd"),
             (self.acceleration, "qdd"),
             (self.temperature, "temp"),
+            (self.reference, "qref"),
+            (self.command, "tau_cmd"),
         ];
         std::iter::once("q").chain(optional.into_iter().filter(|(has, _)| *has).map(|(_, prefix)| prefix))
     }
@@ -67,8 +73,8 @@ impl<W: Write> LogWriter<W> {
         Ok(LogWriter { out })
     }
 
-    /// Writes one row: the time, then the signals in the order `q`, `tau`, `qd`, `qdd`, `temp` (those that
-    /// the log has), one value a joint each.
+    /// Writes one row: the time, then the signals in the order `q`, `tau`, `qd`, `qdd`, `temp`, `qref`,
+    /// `tau_cmd` (those that the log has), one value a joint each.
     ///
     /// # Errors
     /// What the output fails with.

@@ -1,6 +1,6 @@
 //! One cell of the table: where the noise is, what measures, who estimates.
 
-use crate::paper::{Arm, Setup};
+use crate::paper::{Arm, NoiseIn, Setup};
 use crate::plant::engine::Engine;
 use phiw_curriculum::end::FixedCount;
 use phiw_curriculum::motion::Motion;
@@ -9,26 +9,14 @@ use phiw_curriculum::{
     Curriculum, CurriculumError, CurriculumRun, CurriculumSettings, Experiment, Trial, unreliable_model,
 };
 use phiw_estimation::{
-    ConcentratedLikelihood, Estimator, LeastSquares, MotionLikelihood, Robot, RobotModel, RowsAt,
+    ConcentratedLikelihood, ConcentratedSettings, Estimator, LeastSquares, MotionLikelihood, Robot,
+    RobotModel, RowsAt, TorqueNoise,
 };
-use phiw_simulated_robot::{Encoders, KnownOfController, LoggedTorque, Measuring, SimulatedRobot};
+use phiw_simulated_robot::{Encoders, KnownOfController, Measuring, SimulatedRobot};
 use rand::Rng;
 
 /// Bits of the encoders.
 const ENCODER_BITS: u8 = 17;
-
-/// Where the noise is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum NoiseIn {
-    /// It is added to the command and moves the robot; the log has the command.
-    Motion,
-    /// It is added to the logged torque and moves nothing.
-    Log,
-    /// Both, independently.
-    Both,
-    /// It is added to the command and moves the robot, and the log has what was delivered.
-    Delivered,
-}
 
 /// What measures the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -79,7 +67,7 @@ pub enum EstimatorName {
 }
 
 /// A cell.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Cell {
     /// Where the noise is.
     pub noise_in: NoiseIn,
@@ -89,8 +77,8 @@ pub struct Cell {
     pub sensors: SensorName,
     /// Who estimates.
     pub estimator: EstimatorName,
-    /// Weight of the prior.
-    pub prior_weight: Option<f64>,
+    /// What the estimator decides that finds the noise out.
+    pub settings: ConcentratedSettings,
     /// What the log says of the controller.
     pub controller: ControllerName,
 }
@@ -102,6 +90,11 @@ pub struct Outcome {
     pub rmse_w: [f64; 2],
     /// Held-out torque error of both \[N·m\].
     pub torque: [f64; 2],
+    /// RMSE_w of an estimate without a prior that knows all but the parameters; none where nothing moves the
+    /// robot but its commands, or the rows are not those of [`ConcentratedLikelihood`].
+    pub bound: Option<f64>,
+    /// Torques of the last estimate whose misfit is refuted, one false alarm in a hundred tests of them all.
+    pub refuted: usize,
     /// Iterations in which the constraint allowed nothing.
     pub forced: usize,
 }
@@ -155,14 +148,33 @@ impl Cell {
         Ok(Outcome {
             rmse_w: [first.rmse_w, last.rmse_w],
             torque: [first.rmse_torque, last.rmse_torque],
+            bound: self.bound(setup, &run)?,
+            refuted: run.history.last().map_or(0, |record| {
+                record.misfit.iter().filter(|own| own.is_refuted(record.misfit.len(), 100.0)).count()
+            }),
             forced: run.history.iter().filter(|record| record.forced).count(),
         })
     }
 
+    fn bound(&self, setup: &Setup, run: &CurriculumRun) -> anyhow::Result<Option<f64>> {
+        let moves = matches!(self.noise_in, NoiseIn::Motion | NoiseIn::Both);
+        let (Some(evidence), EstimatorName::Concentrated, true) = (&run.evidence, self.estimator, moves)
+        else {
+            return Ok(None);
+        };
+        let noise = |std: f64| TorqueNoise { std, correlation: self.correlation, felt: 0.0 };
+        let noise: Vec<TorqueNoise> =
+            setup.subject.torque_noise(setup.settings.noise).into_iter().map(noise).collect();
+        let truth = setup.truth.parameters(&setup.robot)?;
+        let design = setup.robot.design_of(&setup.truth)?;
+        let estimator = ConcentratedLikelihood::new(run.initial.clone());
+        let std = estimator.bound(&design, evidence, &truth, &noise)?;
+        Ok(Some((std.iter().map(|std| std * std).sum::<f64>() / std.len() as f64).sqrt()))
+    }
+
     fn experiment(&self, setup: &Setup, backend: Engine) -> SimulatedRobot {
         let noise = setup.settings.noise;
-        let in_motion = if self.noise_in == NoiseIn::Log { 0.0 } else { noise };
-        let in_log = if matches!(self.noise_in, NoiseIn::Log | NoiseIn::Both) { noise } else { 0.0 };
+        let (in_motion, in_log) = self.noise_in.shares(noise);
         let robot = setup.experiment(backend, false, in_motion);
         let command_s = robot.timing.control_period_s;
         let encoders = match self.sensors {
@@ -170,17 +182,13 @@ impl Cell {
             SensorName::Encoders => Some(Encoders::new(ENCODER_BITS, 0.1 * command_s)),
             SensorName::SlowEncoders => Some(Encoders::new(ENCODER_BITS, command_s)),
         };
-        let logged = match self.noise_in {
-            NoiseIn::Delivered => LoggedTorque::Delivered,
-            _ => LoggedTorque::Commanded,
-        };
         SimulatedRobot {
             noise_correlation: self.correlation,
             measuring: Measuring {
                 encoders,
                 torque_noise: in_log,
                 torque_noise_correlation: self.correlation,
-                logged,
+                logged: self.noise_in.logged(),
                 controller: self.controller.into(),
             },
             ..robot
@@ -195,11 +203,8 @@ impl Cell {
         };
         match self.estimator {
             EstimatorName::Concentrated => {
-                let mut estimator = ConcentratedLikelihood::new(initial.clone());
-                if let Some(weight) = self.prior_weight {
-                    estimator.settings.prior_weight = weight;
-                }
-                Box::new(estimator)
+                let settings = self.settings.clone();
+                Box::new(ConcentratedLikelihood { settings, ..ConcentratedLikelihood::new(initial.clone()) })
             }
             EstimatorName::Likelihood => told(1.0),
             EstimatorName::LikelihoodLow => told(0.8),

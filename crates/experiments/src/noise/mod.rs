@@ -28,10 +28,11 @@ mod cell;
 mod table;
 
 use crate::environment;
-use crate::paper::{RunArguments, Setup};
+use crate::paper::{NoiseIn, RunArguments, Setup};
 use anyhow::Context;
-use cell::{Cell, ControllerName, EstimatorName, NoiseIn, SensorName};
+use cell::{Cell, ControllerName, EstimatorName, SensorName};
 use phiw::console::Console;
+use phiw_estimation::ConcentratedSettings;
 use rayon::prelude::*;
 
 /// Arguments of `cargo xtask noise`.
@@ -55,9 +56,32 @@ pub struct Arguments {
     /// Weight of the prior of the estimator that finds the noise out.
     #[arg(long)]
     prior_weight: Option<f64>,
+    /// Times that its encoders' motion is found anew under the estimate.
+    #[arg(long)]
+    smoothings: Option<usize>,
+    /// What is left of how accelerations decay within a period, over the noise.
+    #[arg(long)]
+    decay_error: Option<f64>,
+    /// Error of an encoder's reading over that of rounding.
+    #[arg(long)]
+    reading_error: Option<f64>,
     /// What the log says of the controller beside the torques.
     #[arg(long, default_value = "commands")]
     controller: ControllerName,
+}
+
+impl Arguments {
+    /// What the estimator decides that finds the noise out.
+    fn settings(&self) -> ConcentratedSettings {
+        let usual = ConcentratedSettings::default();
+        ConcentratedSettings {
+            prior_weight: self.prior_weight.unwrap_or(usual.prior_weight),
+            smoothings: self.smoothings.unwrap_or(usual.smoothings),
+            decay_error: self.decay_error.unwrap_or(usual.decay_error),
+            reading_error: self.reading_error.unwrap_or(usual.reading_error),
+            ..usual
+        }
+    }
 }
 
 /// Runs the task.
@@ -78,7 +102,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
                         correlation,
                         sensors,
                         estimator,
-                        prior_weight: arguments.prior_weight,
+                        settings: arguments.settings(),
                         controller: arguments.controller,
                     };
                     let first = arguments.run.first_seed;

@@ -5,7 +5,7 @@ use clap::ValueEnum;
 use phiw_report::statistics::median;
 
 /// Its head.
-pub const HEAD: &str = "| sensors | noise in | ρ | estimator | RMSE_w | worst | torque error \\[N·m\\] | worst | worse than the start | forced |\n|---|---|--:|---|--:|--:|--:|--:|--:|--:|";
+pub const HEAD: &str = "| sensors | noise in | ρ | estimator | RMSE_w | worst | torque error \\[N·m\\] | worst | worse than the start | bound | refuted | forced |\n|---|---|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|";
 
 /// The row of a cell.
 pub fn row(cell: &Cell, outcomes: &[Outcome]) -> String {
@@ -15,8 +15,10 @@ pub fn row(cell: &Cell, outcomes: &[Outcome]) -> String {
     let is_worse = |outcome: &&Outcome| {
         [outcome.rmse_w, outcome.torque].iter().any(|[first, last]| last.is_nan() || last > first)
     };
+    let bounds: Vec<f64> = outcomes.iter().filter_map(|outcome| outcome.bound).collect();
+    let bound = if bounds.is_empty() { "–".to_owned() } else { format!("{:.3}", median(&bounds)) };
     format!(
-        "| {} | {} | {} | {} | {:.3} | {:.2} | {:.2} | {:.1} | {} of {} | {} of {} |",
+        "| {} | {} | {} | {} | {:.3} | {:.2} | {:.2} | {:.1} | {} of {} | {} | {} | {} of {} |",
         name(&cell.sensors),
         name(&cell.noise_in),
         cell.correlation,
@@ -27,6 +29,8 @@ pub fn row(cell: &Cell, outcomes: &[Outcome]) -> String {
         worst(&torque),
         outcomes.iter().filter(is_worse).count(),
         outcomes.len(),
+        bound,
+        outcomes.iter().map(|outcome| outcome.refuted).sum::<usize>(),
         outcomes.iter().map(|outcome| outcome.forced).sum::<usize>(),
         outcomes.len() * 5,
     )

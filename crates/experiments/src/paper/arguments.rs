@@ -6,6 +6,7 @@ use super::shard::Shard;
 use super::subject::SubjectName;
 use crate::plant::engine::Engine;
 use crate::plant::secret::SecretKind;
+use phiw_simulated_robot::LoggedTorque;
 use std::path::PathBuf;
 
 /// Arguments of `cargo xtask paper`.
@@ -18,6 +19,17 @@ pub struct Arguments {
     /// What to run.
     #[command(flatten)]
     pub run: RunArguments,
+    /// Where the noise is. The paper's text says that it moves the robot and is not logged; its numbers look
+    /// like noise of the log.
+    #[arg(long, default_value = "motion")]
+    pub noise_in: NoiseIn,
+}
+
+impl Arguments {
+    /// What to run.
+    pub fn run(&self) -> RunArguments {
+        RunArguments { noise_in: self.noise_in, ..self.run.clone() }
+    }
 }
 
 /// What else can be done.
@@ -83,7 +95,7 @@ pub struct RunArguments {
     #[arg(long = "as", value_name = "METHOD", conflicts_with_all = ["estimator", "prior", "relaxation"])]
     pub method: Option<Method>,
     /// How parameters are estimated.
-    #[arg(long, default_value = "likelihood")]
+    #[arg(long, default_value = "concentrated")]
     pub estimator: EstimatorName,
     /// What the estimate falls back on where the logs tell little. Without it: the initial model for the
     /// robot on its feet, nothing for the others, as in the paper. For the likelihood only.
@@ -96,6 +108,9 @@ pub struct RunArguments {
     /// Standard deviation of the torque noise over the torque limit.
     #[arg(long, default_value_t = 0.05)]
     pub noise: f64,
+    /// Where it is.
+    #[arg(skip)]
+    pub noise_in: NoiseIn,
     /// Iterations of each run.
     #[arg(long, default_value_t = 5)]
     pub iterations: usize,
@@ -128,6 +143,42 @@ pub enum EstimatorName {
     Likelihood,
     /// The same with the noise found out: the one for a real robot.
     Concentrated,
+}
+
+/// Where the noise is.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum NoiseIn {
+    /// It is added to the command and moves the robot; the log has the command.
+    #[default]
+    Motion,
+    /// It is added to the logged torque and moves nothing.
+    Log,
+    /// Both, independently.
+    Both,
+    /// It is added to the command and moves the robot, and the log has what was delivered.
+    Delivered,
+}
+
+impl NoiseIn {
+    /// Of a noise, what moves the robot and what is an error of the log.
+    pub fn shares(self, noise: f64) -> (f64, f64) {
+        match self {
+            NoiseIn::Motion | NoiseIn::Delivered => (noise, 0.0),
+            NoiseIn::Log => (0.0, noise),
+            NoiseIn::Both => (noise, noise),
+        }
+    }
+
+    /// Which torque the log has.
+    pub fn logged(self) -> LoggedTorque {
+        match self {
+            NoiseIn::Delivered => LoggedTorque::Delivered,
+            _ => LoggedTorque::Commanded,
+        }
+    }
 }
 
 /// A whole method.

@@ -32,8 +32,11 @@ impl Setup {
     /// # Errors
     /// The run is not of this robot.
     pub fn detection(&self, file: &RunFile) -> anyhow::Result<Option<Detection>> {
-        let (Some(test), Arm::Closed) = (self.score_test(), file.arm) else { return Ok(None) };
+        let (Some(test), Arm::Closed) = (self.score_test(&file.run.initial), file.arm) else {
+            return Ok(None);
+        };
         let run = &file.run;
+        let test = test.knowing(&self.robot, &run.model, &run.logs)?;
         let model = test.fitted(&self.robot, &run.model, &[], &run.logs)?;
         let (own, others): (Vec<Gain>, Vec<Gain>) = test
             .rank(&self.robot, &model, &run.logs)?

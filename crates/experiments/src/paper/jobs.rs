@@ -125,7 +125,7 @@ impl Job {
         let experiment = setup.trial_ground(self.backend, standing, setup.settings.noise, secret);
         let selection = self.arm.selection(&setup.dataset, &setup.settings.tasks);
         let estimator = setup.estimator(&file.run.initial);
-        let growth = setup.growth();
+        let growth = setup.growth(&file.run.initial);
         let curriculum = Curriculum {
             robot: &setup.robot,
             dataset: &setup.dataset,

@@ -34,6 +34,7 @@ mod arguments;
 mod arm;
 mod detection;
 mod ending;
+mod estimators;
 mod figures;
 mod jobs;
 mod method;
@@ -55,7 +56,7 @@ mod whole_body;
 pub(crate) use crate::plant::engine::Engine;
 pub(crate) use crate::plant::secret::SecretKind;
 pub use arguments::Arguments;
-pub(crate) use arguments::{Detector, EstimatorName, Initial, RunArguments};
+pub(crate) use arguments::{Detector, EstimatorName, Initial, NoiseIn, RunArguments};
 pub(crate) use arm::{Arm, Footing};
 pub(crate) use figures::{balance, choices};
 pub(crate) use jobs::{Job, do_all};
@@ -88,7 +89,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
     match &arguments.command {
         Some(Command::Merge(merge)) => self::merge(merge),
         None if arguments.run.slurm.is_some() => shard::slurm(&arguments.run),
-        None => run(&arguments.run),
+        None => run(&arguments.run()),
     }
 }
 

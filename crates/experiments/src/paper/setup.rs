@@ -1,12 +1,13 @@
 //! Everything that all runs share, and what of it decides their results.
 
-use super::arguments::{Detector, EstimatorName, Initial, Method, PriorName, RelaxationName, RunArguments};
+use super::arguments::{
+    Detector, EstimatorName, Initial, Method, NoiseIn, PriorName, RelaxationName, RunArguments,
+};
 use super::method;
 use super::motions::Motions;
 use super::run_file;
 use super::subject::{Subject, SubjectName};
 use super::tasks::two_tasks;
-use super::whole_body::Standing;
 use crate::plant::case;
 use crate::plant::engine::Engine;
 use crate::plant::secret::SecretKind;
@@ -14,21 +15,16 @@ use anyhow::{Context, ensure};
 use phiw::console::Console;
 use phiw_curriculum::Experiment;
 use phiw_curriculum::constraint::ZmpConstraint;
-use phiw_curriculum::growth::Growth;
 use phiw_curriculum::motion::{Motion, MotionDataset};
 use phiw_curriculum::relaxation::Relaxation;
 use phiw_curriculum::selection::MotionCandidates;
 use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
 use phiw_dynamics::{Workspace, World};
-use phiw_estimation::{
-    ConcentratedLikelihood, Estimator, Evidence, LeastSquares, MotionLikelihood, MotionLog, ParameterPrior,
-    Robot, RobotModel, RowsAt, WeightedLeastSquares,
-};
-use phiw_growth::{ScoreTest, TraceResidual};
+use phiw_estimation::{Evidence, MotionLog, Robot, RobotModel, RowsAt};
 use phiw_identification::model::{parameter_name, standard_unit};
 use phiw_plant::{PlantEffect, Sensors, Timing};
 use phiw_regressor::factor::Factor;
-use phiw_simulated_robot::{FeedForward, SimulatedRobot};
+use phiw_simulated_robot::{FeedForward, KnownOfController, SimulatedRobot};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -100,6 +96,9 @@ pub struct Settings {
     pub detector: Detector,
     /// Torque noise over the torque limit.
     pub noise: f64,
+    /// Where it is.
+    #[serde(default)]
+    pub noise_in: NoiseIn,
     /// Iterations.
     pub iterations: usize,
     /// How many initial models.
@@ -144,7 +143,7 @@ const VALIDATION_SEED: u64 = u64::MAX;
 /// The stream of the secrets of a seed.
 const SECRET_STREAM: u64 = 1;
 /// What stands for rounding where there is no noise, over the torque limit.
-const NOISELESS: f64 = 1e-3;
+pub(super) const NOISELESS: f64 = 1e-3;
 
 impl Setup {
     /// Reads robot and motions, retargets what is not there, and measures the validation motions. `console`
@@ -201,6 +200,7 @@ impl Setup {
             relaxation,
             detector: arguments.detector,
             noise: arguments.noise,
+            noise_in: arguments.noise_in,
             iterations: arguments.iterations,
             initial: arguments.initial,
             parameters: parameter_facts(&robot, &truth)?,
@@ -242,9 +242,15 @@ impl Setup {
         noise: f64,
         secret: Option<&PlantEffect>,
     ) -> Box<dyn Experiment> {
-        let mut experiment = self.experiment(backend, standing, noise);
+        let (in_motion, in_log) = self.settings.noise_in.shares(noise);
+        let mut experiment = self.experiment(backend, standing, in_motion);
         // What is held out is measured without noise, and exactly.
         if noise > 0.0 {
+            experiment.measuring.torque_noise = in_log;
+            experiment.measuring.logged = self.settings.noise_in.logged();
+            if self.settings.method == Some(Method::Printed) {
+                experiment.measuring.controller = KnownOfController::Nothing;
+            }
             experiment.measuring.encoders =
                 method::encoders(self.settings.method, experiment.timing.control_period_s);
         }
@@ -274,47 +280,6 @@ impl Setup {
             noise_correlation: 0.0,
             measuring: Default::default(),
             build: Box::new(move |tree, world| backend.build(tree, world)),
-        }
-    }
-
-    /// Who estimates, in a run that begins with `initial`.
-    pub fn estimator(&self, initial: &RobotModel) -> Box<dyn Estimator> {
-        match self.settings.estimator {
-            EstimatorName::Concentrated => {
-                let standing_on = self.subject.standing.as_ref().map(Standing::foot_bodies);
-                let concentrated = ConcentratedLikelihood::new(initial.clone());
-                Box::new(concentrated.standing_on(standing_on.unwrap_or_default()))
-            }
-            EstimatorName::LeastSquares => Box::new(LeastSquares),
-            EstimatorName::Weighted => Box::new(WeightedLeastSquares),
-            EstimatorName::Likelihood => {
-                let likelihood = self.likelihood();
-                Box::new(match self.settings.prior {
-                    PriorName::None => likelihood,
-                    PriorName::Initial => likelihood.believing(ParameterPrior::unreliable(initial.clone())),
-                })
-            }
-        }
-    }
-
-    /// The likelihood of motions under the noise of the plant.
-    pub fn likelihood(&self) -> MotionLikelihood {
-        // Without noise there is no likelihood.
-        let share = if self.settings.noise > 0.0 { self.settings.noise } else { NOISELESS };
-        let standing_on = self.subject.standing.as_ref().map(Standing::foot_bodies);
-        MotionLikelihood::new(self.subject.torque_noise(share)).standing_on(standing_on.unwrap_or_default())
-    }
-
-    /// Who looks for what the model lacks by the likelihood, if that is how parameters are estimated.
-    pub fn score_test(&self) -> Option<ScoreTest> {
-        (self.settings.estimator == EstimatorName::Likelihood).then(|| ScoreTest::new(self.likelihood()))
-    }
-
-    /// Who looks for what the model lacks.
-    pub fn growth(&self) -> Box<dyn Growth> {
-        match self.score_test().filter(|_| self.settings.detector == Detector::Score) {
-            Some(test) => Box::new(test),
-            None => Box::new(TraceResidual::default()),
         }
     }
 

@@ -6,8 +6,8 @@
 
 use super::curriculum_page;
 use crate::paper::{
-    Arm, Detector, Engine, EstimatorName, Footing, Initial, Job, RunArguments, RunFile, SecretKind, Setup,
-    Source, Subject, SubjectName, do_all,
+    Arm, Detector, Engine, EstimatorName, Footing, Initial, Job, NoiseIn, RunArguments, RunFile, SecretKind,
+    Setup, Source, Subject, SubjectName, do_all,
 };
 use anyhow::Context;
 use phiw::console::Console;
@@ -114,6 +114,7 @@ fn arguments(backend: Engine, out: &Path) -> RunArguments {
         prior: None,
         relaxation: None,
         noise: NOISE,
+        noise_in: NoiseIn::Motion,
         iterations: ITERATIONS,
         initial: Initial::Each,
         shard: None,

@@ -1,8 +1,9 @@
 //! What is believed of the robot at present: the URDF, corrected by what has been measured.
 
+use super::controlled::{ControlledLogs, Learnt};
 use super::motions::Motions;
 use crate::Error;
-use crate::arguments::NextArguments;
+use crate::arguments::{NextArguments, NextEstimator};
 use crate::model_file::ModelFile;
 use crate::session::Session;
 use phiw_curriculum::CurriculumError;
@@ -11,7 +12,8 @@ use phiw_dynamics::Tree;
 use phiw_dynamics::inertia::InertialParameters;
 use phiw_effects::Catalogue;
 use phiw_estimation::{
-    BayesianLeastSquares, Estimate, Estimator, Evidence, LogNoise, ParameterPrior, Robot, RobotModel, RowsAt,
+    BayesianLeastSquares, Estimate, Estimator, Evidence, LogNoise, LoggedSettings, ParameterPrior, Robot,
+    RobotModel, RowsAt, TorqueMisfit,
 };
 use phiw_identification::checks::check_size_of_robot;
 use phiw_identification::fitting::{fit, merge};
@@ -32,8 +34,10 @@ pub enum Source {
     Urdf,
     /// A model.json.
     Model,
-    /// The measured logs.
+    /// The measured logs, of which nobody knows what the controller did: equation (4).
     Logs,
+    /// Measured logs that tell what the controller did: the likelihood that is told no noise.
+    ControlledLogs,
 }
 
 /// What is believed and what has been measured.
@@ -58,14 +62,16 @@ pub struct Present {
     pub condition_numbers: Vec<Option<f64>>,
     /// How many logs there are, and how long they are together \[s\].
     pub measured: Option<(usize, f64)>,
+    /// Whether the noise's story holds, torque by torque; empty where the estimate has none.
+    pub misfit: Vec<TorqueMisfit>,
 }
 
 /// The measured logs, reduced.
-struct MeasuredLogs {
+pub struct MeasuredLogs {
     /// What had been measured after each log.
-    after_each: Vec<Evidence>,
+    pub after_each: Vec<Evidence>,
     /// How long they are together \[s\].
-    seconds: f64,
+    pub seconds: f64,
 }
 
 /// A model's columns and what is known of their parameters.
@@ -75,6 +81,8 @@ struct Known {
     evidence: Evidence,
     noise: LogNoise,
     measured: Option<MeasuredLogs>,
+    /// The logs at the controller's rate, where they tell what it did and are what is estimated from.
+    controlled: Option<ControlledLogs>,
 }
 
 impl Present {
@@ -86,7 +94,7 @@ impl Present {
         motions: &Motions,
         progress: Progress<'_>,
     ) -> Result<Self, Error> {
-        let Known { source, design, evidence, noise, measured } =
+        let Known { source, design, evidence, noise, measured, controlled } =
             Known::read(arguments, tree, motions, progress)?;
         let catalogue = Catalogue::default();
         let robot =
@@ -94,10 +102,19 @@ impl Present {
         let nothing = vec![0.0; design.parameter_count() - design.base().count()];
         let initial = RobotModel { standard: with_masses(tree), ..robot.truth(&nothing)? };
         let prior = ParameterPrior { model: initial, share: arguments.urdf_error };
-        let estimator = BayesianLeastSquares { noise, prior: prior.clone() };
-        let present = prior.model.parameters(&robot)?;
-        let estimate = estimator.estimate(&design, &evidence, &prior.model, &present)?;
-        let model = prior.model.with_parameters(&robot, &specs(&design), &estimate.parameters)?;
+        let (estimate, model, measured, misfit) = match controlled {
+            Some(logs) => {
+                let Learnt { measured, estimate, model, misfit } = logs.learn(&robot, &prior.model)?;
+                (estimate, model, Some(measured), misfit)
+            }
+            None => {
+                let estimator = BayesianLeastSquares { noise, prior: prior.clone() };
+                let present = prior.model.parameters(&robot)?;
+                let estimate = estimator.estimate(&design, &evidence, &prior.model, &present)?;
+                let model = prior.model.with_parameters(&robot, &specs(&design), &estimate.parameters)?;
+                (estimate, model, measured, Vec::new())
+            }
+        };
         let weights = vec![1.0; tree.joint_count()];
         let candidates = MotionCandidates::foreseeable(&robot, &design, &motions.dataset, &weights)?;
         let after_each = measured.iter().flat_map(|measured| &measured.after_each);
@@ -118,6 +135,7 @@ impl Present {
             triangle: triangles.into_iter().last(),
             condition_numbers,
             measured,
+            misfit,
         })
     }
 }
@@ -148,7 +166,7 @@ impl Known {
                 let design = unmeasured_design(arguments, tree, motions)?;
                 let evidence = Evidence::none(&design, RowsAt::Stamps)?;
                 let noise = LogNoise::unit(evidence.factor().groups().len());
-                Ok(Known { source: Source::Urdf, design, evidence, noise, measured: None })
+                Ok(Known { source: Source::Urdf, design, evidence, noise, measured: None, controlled: None })
             }
         }
     }
@@ -163,7 +181,7 @@ impl Known {
         let noise = LogNoise::of_weighted_rows(&factor, &parameters, &deviations);
         let evidence = Evidence::of_weighted_rows(design.parameter_count(), parameters, factor)
             .map_err(CurriculumError::from)?;
-        Ok(Known { source: Source::Model, design, evidence, noise, measured: None })
+        Ok(Known { source: Source::Model, design, evidence, noise, measured: None, controlled: None })
     }
 
     /// Fits the declared model (or the columns of `model`) to all logs.
@@ -202,7 +220,20 @@ impl Known {
         };
         let noise = LogNoise::of_fit(&fit(&design, &folds)?);
         let evidence = Evidence::of_factor(merge(&folds).map_err(CurriculumError::from)?, Some(rate_hz));
-        Ok(Known { source: Source::Logs, design, evidence, noise, measured: Some(measured) })
+        let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
+        let settings = LoggedSettings {
+            command_period_s: arguments.command_hz.map(f64::recip),
+            ..LoggedSettings::default()
+        };
+        let controlled = match arguments.estimator {
+            // Parameters are a model file's where there is one.
+            NextEstimator::UnknownNoise if model.is_none() => {
+                ControlledLogs::read(surveys, &joints, &settings)?
+            }
+            _ => None,
+        };
+        let source = if controlled.is_some() { Source::ControlledLogs } else { Source::Logs };
+        Ok(Known { source, design, evidence, noise, measured: Some(measured), controlled })
     }
 }
 

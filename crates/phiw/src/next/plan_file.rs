@@ -8,7 +8,7 @@ use phiw_telemetry::{LogColumns, LogWriter};
 /// The file: a log with `q`, `tau`, `qd` and `qdd` of all joints; `torque` is `[sample × joint]` \[N·m, N\].
 pub fn csv(motion: &Motion, torque: &[f64], tree: &Tree) -> String {
     let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
-    let columns = LogColumns { torque: true, velocity: true, acceleration: true, temperature: false };
+    let columns = LogColumns { torque: true, velocity: true, acceleration: true, ..LogColumns::default() };
     let write = || {
         let mut writer = LogWriter::new(Vec::new(), &joints, columns)?;
         for (sample, torque) in torque.chunks_exact(joints.len()).enumerate() {

@@ -2,12 +2,14 @@
 
 use super::estimate::{Present, Source};
 use super::motions::Motions;
-use crate::arguments::NextArguments;
+use crate::arguments::{NextArguments, NextEstimator};
 use crate::warnings::file_name;
 use phiw_curriculum::constraint::MotionMargin;
 use phiw_curriculum::motion::{Excess, Motion, MotionLimits, Unrest};
 use phiw_curriculum::planner::Plan;
 use phiw_dynamics::urdf::Finding;
+use phiw_estimation::TorqueMisfit;
+use phiw_identification::model::parameter_name;
 use phiw_report::number::{percent, significant};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -116,6 +118,9 @@ impl Telling<'_> {
             Source::Urdf => {
                 format!("estimate: {count} parameters as {urdf} has them; nothing has been measured")
             }
+            Source::ControlledLogs => {
+                format!("estimate: {count} parameters from {from}, the noise found with them, and the URDF")
+            }
             Source::Logs => format!("estimate: {count} parameters from {from} and {urdf}"),
             Source::Model => {
                 format!("estimate: {count} parameters from the model and {urdf}; cond(Φ) of {from}")
@@ -155,6 +160,20 @@ impl Telling<'_> {
                     .to_owned(),
             );
         }
+        let refuted = self.refuted();
+        if !refuted.is_empty() {
+            let told = |(joint, misfit): &(&str, TorqueMisfit)| {
+                let TorqueMisfit { chi_squared, degrees, .. } = misfit;
+                format!("{joint} (χ² {} of {degrees})", significant(*chi_squared, 3))
+            };
+            warnings.push(format!(
+                "what is left of a torque is not noise alone, for the motion before foretells it: {}; `phiw explain` seeks what the model lacks",
+                refuted.iter().map(told).collect::<Vec<_>>().join(", ")
+            ));
+        }
+        if self.present.source == Source::Logs && self.arguments.estimator == NextEstimator::UnknownNoise {
+            warnings.push("the logs do not say what the controller commanded (tau_cmd.<joint>) or was asked for (qref.<joint>): noise is taken to be in the logs and not in the motion, which makes inertias and frictions wrong where it moved the robot".to_owned());
+        }
         if !self.after().is_finite() {
             warnings.push("even with this motion some parameters stay undetermined, and cond(Φ) says little: add motions of more variety".to_owned());
         }
@@ -177,6 +196,33 @@ impl Telling<'_> {
             warnings.push(format!("the URDF is believed as it is, though {} things in it should not be trusted (`urdf_findings` of the report)", self.findings.len()));
         }
         warnings
+    }
+
+    /// The base parameters as they are believed, with their standard deviations.
+    fn base_parameters(&self) -> Vec<Value> {
+        let Present { design, estimate, robot, .. } = self.present;
+        let numbers = estimate.parameters.iter().zip(&estimate.standard_deviations);
+        let columns = design.base().independent().iter().zip(numbers);
+        let named = |(&column, (value, std)): (&usize, (&f64, &f64))| json!({"name": parameter_name(robot.tree(), column), "value": value, "std": std});
+        columns.map(named).collect()
+    }
+
+    /// Torques whose noise is foretold by what was there before it, and by how much.
+    fn refuted(&self) -> Vec<(&str, TorqueMisfit)> {
+        let all = &self.present.misfit;
+        let named = self.present.robot.tree().joint_names().zip(all);
+        named
+            .filter(|(_, misfit)| misfit.is_refuted(all.len(), ONCE_IN))
+            .map(|(joint, own)| (joint, *own))
+            .collect()
+    }
+
+    fn misfit(&self) -> Value {
+        let joints = self.present.robot.tree().joint_names().zip(&self.present.misfit);
+        joints
+            .map(|(joint, misfit)| (joint.to_owned(), json!(misfit)))
+            .collect::<serde_json::Map<_, _>>()
+            .into()
     }
 
     /// For programs. Numbers that are not finite are `null`.
@@ -222,6 +268,8 @@ impl Telling<'_> {
                     "urdf_error": self.arguments.urdf_error,
                     "logs": logs,
                     "seconds": seconds,
+                    "base_parameters": self.base_parameters(),
+                    "misfit": self.misfit(),
                 },
             },
             "phiw": {
@@ -232,6 +280,9 @@ impl Telling<'_> {
         })
     }
 }
+
+/// Tests of all torques of which at most one is a false alarm.
+const ONCE_IN: f64 = 100.0;
 
 /// A condition number in words.
 fn condition(value: f64) -> String {

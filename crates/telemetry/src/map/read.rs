@@ -47,6 +47,7 @@ pub(crate) struct RawJoint {
     pub qdd: Option<Spanned<RawSignal>>,
     pub tau: Option<Spanned<RawSignal>>,
     pub qref: Option<Spanned<RawSignal>>,
+    pub tau_cmd: Option<Spanned<RawSignal>>,
     pub temp: Option<Spanned<RawSignal>>,
     pub gear: Option<f64>,
     pub torque_constant_nm_per_a: Option<f64>,
@@ -64,6 +65,7 @@ impl RawJoint {
             Signal::Acceleration => self.qdd.as_ref(),
             Signal::Torque => self.tau.as_ref(),
             Signal::Reference => self.qref.as_ref(),
+            Signal::Command => self.tau_cmd.as_ref(),
             Signal::Temperature => self.temp.as_ref(),
         }
     }

@@ -104,7 +104,7 @@ impl Entry<'_> {
                 let why = "turns what is measured at the motor into the joint's; write 1.0 for a direct drive, or side = \"joint\"";
                 let gear = self.constant("gear", drive.gear, why)?;
                 match signal {
-                    Signal::Torque => {
+                    Signal::Torque | Signal::Command => {
                         gear * drive
                             .efficiency
                             .map_or(Ok(1.0), |efficiency| self.constant("efficiency", Some(efficiency), ""))?
@@ -203,7 +203,7 @@ impl Lookup<'_> {
         joint: &str,
     ) -> Result<Option<Expression>, LogError> {
         let matrix = match signal {
-            Signal::Torque => &coupling.torques,
+            Signal::Torque | Signal::Command => &coupling.torques,
             Signal::Temperature => return Ok(None),
             _ => &coupling.matrix,
         };

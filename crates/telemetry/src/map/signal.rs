@@ -9,6 +9,7 @@ pub(crate) enum Signal {
     Torque,
     Temperature,
     Reference,
+    Command,
 }
 
 impl Signal {
@@ -21,6 +22,7 @@ impl Signal {
             Signal::Torque => "tau",
             Signal::Temperature => "temp",
             Signal::Reference => "qref",
+            Signal::Command => "tau_cmd",
         }
     }
 }

@@ -41,7 +41,7 @@ impl Unit {
                 plain => angle(plain.strip_suffix("/s")?),
             },
             Signal::Acceleration => angle(plain.strip_suffix("/s2")?),
-            Signal::Torque => Some(match plain.as_str() {
+            Signal::Torque | Signal::Command => Some(match plain.as_str() {
                 "Nm" | "N" => Unit::Si(1.0),
                 "mNm" | "mN" => Unit::Si(1e-3),
                 "kN" | "kNm" => Unit::Si(1e3),
@@ -68,7 +68,9 @@ impl Unit {
             Signal::Position | Signal::Reference => "rad, deg, rev, ticks, m, cm, mm",
             Signal::Velocity => "rad/s, deg/s, rev/s, rpm, ticks/s, m/s, mm/s",
             Signal::Acceleration => "rad/s^2, deg/s^2, rev/s^2, m/s^2, mm/s^2",
-            Signal::Torque => "N.m, mN.m, N.cm, kgf.cm, N, kN, A, mA, % (of rated), permille (of rated)",
+            Signal::Torque | Signal::Command => {
+                "N.m, mN.m, N.cm, kgf.cm, N, kN, A, mA, % (of rated), permille (of rated)"
+            }
             Signal::Temperature => "degC, K",
         }
     }
