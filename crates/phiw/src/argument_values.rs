@@ -74,3 +74,11 @@ pub fn quoted(word: &str) -> String {
     }
     format!("'{}'", word.replace('\'', r"'\''"))
 }
+
+/// A joint that is held, as `--hold` takes it.
+pub fn held_in_words((joint, value): &(String, f64)) -> String {
+    match *value {
+        0.0 => joint.clone(),
+        value => format!("{joint}={value}"),
+    }
+}
