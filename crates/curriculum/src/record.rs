@@ -45,8 +45,8 @@ pub struct IterationRecord {
     pub model: RobotModel,
     /// Standard deviations of its parameter vector; `null` where the estimator does not know.
     pub standard_deviations: Vec<Option<f64>>,
-    /// Whether what the model leaves of each torque is noise, as the estimator tests it; empty where it has no
-    /// test, or the log did not count.
+    /// Whether what the model leaves of each torque is noise, as the estimator tests it; empty where it has
+    /// no test, or the log did not count.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub misfit: Vec<TorqueMisfit>,
 }

@@ -88,9 +88,9 @@ impl ConcentratedLikelihood {
         })
     }
 
-    /// The least standard deviation of each parameter at the truth that any estimate without a prior can have,
-    /// one to which the noise is known and the motion exact (Cramér and Rao's bound: the observed information
-    /// of the motions that were measured). NaN where nothing is known of one.
+    /// The least standard deviation of each parameter at the truth that any estimate without a prior can
+    /// have, one to which the noise is known and the motion exact (Cramér and Rao's bound: the observed
+    /// information of the motions that were measured). NaN where nothing is known of one.
     ///
     /// # Errors
     /// The evidence is not of this design, or its rows were not taken in order.

@@ -77,7 +77,8 @@ pub struct Evidence {
     pub(super) rate_hz: Option<f64>,
     /// The rows with those before them, where the settings ask for them.
     pub(super) in_order: Option<InOrder>,
-    /// Logs of encoders, where rows are asked for in order: their motion is found again under a better belief.
+    /// Logs of encoders, where rows are asked for in order: their motion is found again under a better
+    /// belief.
     pub(super) encoder_logs: Vec<MotionLog>,
 }
 

@@ -3,9 +3,9 @@
 //! The story is that what is left of a torque is noise that is correlated with itself from one command to the
 //! next and with nothing else. Then what is new in it, ε_t = (Φ_t − ρ·Φ_{t−1})·w − (u_t − ρ·u_{t−1}), is
 //! foretold by nothing that was there a period before: neither the motion, in the columns Φ_{t−1}, nor the
-//! command u_{t−1}. Of N rows of ε with the standard deviation σ, k such columns take N·R² by chance, which is
-//! χ² with k degrees of freedom: the test of overidentified instruments (Sargan 1958). That w was fitted to the
-//! same rows takes away some degrees; the test is a little too mild for it.
+//! command u_{t−1}. Of N rows of ε with the standard deviation σ, k such columns take N·R² by chance, which
+//! is χ² with k degrees of freedom: the test of overidentified instruments (Sargan 1958). That w was fitted
+//! to the same rows takes away some degrees; the test is a little too mild for it.
 
 use super::in_order::{Colour, InOrder};
 use crate::EstimationError;

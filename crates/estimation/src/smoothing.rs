@@ -1,12 +1,12 @@
 //! The motion between encoders' readings, as it most likely was under what is believed.
 //!
-//! A spline of the readings alone ([`MotionLog::of_encoders`]) knows neither the commands nor the robot. Where
-//! encoders are coarse beside what noise does within a period, or read once a period, its accelerations are
-//! wrong by as much as the noise moved them, and an estimate takes that for inertia. Given a belief, a motion
-//! has a likelihood: of the readings, of the noise that the motion asks for beside the commands (stationary,
-//! with the correlation ρ from one period to the next, all joints coupled by the mass matrix A), and of how
-//! an acceleration decays within a period, A·ȧ = −F·a. What is most likely is least squares over the angles
-//! and speeds at all commands, whose normal equations are a band.
+//! A spline of the readings alone ([`MotionLog::of_encoders`]) knows neither the commands nor the robot.
+//! Where encoders are coarse beside what noise does within a period, or read once a period, its accelerations
+//! are wrong by as much as the noise moved them, and an estimate takes that for inertia. Given a belief, a
+//! motion has a likelihood: of the readings, of the noise that the motion asks for beside the commands
+//! (stationary, with the correlation ρ from one period to the next, all joints coupled by the mass matrix A),
+//! and of how an acceleration decays within a period, A·ȧ = −F·a. What is most likely is least squares over
+//! the angles and speeds at all commands, whose normal equations are a band.
 //!
 //! With the belief after it, it is the two halves of the EM algorithm (Dempster, Laird & Rubin 1977): the
 //! squares that the estimate wants are means over all motions that the readings leave possible, which are
@@ -53,8 +53,8 @@ pub(super) struct Smoothed {
     pub drawn: MotionLog,
     /// What the spread of all possible motions adds to the squares of each torque: rows of its columns.
     pub spread: Vec<Factor>,
-    /// What it adds to the squares of the noise before, of the products with the noise after, and of the noise
-    /// after, for each torque.
+    /// What it adds to the squares of the noise before, of the products with the noise after, and of the
+    /// noise after, for each torque.
     pub noise: Vec<[f64; 3]>,
 }
 
@@ -204,8 +204,8 @@ impl Belief<'_> {
         Ok(stretches)
     }
 
-    /// The noise that the log's own motion asks for: the model's torque less what was commanded, and the share
-    /// that was felt of what the log has beside, `[period × torque]`.
+    /// The noise that the log's own motion asks for: the model's torque less what was commanded, and the
+    /// share that was felt of what the log has beside, `[period × torque]`.
     fn asked(&self, measured: &MotionLog) -> Result<Vec<f64>, EstimationError> {
         let tree = self.design.tree();
         let limits: Vec<f64> = (0..measured.joints).map(|joint| tree.joint(joint).limits.effort).collect();

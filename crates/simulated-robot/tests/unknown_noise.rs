@@ -86,8 +86,8 @@ fn the_noise_is_found_with_the_parameters() {
     }
 }
 
-/// A spline of the readings alone does not know that slow noise hardly changes from a period to the next: with
-/// encoders, slow noise made the parameters twice as wrong as exact sensors did.
+/// A spline of the readings alone does not know that slow noise hardly changes from a period to the next:
+/// with encoders, slow noise made the parameters twice as wrong as exact sensors did.
 #[test]
 fn slow_noise_and_encoders_ask_for_the_motion_under_the_belief() {
     let measuring = Measuring { encoders: Some(Encoders::new(13, 1e-3)), ..Measuring::default() };

@@ -15,8 +15,8 @@ pub enum ControllerSignal {
 }
 
 impl ControllerSignal {
-    /// The signal in every row of a log, `[row × joint]`; a row that can't be used is one of NaN, so that rows
-    /// are those of [`crate::Recording::read`]. None where no joint has the signal.
+    /// The signal in every row of a log, `[row × joint]`; a row that can't be used is one of NaN, so that
+    /// rows are those of [`crate::Recording::read`]. None where no joint has the signal.
     ///
     /// # Errors
     /// The log can't be read, or the signal is there for some joints only.

@@ -41,8 +41,8 @@ impl Setup {
         MotionLikelihood::new(self.subject.torque_noise(share)).standing_on(standing_on.unwrap_or_default())
     }
 
-    /// Who looks for what the model lacks by the likelihood, if that is how parameters are estimated, in a run
-    /// that begins with `initial`.
+    /// Who looks for what the model lacks by the likelihood, if that is how parameters are estimated, in a
+    /// run that begins with `initial`.
     pub fn score_test(&self, initial: &RobotModel) -> Option<ScoreTest> {
         match self.settings.estimator {
             EstimatorName::Likelihood => Some(ScoreTest::new(self.likelihood())),
