@@ -27,8 +27,9 @@ pub struct TraceOptions {
     /// Share of what the other effects took from the same torque that it must take: the form of an effect is
     /// never quite the catalogue's, and what mends it is no effect of its own.
     pub least_of_others: f64,
-    /// Share of the squares of what it is a form of that a form must take: how exactly a sign turns is no
-    /// effect of its own.
+    /// What a form must take, as a share of the squares of the simpler that it is a form of, times what the
+    /// simpler leaves over what is left with it: how exactly a sign turns is no effect of its own, but neither
+    /// does that leave next to nothing.
     pub least_of_simpler: f64,
     /// RMS of what an effect takes over the RMS of its torque, at least, to have a name.
     pub least_size: f64,
@@ -66,7 +67,7 @@ impl Default for TraceOptions {
             least_share: 0.2,
             least_share_of_kin: 0.75,
             least_of_others: 0.025,
-            least_of_simpler: 0.0025,
+            least_of_simpler: 0.01,
             least_size: 0.01,
             negligible_share: 0.005,
             floor_margin: 1.15,

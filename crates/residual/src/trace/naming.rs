@@ -262,7 +262,8 @@ impl Search<'_> {
     }
 
     /// Whether a form of something simpler is worth a name of its own: it must take away most of what the
-    /// simpler ones leave, be a share of the torque, and a share of what it is a form of.
+    /// simpler ones leave, be a share of the torque, and be large beside what it is a form of or leave next to
+    /// nothing.
     fn is_form_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
         let hypothesis = &trial.problem.hypotheses[member.hypothesis];
         hypothesis.torques.iter().any(|&torque| {
@@ -276,7 +277,7 @@ impl Search<'_> {
             let of_simpler = trial.held_out[torque].size_of(&simpler);
             !self.is_as_it_was(torque, (without / trial.held_out[torque].rows().max(1.0)).sqrt())
                 && taken >= self.options.least_share_of_kin * without
-                && taken >= self.options.least_of_simpler * of_simpler
+                && taken * without >= self.options.least_of_simpler * of_simpler * with
                 && (taken / whole).sqrt() >= self.options.least_size
         })
     }
