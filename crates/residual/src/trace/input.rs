@@ -28,8 +28,8 @@ pub struct TraceOptions {
     /// never quite the catalogue's, and what mends it is no effect of its own.
     pub least_of_others: f64,
     /// What a form must take, as a share of the squares of the simpler that it is a form of, times what the
-    /// simpler leaves over what is left with it: how exactly a sign turns is no effect of its own, but neither
-    /// does that leave next to nothing.
+    /// simpler leaves over what is left with it. How exactly a sign turns is no effect of its own, and does
+    /// not leave next to nothing.
     pub least_of_simpler: f64,
     /// RMS of what an effect takes over the RMS of its torque, at least, to have a name.
     pub least_size: f64,
