@@ -131,7 +131,8 @@ impl Logged {
         let joints = self.recording.joints.len();
         let of_joint = |joint: usize| {
             let readings: Vec<f64> = self.recording.q.iter().skip(joint).step_by(joints).copied().collect();
-            let rounding = ROUNDING * readings.iter().copied().filter(|q| q.is_finite()).fold(1.0, f64::max);
+            let rounding =
+                ROUNDING * readings.iter().map(|q| q.abs()).filter(|q| q.is_finite()).fold(1.0, f64::max);
             let changes = readings.windows(2).map(|pair| (pair[1] - pair[0]).abs());
             let least = changes.filter(|change| *change > rounding).fold(f64::INFINITY, f64::min);
             if least.is_finite() { least } else { rounding }

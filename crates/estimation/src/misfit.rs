@@ -10,6 +10,7 @@
 use super::in_order::{Colour, InOrder};
 use crate::EstimationError;
 use faer::Mat;
+use phiw_dynamics::dense::dot;
 use phiw_regressor::factor::Factor;
 use serde::{Deserialize, Serialize};
 
@@ -82,10 +83,6 @@ fn foretold(factor: &Factor, size: usize) -> TorqueMisfit {
     let degrees = taken.len() as f64;
     let chi_squared = if rest > 0.0 { (rows - degrees) * (all - rest) / rest } else { 0.0 };
     TorqueMisfit::of(chi_squared.max(0.0), degrees)
-}
-
-fn dot(left: &[f64], right: &[f64]) -> f64 {
-    left.iter().zip(right).map(|(a, b)| a * b).sum()
 }
 
 /// Probability that χ² with k degrees of freedom exceeds x (Wilson & Hilferty 1931: its third root is nearly
