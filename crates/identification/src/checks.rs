@@ -31,20 +31,12 @@ pub enum InputError {
         /// Upper limit \[rad\].
         upper: f64,
     },
-    /// A joint that no log moves.
-    #[error(
-        "joint `{joint}` is not excited: it moves by {travel:.1e} {unit} in all training logs; \
-         move it, or hold it with --hold {joint}={position:.4}"
-    )]
+    /// Joints that no log moves.
+    #[error("{}; move {them}, or hold {them} with --hold {}", not_excited(.joints), held(.joints),
+        them = if .joints.len() == 1 { "it" } else { "them" })]
     NotExcited {
-        /// The joint.
-        joint: String,
-        /// Its largest travel \[rad, m\].
-        travel: f64,
-        /// Unit of the travel.
-        unit: &'static str,
-        /// Where it stands \[rad, m\].
-        position: f64,
+        /// The joints, at least one.
+        joints: Vec<StillJoint>,
     },
     /// A torque column of zeros.
     #[error(
@@ -295,21 +287,54 @@ fn check_size(
     if bytes > most { Err(InputError::TooLarge { joints, parameters, bytes, most }) } else { Ok(()) }
 }
 
+/// A joint that no log moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StillJoint {
+    /// Its name.
+    pub joint: String,
+    /// Its largest travel \[rad, m\].
+    pub travel: f64,
+    /// Unit of the travel.
+    pub unit: &'static str,
+    /// Where it stands \[rad, m\].
+    pub position: f64,
+}
+
+fn not_excited(joints: &[StillJoint]) -> String {
+    let [first, others @ ..] = joints else { return String::new() };
+    let StillJoint { joint, travel, unit, .. } = first;
+    let mut text =
+        format!("joint `{joint}` is not excited: it moves by {travel:.1e} {unit} in all training logs");
+    let others: Vec<String> = others.iter().map(|other| format!("`{}`", other.joint)).collect();
+    if !others.is_empty() {
+        text += &format!("; nor is {}", others.join(", nor "));
+    }
+    text
+}
+
+/// What `--hold` takes.
+fn held(joints: &[StillJoint]) -> String {
+    let held = joints.iter().map(|joint| format!("{}={:.4}", joint.joint, joint.position));
+    held.collect::<Vec<String>>().join(",")
+}
+
 /// Checks that every joint moves in some log: the parameters of what stands still are unidentifiable.
 ///
 /// # Errors
-/// The first joint that does not.
+/// All joints that do not.
 pub fn check_excitation(tree: &Tree, train: &[Survey]) -> Result<(), InputError> {
-    for index in 0..tree.joint_count() {
+    let still = |index: usize| {
         let body = tree.joint(index);
         let logs = || train.iter().map(|survey| &survey.joints[index]);
         let travel = logs().map(|joint| joint.travel()).fold(0.0, f64::max);
         let noise = logs().map(|joint| joint.position_noise_std).fold(0.0, f64::max);
-        if travel < STANDING_STILL.max(TRAVEL_TO_NOISE * noise) {
-            let unit = if body.joint_type == JointType::Prismatic { "m" } else { "rad" };
-            let position = logs().next().map_or(0.0, |joint| joint.q_mean);
-            return Err(InputError::NotExcited { joint: body.joint.clone(), travel, unit, position });
-        }
-    }
-    Ok(())
+        (travel < STANDING_STILL.max(TRAVEL_TO_NOISE * noise)).then(|| StillJoint {
+            joint: body.joint.clone(),
+            travel,
+            unit: if body.joint_type == JointType::Prismatic { "m" } else { "rad" },
+            position: logs().next().map_or(0.0, |joint| joint.q_mean),
+        })
+    };
+    let joints: Vec<StillJoint> = (0..tree.joint_count()).filter_map(still).collect();
+    if joints.is_empty() { Ok(()) } else { Err(InputError::NotExcited { joints }) }
 }

@@ -153,7 +153,22 @@ fn motion_that_tells_nothing() {
     check(|scene| scene.record(head(40)), &["too short", "record"]);
     check(|scene| scene.record(head(6)), &["train.csv"]);
     let still = |log: &mut Recording| log.q.iter_mut().skip(1).step_by(3).for_each(|q| *q = 0.4);
-    check(|scene| scene.record(still), &["joint `joint_2` is not excited", "--hold joint_2=0.4"]);
+    check(
+        |scene| scene.record(still),
+        &["joint `joint_2` is not excited", "hold it with --hold joint_2=0.4"],
+    );
+    // All of them at once: a user held one joint after the other, with a run for each.
+    let both_still = |log: &mut Recording| {
+        log.q.chunks_exact_mut(3).for_each(|row| row[1..].copy_from_slice(&[0.4, -0.2]));
+    };
+    check(
+        |scene| scene.record(both_still),
+        &[
+            "joint `joint_2` is not excited",
+            "nor is `joint_3`; move them",
+            "--hold joint_2=0.4000,joint_3=-0.2000",
+        ],
+    );
 }
 
 #[test]

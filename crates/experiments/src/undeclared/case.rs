@@ -52,6 +52,8 @@ pub struct Case<'a> {
     pub sensors: Sensors,
     /// Effects of the wide suites' plants that are declared, in forms of their own.
     pub plant: Vec<Secret>,
+    /// Joints that never move, and where they stand: the tracer is told to hold them.
+    pub still: Vec<(usize, f64)>,
     /// The attempt that it was drawn in.
     pub attempt: u64,
 }
@@ -115,6 +117,7 @@ impl<'a> Case<'a> {
             clean_motions,
             sensors,
             plant: Vec::new(),
+            still: Vec::new(),
             attempt,
         };
         for (&name, &joint) in spec.secrets.iter().zip(&joints) {
@@ -200,6 +203,7 @@ impl<'a> Case<'a> {
             clean_motions: self.clean_motions.clone(),
             sensors: self.sensors.clone(),
             plant: self.plant.clone(),
+            still: self.still.clone(),
             motions,
             ..*self
         }

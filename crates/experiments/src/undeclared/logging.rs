@@ -3,11 +3,12 @@
 
 use super::plant::Record;
 use super::rng::CaseRng;
-use super::sensors::Sensors;
+use super::sensors::{Clock, Sensors};
 use super::situation::Situation;
 use super::trajectory::Trajectory;
 use phiw_dynamics::{JointType, Tree};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
@@ -64,6 +65,28 @@ pub struct Logging {
     pub dead_band: Vec<f64>,
     /// Steps of the torque \[N·m, N\], joint by joint; 0 for none.
     pub torque_step: Vec<f64>,
+    /// Samples for which a torque is held until it is renewed.
+    #[serde(skip_serializing_if = "is_one")]
+    pub held_samples: usize,
+    /// What its clock and its memory do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rough: Option<RoughClock>,
+}
+
+/// A logger that rounds its stamps and loses rows.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RoughClock {
+    /// What stamps are rounded to \[s\].
+    pub step: f64,
+    /// Share of the rows that are lost one by one.
+    pub lost: f64,
+    /// Rows that are lost in one burst, at most.
+    pub burst: usize,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_one(count: &usize) -> bool {
+    *count == 1
 }
 
 impl Logging {
@@ -78,7 +101,7 @@ impl Logging {
     ) -> Self {
         use Situation::{
             Colour, DeadBand, DriveFilter as Filter, HeavyTails, LateFilter, LateVelocity, LongColour, Mixed,
-            NoiseJoints, Quantised, ShortColour, White,
+            NoiseJoints, NoisyPositions, Quantised, ShortColour, White,
         };
         let joints = torque.len();
         sensors.correlation_time = match situation {
@@ -141,7 +164,31 @@ impl Logging {
                 noise: speed.iter().map(|speed| 0.001 * speed).collect(),
             });
         }
-        Logging { tails, filter, velocity, dead_band, torque_step }
+        // These came later: they draw last, so that the others are what they were.
+        if situation == Situation::LowRate {
+            sensors.rate = rng.pick(&[20.0, 40.0, 50.0, 100.0, 125.0]);
+        }
+        if situation == NoisyPositions {
+            let angle = rng.log_uniform(5e-4, 5e-3);
+            sensors.angle_noise = 2.0;
+            for (joint, quantum) in sensors.quantum.iter_mut().enumerate() {
+                let slides = tree.joint(joint).joint_type == JointType::Prismatic;
+                *quantum = if slides { 0.1 } else { 1.0 } * angle / sensors.angle_noise;
+            }
+        }
+        let held_samples = match situation {
+            Situation::HeldTorque => 2 + rng.index((sensors.rate / 25.0) as usize - 1).min(18),
+            _ => 1,
+        };
+        let rough = (situation == Situation::RoughClock).then(|| {
+            sensors.clock = Clock::Even;
+            RoughClock {
+                step: if sensors.rate < 450.0 { 0.001 } else { 0.0005 },
+                lost: rng.log_uniform(0.001, 0.03),
+                burst: rng.index((0.4 * sensors.rate) as usize),
+            }
+        });
+        Logging { tails, filter, velocity, dead_band, torque_step, held_samples, rough }
     }
 
     /// The log's text: `t`, `q.*`, `qd.*` if there is such a column, `tau.*`.
@@ -165,7 +212,9 @@ impl Logging {
             });
         }
         text.push('\n');
-        for (sample, stamp) in stamps.iter().enumerate() {
+        let lost = self.rough.as_ref().map_or_else(BTreeSet::new, |rough| rough.lost_rows(stamps.len(), rng));
+        for (sample, stamp) in stamps.iter().enumerate().filter(|(sample, _)| !lost.contains(sample)) {
+            let stamp = self.rough.as_ref().map_or(*stamp, |rough| (stamp / rough.step).round() * rough.step);
             let _ = write!(text, "{stamp:.7}");
             for joint in 0..joints {
                 let quantum = sensors.quantum[joint];
@@ -216,6 +265,10 @@ impl Logging {
                 }
             }
         }
+        for held in torque.chunks_mut(joints * self.held_samples) {
+            let (first, others) = held.split_at_mut(joints);
+            others.chunks_exact_mut(joints).for_each(|row| row.copy_from_slice(first));
+        }
         torque
     }
 
@@ -252,6 +305,17 @@ impl Tails {
                 scale * rng.normal() / (1.0 - share + share * size * size).sqrt()
             }
         }
+    }
+}
+
+impl RoughClock {
+    /// The rows that are lost, never the first or the last.
+    fn lost_rows(&self, rows: usize, rng: &mut CaseRng) -> BTreeSet<usize> {
+        let inside = 1..rows - 1;
+        let mut lost: BTreeSet<usize> = inside.clone().filter(|_| rng.chance(self.lost)).collect();
+        let begin = rng.index(rows);
+        lost.extend((begin..begin + self.burst).filter(|row| inside.contains(row)));
+        lost
     }
 }
 

@@ -8,9 +8,9 @@
 //! with one that the catalogue does not have (`outside`). Noise, jitter, quantisation and the declared
 //! effects are drawn as well. The wide suites have robots as they come: frictions on all joints, of which
 //! mostly nothing is declared, and up to thirteen effects more (`wide_effects`), right models (`wide_right`),
-//! effects that no catalogue has beside others (`wide_outside`), each in fifteen situations, from white noise
-//! to joints that are mostly noise, filters in drives, late velocities, dead bands, and held-out motion that
-//! is faster than all that was trained on. `new_kinds` has the kinds that came to the catalogue last, so that
+//! effects that no catalogue has beside others (`wide_outside`), each in 22 situations, from white noise to
+//! joints that are mostly noise, filters in drives, late velocities, dead bands, logs of a few seconds, rough
+//! clocks, and held-out motion that is faster than all that was trained on. `new_kinds` has the kinds that came to the catalogue last, so that
 //! the cases of the other suites stay what they were. A case follows from its seed alone. Seeds for
 //! developing the tracer and seeds for reporting are disjoint.
 //!
@@ -51,10 +51,13 @@ mod elasticity;
 mod family;
 mod friction;
 mod kind;
+#[cfg(test)]
+mod later_tests;
 mod load;
 mod logging;
 mod mechanism;
 mod plant;
+mod profile;
 pub(crate) mod report_file;
 mod rng;
 mod robot;
@@ -254,9 +257,14 @@ fn specs(arguments: &Arguments, seeds: Seeds, robots: &[robot::Robot]) -> anyhow
         let full = suite.full_count();
         // With a filter and a count, cases beyond the full run's fill up what the filter takes away.
         let range = if arguments.count.is_some() { 0..100_000 } else { 0..full };
-        let seeds = range.map(|index| suite.seed(seeds, index));
+        let later = match suite.later_count() {
+            0 => 0..0,
+            _ if arguments.count.is_some() => 0..0,
+            count => Situation::LATER_CASES..Situation::LATER_CASES + count,
+        };
+        let seeds = range.chain(later).map(|index| suite.seed(seeds, index));
         let found = seeds.filter_map(|seed| Spec::of_seed(seed, robots.len())).filter(wanted);
-        specs.extend(found.take(arguments.count.unwrap_or(full)));
+        specs.extend(found.take(arguments.count.unwrap_or(full + suite.later_count())));
     }
     Ok(specs)
 }

@@ -40,11 +40,26 @@ pub enum Situation {
     Quantised,
     /// Colour, tails, steps, a late velocity and rests together.
     Mixed,
+    /// 20 to 125 samples a second.
+    LowRate,
+    /// Logs of 4 to 8 s.
+    ShortLogs,
+    /// Strokes of constant speed between short ramps, as industrial controllers make them.
+    Strokes,
+    /// The torque is renewed less often than the position, and held in between: on average it is late by half
+    /// of that, so a delay is no false name.
+    HeldTorque,
+    /// Stamps rounded to milliseconds or more, rows lost one by one and in bursts.
+    RoughClock,
+    /// Some joints stay where they are, in all logs.
+    StillJoints,
+    /// Positions of a potentiometer: noise of 0.03 to 0.3 degrees.
+    NoisyPositions,
 }
 
 impl Situation {
     /// All situations.
-    pub const ALL: [Situation; 15] = [
+    pub const ALL: [Situation; 22] = [
         Situation::White,
         Situation::ShortColour,
         Situation::Colour,
@@ -60,7 +75,27 @@ impl Situation {
         Situation::Rests,
         Situation::Quantised,
         Situation::Mixed,
+        Situation::LowRate,
+        Situation::ShortLogs,
+        Situation::Strokes,
+        Situation::HeldTorque,
+        Situation::RoughClock,
+        Situation::StillJoints,
+        Situation::NoisyPositions,
     ];
+    /// Those of the first cases of each suite: so many there were when these were drawn first.
+    pub const FIRST: usize = 15;
+    /// Index from which on a suite's cases are in the situations that came later.
+    pub const LATER_CASES: usize = 50_000;
+
+    /// The situation of the case of this index: the first ones in turn, or the later ones.
+    pub fn of_index(index: usize) -> Self {
+        let (first, later) = Self::ALL.split_at(Self::FIRST);
+        match index.checked_sub(Self::LATER_CASES) {
+            Some(index) => later[index % later.len()],
+            None => first[index % first.len()],
+        }
+    }
 
     /// The name in tables.
     pub fn name(self) -> String {

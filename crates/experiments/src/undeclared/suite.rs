@@ -79,6 +79,16 @@ impl Suite {
         }
     }
 
+    /// How many more it has in the situations that came later.
+    pub fn later_count(self) -> usize {
+        match self {
+            Suite::WideRight => 210,
+            Suite::WideEffects => 84,
+            Suite::WideOutside => 28,
+            _ => 0,
+        }
+    }
+
     /// The seed of a case.
     pub fn seed(self, seeds: Seeds, index: usize) -> u64 {
         let phase = match seeds {
@@ -156,8 +166,7 @@ impl Spec {
 
     /// Situations in turn; the largest robot in one case of ten, since it takes as long as all others.
     fn draw_wide(&mut self, index: usize, robots: usize, rng: &mut CaseRng) {
-        let situations = Situation::ALL.len();
-        self.situation = Some(Situation::ALL[index % situations]);
+        self.situation = Some(Situation::of_index(index));
         self.robot = if rng.chance(0.1) { robots - 1 } else { rng.index((robots - 1).max(1)) };
         self.friction_declared = match self.suite {
             Suite::WideEffects => rng.chance(0.3),
@@ -167,7 +176,8 @@ impl Spec {
         let count = match self.suite {
             Suite::WideRight => 0,
             Suite::WideOutside => {
-                self.secrets = vec![Name::Outside(strangers[(index + index / situations) % strangers.len()])];
+                self.secrets =
+                    vec![Name::Outside(strangers[(index + index / Situation::FIRST) % strangers.len()])];
                 rng.index(4)
             }
             // One with friction alone, then more and more.

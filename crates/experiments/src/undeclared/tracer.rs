@@ -73,6 +73,12 @@ impl Tracer {
         if !declared.is_empty() {
             command.args(["--declare", &declared.join(",")]);
         }
+        if !case.still.is_empty() {
+            let tree = &case.robot.tree;
+            let held =
+                case.still.iter().map(|&(joint, position)| format!("{}={position}", tree.joint(joint).joint));
+            command.args(["--hold", &held.collect::<Vec<String>>().join(",")]);
+        }
         command.args(["--out", out]);
         command
     }

@@ -1,19 +1,21 @@
 //! Motions whose position, velocity and acceleration are known in closed form.
 
+use super::profile::{hermite, minimum_jerk, stroke, window};
 use super::rng::CaseRng;
 use phiw_dynamics::Tree;
 use std::f64::consts::TAU;
 
 /// Reach taken for joints without limits \[rad\].
 const UNLIMITED_REACH: f64 = 2.8;
-/// Time in which a motion fades in and out \[s\].
-const FADE: f64 = 1.2;
 /// Fastest speed asked of any joint \[rad/s, m/s\].
 const FASTEST: f64 = 3.0;
 /// Shortest and longest rest between moves \[s\].
 const SHORT_RESTS: [f64; 2] = [0.1, 0.7];
 /// The same where joints rest for long.
 const LONG_RESTS: [f64; 2] = [0.8, 3.0];
+
+/// Shortest and longest ramp of a stroke, as a share of its time.
+const RAMPS: [f64; 2] = [0.1, 0.3];
 
 /// Position, velocity, acceleration of one joint.
 pub type JointState = [f64; 3];
@@ -52,10 +54,12 @@ pub enum JointMotion {
         /// Amplitude, angular frequency, phase.
         terms: Vec<[f64; 3]>,
     },
-    /// Minimum-jerk moves with rests between.
+    /// Moves with rests between.
     PointToPoint {
         /// Beginning and end in time, start and goal, ascending in time.
         moves: Vec<[f64; 4]>,
+        /// Share of a move's time that each ramp of a stroke of constant speed takes; minimum jerk without.
+        ramp: Option<f64>,
     },
     /// Another motion, so many times as slow.
     Slowed {
@@ -132,6 +136,19 @@ impl Trajectory {
         motion
     }
 
+    /// Strokes of constant speed from pose to pose, all joints together, with short rests.
+    pub fn strokes(tree: &Tree, rng: &mut CaseRng, start: f64, duration: f64, reach: Option<Reach>) -> Self {
+        let mut motion = Self::moves(tree, rng, start, duration, reach, SHORT_RESTS);
+        // Longer ramps than a minimum-jerk move has would be faster between them.
+        let share = rng.uniform(RAMPS[0], RAMPS[1]);
+        for joint in &mut motion.joints {
+            if let JointMotion::PointToPoint { ramp, .. } = joint {
+                *ramp = Some(share);
+            }
+        }
+        motion
+    }
+
     /// A periodic excitation of two to five harmonics of 0.2 to 0.5 Hz.
     pub fn periodic(tree: &Tree, rng: &mut CaseRng, start: f64, duration: f64, reach: Option<Reach>) -> Self {
         let fundamental = rng.uniform(0.2, 0.5);
@@ -186,7 +203,8 @@ impl Trajectory {
             clock = end + rng.uniform(rests[0], rests[1]);
             from = to;
         }
-        let joints = joints.into_iter().map(|moves| JointMotion::PointToPoint { moves }).collect();
+        let joints =
+            joints.into_iter().map(|moves| JointMotion::PointToPoint { moves, ramp: None }).collect();
         Trajectory { start, duration, joints, excess: None }
     }
 
@@ -196,12 +214,19 @@ impl Trajectory {
         self.joints = self.joints.iter().map(slowed).collect();
     }
 
+    /// The same motion with some joints that stay where they are told to.
+    pub fn keep_still(&mut self, still: &[(usize, f64)]) {
+        for &(joint, center) in still {
+            self.joints[joint] = JointMotion::Fourier { center, terms: Vec::new() };
+        }
+    }
+
     /// The same motion around the same place, `factor` times as wide.
     pub fn shrink(&mut self, factor: f64) {
         for joint in &mut self.joints {
             match joint {
                 JointMotion::Fourier { terms, .. } => terms.iter_mut().for_each(|term| term[0] *= factor),
-                JointMotion::PointToPoint { moves } => {
+                JointMotion::PointToPoint { moves, .. } => {
                     let center = moves.first().map_or(0.0, |first| first[2]);
                     for [_, _, from, to] in moves {
                         *from = center + factor * (*from - center);
@@ -229,11 +254,15 @@ impl JointMotion {
                 let [s, ds, dds] = sum;
                 [center + w * s, dw * s + w * ds, ddw * s + 2.0 * dw * ds + w * dds]
             }
-            JointMotion::PointToPoint { moves } => {
+            JointMotion::PointToPoint { moves, ramp } => {
                 let after = moves.partition_point(|move_| move_[0] <= time);
                 match after.checked_sub(1).map(|index| moves[index]) {
                     Some([begin, end, from, to]) => {
-                        minimum_jerk((time - begin) / (end - begin), end - begin, from, to)
+                        let (x, length) = ((time - begin) / (end - begin), end - begin);
+                        match ramp {
+                            Some(ramp) => stroke(x, length, from, to, *ramp),
+                            None => minimum_jerk(x, length, from, to),
+                        }
                     }
                     None => [moves.first().map_or(0.0, |first| first[2]), 0.0, 0.0],
                 }
@@ -313,53 +342,6 @@ fn fourier_joint(
         }
     };
     JointMotion::Fourier { center, terms }
-}
-
-/// Rises from 0 to 1 in [`FADE`] and falls at the end, with three smooth derivatives.
-fn window(time: f64, duration: f64) -> JointState {
-    if time < FADE {
-        smooth_step(time / FADE, FADE)
-    } else if time > duration - FADE {
-        let [w, dw, ddw] = smooth_step((duration - time) / FADE, FADE);
-        [w, -dw, ddw]
-    } else {
-        [1.0, 0.0, 0.0]
-    }
-}
-
-/// 35 x⁴ − 84 x⁵ + 70 x⁶ − 20 x⁷.
-fn smooth_step(x: f64, length: f64) -> JointState {
-    let value = x.powi(4) * (35.0 + x * (-84.0 + x * (70.0 - 20.0 * x)));
-    let slope = 140.0 * (x * (1.0 - x)).powi(3);
-    let curvature = 420.0 * (x * (1.0 - x)).powi(2) * (1.0 - 2.0 * x);
-    [value, slope / length, curvature / (length * length)]
-}
-
-/// 10 x³ − 15 x⁴ + 6 x⁵ of the way; at the goal after x = 1.
-fn minimum_jerk(x: f64, length: f64, from: f64, to: f64) -> JointState {
-    if x >= 1.0 {
-        return [to, 0.0, 0.0];
-    }
-    let way = to - from;
-    let value = x.powi(3) * (10.0 + x * (-15.0 + 6.0 * x));
-    let slope = 30.0 * (x * (1.0 - x)).powi(2);
-    let curvature = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x);
-    [from + way * value, way * slope / length, way * curvature / (length * length)]
-}
-
-/// Cubic in position, from positions and velocities on the grid; linear in acceleration.
-fn hermite(states: &[JointState], place: f64, step: f64) -> JointState {
-    let last = states.len() - 1;
-    let index = (place as usize).min(last.saturating_sub(1));
-    let ([q0, v0, a0], [q1, v1, a1]) = (states[index], states[(index + 1).min(last)]);
-    let x = (place - index as f64).clamp(0.0, 1.0);
-    let (h00, h10) = ((1.0 + 2.0 * x) * (1.0 - x).powi(2), x * (1.0 - x).powi(2));
-    let (h01, h11) = (x * x * (3.0 - 2.0 * x), x * x * (x - 1.0));
-    let position = h00 * q0 + h10 * step * v0 + h01 * q1 + h11 * step * v1;
-    let velocity = (6.0 * x * x - 6.0 * x) * (q0 - q1) / step
-        + (1.0 - x) * (1.0 - 3.0 * x) * v0
-        + x * (3.0 * x - 2.0) * v1;
-    [position, velocity, a0 + x * (a1 - a0)]
 }
 
 #[cfg(test)]

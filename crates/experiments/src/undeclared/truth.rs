@@ -2,6 +2,7 @@
 //! tracer sees.
 
 use super::case::Case;
+use super::family::Shape;
 use super::kind::{Kind, Name};
 use super::mechanism::Mechanism;
 use super::secret::{Form, Secret};
@@ -82,15 +83,27 @@ impl Truth {
             declared: case.declared.iter().map(|kind| kind.name()).collect(),
             secrets: case.secrets.iter().map(secret).collect(),
             situation: case.spec.situation,
-            allowed: match case.spec.situation {
-                Some(Situation::LateFilter) => vec![Kind::TimeDelay],
-                _ => Vec::new(),
-            },
+            allowed: allowed(case),
             sign_width: case.ordinary.width,
             sensors: case.sensors.clone(),
             rejected: case.rejected,
         }
     }
+}
+
+/// Names that the situation, or the form of a friction, makes true.
+fn allowed(case: &Case) -> Vec<Kind> {
+    let mut allowed = Vec::new();
+    if matches!(case.spec.situation, Some(Situation::LateFilter | Situation::HeldTorque)) {
+        allowed.push(Kind::TimeDelay);
+    }
+    // Bristles are presliding: their torque depends on the way since the last reversal.
+    let mut secrets = case.plant.iter().chain(case.secrets.iter().map(|drawn| &drawn.secret));
+    let bristles = |secret: &Secret| matches!(&secret.form, Form::Family(family) if matches!(family.shape, Shape::Bristles { .. }));
+    if secrets.any(bristles) {
+        allowed.push(Kind::Hysteresis);
+    }
+    allowed
 }
 
 fn optional(drawn: &super::case::Drawn) -> Vec<usize> {

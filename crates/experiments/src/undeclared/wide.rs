@@ -32,6 +32,9 @@ const BARE: f64 = 0.2;
 /// How many times faster the held-out motion is, where it is.
 const FASTER: [f64; 2] = [3.0, 5.0];
 
+/// Shortest and longest of short logs \[s\].
+const SHORT: [f64; 2] = [4.0, 8.0];
+
 /// One attempt at the case of a spec. `None` if its stranger can't be seen.
 pub fn draw<'a>(spec: &Spec, situation: Situation, robot: &'a Robot, attempt: u64) -> Option<Case<'a>> {
     let rng = |stream| CaseRng::new(spec.seed, attempt, stream);
@@ -39,7 +42,7 @@ pub fn draw<'a>(spec: &Spec, situation: Situation, robot: &'a Robot, attempt: u6
     let reach = spec
         .has(Kind::EndStop)
         .then(|| Reach { joint: secret_rng.index(robot.joints()), upper: secret_rng.chance(0.5) });
-    let motions = motions(situation, robot, reach, spec, &mut rng(Stream::Motion));
+    let mut motions = motions(situation, robot, reach, spec, &mut rng(Stream::Motion));
     let plain = Spec { secrets: Vec::new(), ..spec.clone() };
     let (mut full, mut kinds) = draw_ordinary(&plain, robot, &motions, &mut plant_rng);
     if spec.suite == Suite::WideRight && plant_rng.chance(BARE) {
@@ -53,6 +56,16 @@ pub fn draw<'a>(spec: &Spec, situation: Situation, robot: &'a Robot, attempt: u6
     let logging = Logging::draw(situation, &robot.tree, rms, &mut sensors, &mut rng(Stream::Situation));
     sensors.logging = Some(logging);
     let bristles = situation.rests() && plant_rng.chance(0.6);
+    let mut still = Vec::new();
+    if situation == Situation::StillJoints {
+        // Sizes are drawn from the motion that these joints could make.
+        let mut joints: Vec<usize> = (0..robot.joints()).collect();
+        still = (0..1 + plant_rng.index(robot.joints().div_ceil(2)))
+            .map(|_| joints.swap_remove(plant_rng.index(joints.len())))
+            .map(|joint| (joint, motions[0].state(joint, motions[0].start)[0]))
+            .collect();
+        motions.iter_mut().for_each(|motion| motion.keep_still(&still));
+    }
     let families: Vec<Secret> = kinds
         .iter()
         .map(|kind| family(*kind, spec, &full, &survey.speed, bristles, &mut plant_rng))
@@ -68,6 +81,7 @@ pub fn draw<'a>(spec: &Spec, situation: Situation, robot: &'a Robot, attempt: u6
         clean_motions: Vec::new(),
         sensors,
         plant: families,
+        still,
         attempt,
     };
     let mut secrets = if spec.friction_declared { Vec::new() } else { std::mem::take(&mut case.plant) };
@@ -134,6 +148,15 @@ fn motions(
             let draw = |start| {
                 tamed(robot, Trajectory::with_rests(tree, rng, start, DURATION, reach, together), reach)
             };
+            STARTS.into_iter().map(draw).collect()
+        }
+        Situation::Strokes => {
+            let draw = |start| tamed(robot, Trajectory::strokes(tree, rng, start, DURATION, reach), reach);
+            STARTS.into_iter().map(draw).collect()
+        }
+        Situation::ShortLogs => {
+            let duration = rng.uniform(SHORT[0], SHORT[1]);
+            let draw = |start| tamed(robot, Trajectory::fourier(tree, rng, start, duration, reach), reach);
             STARTS.into_iter().map(draw).collect()
         }
         // Bristles hold a force at rest: that belongs to the situations with rests.
@@ -258,7 +281,8 @@ fn weighed(secrets: &[Secret], case: &Case, full: &Ordinary) -> Vec<Drawn> {
         }
     }
     let visible = visible_beside_others(&absorber, columns, ideal.len() / joints);
-    let rows = effective_rows(sensors);
+    let duration = case.motions[..2].iter().map(|motion| motion.duration).sum();
+    let rows = effective_rows(sensors, duration);
     let material = |place: usize| {
         let (index, joint, size) = owners[place];
         // Friction that differs with the direction may well be named instead of what both directions have in
@@ -285,11 +309,11 @@ fn weighed(secrets: &[Secret], case: &Case, full: &Ordinary) -> Vec<Drawn> {
     secrets.iter().enumerate().map(weigh).collect()
 }
 
-/// Rows of both training logs that tell as much as independent ones would.
-fn effective_rows(sensors: &Sensors) -> f64 {
+/// Rows of so much training motion \[s\] that tell as much as independent ones would.
+fn effective_rows(sensors: &Sensors, duration: f64) -> f64 {
     let filter = sensors.logging.as_ref().and_then(|logging| logging.filter);
     let memory = filter.map_or(0.0, |filter| 1.0 / (std::f64::consts::TAU * filter.corner));
     let correlation_time = sensors.correlation_time.max(memory);
     let kept = if correlation_time > 0.0 { (-1.0 / (sensors.rate * correlation_time)).exp() } else { 0.0 };
-    2.0 * DURATION * sensors.rate * (1.0 - kept) / (1.0 + kept)
+    duration * sensors.rate * (1.0 - kept) / (1.0 + kept)
 }

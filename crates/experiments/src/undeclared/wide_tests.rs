@@ -13,7 +13,7 @@ use super::trajectory::Trajectory;
 use super::truth::Truth;
 use super::wide::speed;
 
-fn models() -> Vec<Robot> {
+pub(super) fn models() -> Vec<Robot> {
     robots().expect("the models read")
 }
 
@@ -23,9 +23,12 @@ fn draw(suite: Suite, index: usize, robots: &[Robot]) -> Case<'_> {
 }
 
 /// The right model of a situation on the smallest robot.
-fn small(situation: Situation, number: usize, robots: &[Robot]) -> Case<'_> {
+pub(super) fn small(situation: Situation, number: usize, robots: &[Robot]) -> Case<'_> {
     let place = Situation::ALL.iter().position(|other| *other == situation).expect("it is one of all");
-    let index = place + Situation::ALL.len() * number;
+    let index = match place.checked_sub(Situation::FIRST) {
+        Some(place) => Situation::LATER_CASES + place + (Situation::ALL.len() - Situation::FIRST) * number,
+        None => place + Situation::FIRST * number,
+    };
     let spec = Spec::of_seed(Suite::WideRight.seed(Seeds::Dev, index), 5).expect("every index has a case");
     Case::draw(&Spec { robot: 0, ..spec }, &robots[..1]).expect("a right model can always be drawn")
 }
@@ -37,16 +40,18 @@ fn logging() -> Logging {
         velocity: None,
         dead_band: vec![0.0; 2],
         torque_step: vec![0.0; 2],
+        held_samples: 1,
+        rough: None,
     }
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
+pub(super) fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
     sum / count
 }
 
 /// Columns of a log's text by name.
-fn column(log: &str, name: &str) -> Vec<f64> {
+pub(super) fn column(log: &str, name: &str) -> Vec<f64> {
     let mut lines = log.lines();
     let header = lines.next().expect("a header");
     let place =

@@ -1,0 +1,105 @@
+//! What the situations that came later must do to a log.
+
+use super::case::{Case, DURATION};
+use super::situation::Situation;
+use super::wide_tests::{column, mean, models, small};
+use std::collections::BTreeSet;
+
+/// Checks three training logs of a situation on the smallest robot.
+fn check(situation: Situation, holds: impl Fn(&Case, &str)) {
+    let robots = models();
+    for number in 0..3 {
+        let case = small(situation, number, &robots);
+        let log = case.logs().swap_remove(0).1;
+        holds(&case, &log);
+    }
+}
+
+fn period(log: &str) -> f64 {
+    let stamps = column(log, "t");
+    (stamps[stamps.len() - 1] - stamps[0]) / (stamps.len() - 1) as f64
+}
+
+#[test]
+fn a_low_rate_is_20_to_125_samples_a_second() {
+    check(Situation::LowRate, |_, log| {
+        let period = period(log);
+        assert!((1.0 / 126.0..1.0 / 19.0).contains(&period), "{period}");
+        assert!((period * column(log, "t").len() as f64 - DURATION).abs() < 0.2);
+    });
+}
+
+#[test]
+fn short_logs_last_4_to_8_seconds() {
+    check(Situation::ShortLogs, |case, log| {
+        let stamps = column(log, "t");
+        let duration = stamps[stamps.len() - 1] - stamps[0];
+        assert!((3.9..8.1).contains(&duration), "{duration}");
+        assert!((case.motions[2].duration - case.motions[0].duration).abs() < 1e-12);
+    });
+}
+
+#[test]
+fn strokes_have_a_constant_speed_most_of_their_time() {
+    check(Situation::Strokes, |case, _| {
+        let states = (0..4000).map(|k| case.motions[0].state(0, 0.005 * f64::from(k)));
+        let moving: Vec<[f64; 3]> = states.filter(|[_, v, _]| v.abs() > 1e-9).collect();
+        let steady = moving.iter().filter(|[_, _, a]| *a == 0.0).count();
+        assert!(steady as f64 > 0.3 * moving.len() as f64, "{steady} of {}", moving.len());
+        assert!(steady < moving.len());
+    });
+}
+
+#[test]
+fn a_held_torque_changes_every_so_many_samples() {
+    check(Situation::HeldTorque, |case, log| {
+        let held = case.sensors.logging.as_ref().expect("a wide case").held_samples;
+        assert!(held > 1 && case.sensors.rate / held as f64 >= 24.0, "{held}");
+        let torque = column(log, "tau.joint_1");
+        assert!(torque.chunks(held).all(|chunk| chunk.iter().all(|value| *value == chunk[0])));
+        let changes = torque.chunks(held).zip(torque.chunks(held).skip(1)).filter(|(a, b)| a[0] != b[0]);
+        assert!(changes.count() > torque.len() / held / 2);
+    });
+}
+
+#[test]
+fn a_rough_clock_rounds_stamps_and_loses_rows() {
+    check(Situation::RoughClock, |case, log| {
+        let rough = case.sensors.logging.as_ref().and_then(|logging| logging.rough.clone());
+        let rough = rough.expect("a rough clock");
+        let stamps = column(log, "t");
+        assert!(stamps.windows(2).all(|pair| pair[1] > pair[0]), "stamps run forwards");
+        assert!(stamps.iter().all(|t| (t / rough.step - (t / rough.step).round()).abs() < 1e-3));
+        let rows = (DURATION * case.sensors.rate) as usize;
+        let lost = rows - stamps.len();
+        assert!(lost > 0 && lost <= rough.burst + (3.0 * rough.lost * rows as f64) as usize + 5, "{lost}");
+    });
+}
+
+#[test]
+fn still_joints_stand_at_one_place_in_all_logs() {
+    check(Situation::StillJoints, |case, _| {
+        let still: BTreeSet<usize> = case.still.iter().map(|(joint, _)| *joint).collect();
+        assert!(!still.is_empty() && still.len() < case.robot.joints());
+        for (joint, motion) in (0..case.robot.joints()).flat_map(|j| case.motions.iter().map(move |m| (j, m)))
+        {
+            let place = |k: i32| motion.state(joint, motion.start + 0.5 * f64::from(k))[0];
+            let moves = (0..40).any(|k| (place(k) - place(0)).abs() > 1e-9);
+            assert_eq!(moves, !still.contains(&joint));
+            if let Some((_, stands)) = case.still.iter().find(|(other, _)| *other == joint) {
+                assert_eq!(place(0), *stands);
+            }
+        }
+    });
+}
+
+#[test]
+fn noisy_positions_scatter_about_the_motion() {
+    check(Situation::NoisyPositions, |case, log| {
+        let (stamps, positions) = (column(log, "t"), column(log, "q.joint_1"));
+        let scatter =
+            stamps.iter().zip(&positions).map(|(t, q)| (q - case.motions[0].state(0, *t)[0]).powi(2));
+        let std = mean(scatter).sqrt();
+        assert!((4e-4..7e-3).contains(&std), "{std}");
+    });
+}
