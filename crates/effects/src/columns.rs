@@ -7,19 +7,6 @@ use phiw_identification::effect::{
 };
 use phiw_identification::{Effect, EffectSpec};
 
-/// sign(v), smoothed over the speed `width`; the plain sign where `width` is zero.
-#[inline]
-pub fn smooth_sign(velocity: f64, width: f64) -> f64 {
-    // tanh is one to the last digit beyond 20.
-    if velocity.abs() < 20.0 * width {
-        (velocity / width).tanh()
-    } else if velocity == 0.0 {
-        0.0
-    } else {
-        velocity.signum()
-    }
-}
-
 /// The dimension of a parameter over the joint's torque or force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterKind {

@@ -1,11 +1,11 @@
 //! Two joints behind one transmission: the torque of each depends on the other's motion, or on their sum
 //! (differential wrists).
 
-use crate::columns::{ParameterKind, smooth_sign};
+use crate::columns::ParameterKind;
 use crate::fitted::FittedEffect;
-use crate::friction::WIDTH;
 use crate::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
 use crate::mechanism::{Mechanism, Mechanisms};
+use crate::sign::{WIDTH, smooth_sign};
 use phiw_codegen::{Expression, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::effect::{

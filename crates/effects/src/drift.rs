@@ -1,9 +1,9 @@
 //! Friction that changes with time or temperature.
 
-use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
+use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
-use crate::friction::WIDTH;
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, values};
+use crate::sign::Sign;
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
 use phiw_identification::effect::Sample;
@@ -48,7 +48,7 @@ impl EffectKind for ThermalDrift {
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
         let time_constant = constant(constants, TIME_CONSTANT, 60.0);
-        let width = constant(constants, WIDTH, 0.0);
+        let sign = Sign::of(constants);
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
             let factor = if time_constant > 0.0 {
                 (-sample.time() / time_constant).exp()
@@ -62,7 +62,7 @@ impl EffectKind for ThermalDrift {
             };
             let velocity = sample.qd()[joint];
             out[0] = factor * velocity;
-            out[1] = factor * smooth_sign(velocity, width);
+            out[1] = factor * sign.at(velocity);
         };
         let parameters = [
             ("fv_cold", ParameterKind::PerVelocity, f64::NEG_INFINITY),

@@ -1,9 +1,9 @@
 //! Losses of a transmission that depend on the direction of power.
 
-use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
+use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
-use crate::friction::{WIDTH, few_sign_widths};
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, product, values};
+use crate::sign::{Sign, WIDTH, few_sign_widths};
 use phiw_codegen::{Expression, Function, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
@@ -68,12 +68,12 @@ impl EffectKind for DriveEfficiency {
         named.flat_map(|(name, value)| found.own_torque(|joint| value * loss(joint, side(name)))).collect()
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
-        let (joint, width) = (site[0], constant(constants, WIDTH, 0.0));
+        let (joint, sign) = (site[0], Sign::of(constants));
         let part = constant(constants, PART, BOTH);
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
             let load = sample.reference_torque().get(joint).copied().unwrap_or_default();
             let velocity = sample.qd()[joint];
-            let loss = load.abs() * smooth_sign(velocity, width);
+            let loss = load.abs() * sign.at(velocity);
             let drives = load * velocity > 0.0;
             if part == BOTH {
                 (out[0], out[1]) = if drives { (loss, 0.0) } else { (0.0, loss) };

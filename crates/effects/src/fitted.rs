@@ -1,6 +1,6 @@
 //! An effect with its fitted values, and its description for a user.
 
-use crate::friction::WIDTH;
+use crate::sign::Sign;
 use phiw_codegen::{Expression, JointTorque};
 use phiw_identification::EffectSpec;
 use phiw_identification::effect::EffectParameter;
@@ -75,7 +75,7 @@ impl<'a> FittedEffect<'a> {
 
     /// The sign of a joint's velocity, as smooth as the effect's own constant says.
     pub(crate) fn sign_of_velocity(&self, joint: &str) -> Expression {
-        Expression::velocity(joint).sign(self.constant(WIDTH))
+        Sign::of(&self.spec.constants).formula(Expression::velocity(joint))
     }
 
     /// Its torque at its only joint, of the joint's name; none where it has not one joint.

@@ -1,34 +1,14 @@
 //! Friction that depends on the velocity alone, or on the load.
 
-use crate::columns::{OwnTorque, ParameterKind, smooth_sign};
+use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, product, values};
 use crate::mechanism::ServoFriction;
+use crate::sign::{POWER, Sign, WIDTH, few_sign_widths, sign_widths, signs_near};
 use phiw_codegen::{Expression, Function, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
 use phiw_identification::effect::{JointProperty, Needs, QuadraticForm, Sample};
-
-/// The constant of every smoothed sign: the speed over which it turns \[rad/s, m/s\].
-pub(crate) const WIDTH: &str = "sign_width";
-
-/// Speeds over which a sign may turn: the plain sign, then up to 0.064 rad/s (m/s), but no more than half of
-/// the joint's RMS speed.
-pub(crate) fn sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
-    let largest = 0.5 * ranges.joints[joint].velocity_rms;
-    let widths =
-        (0..15).map(|step| 0.0005 * 2.0_f64.powf(0.5 * f64::from(step))).filter(|&width| width <= largest);
-    values(WIDTH, [0.0].into_iter().chain(widths))
-}
-
-/// A few of them, for effects that are not themselves about the sign.
-pub(crate) fn few_sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
-    sign_widths(joint, ranges).into_iter().step_by(5).collect()
-}
-
-fn width_of(constants: &Constants) -> f64 {
-    constant(constants, WIDTH, 0.0)
-}
 
 const VISCOUS: &str = "viscous_friction";
 
@@ -74,7 +54,7 @@ impl EffectKind for Coulomb {
         sign_widths(site[0], ranges)
     }
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
-        around(found, WIDTH, step)
+        signs_near(found, step)
     }
     fn may_change(&self) -> bool {
         true
@@ -92,15 +72,14 @@ impl EffectKind for Coulomb {
         &[VISCOUS]
     }
     fn constants_of_the_site(&self) -> &'static [&'static str] {
-        &[WIDTH]
+        &[WIDTH, POWER]
     }
     fn dissipates(&self) -> bool {
         true
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
-        let (joint, width) = (site[0], width_of(constants));
-        let columns =
-            move |sample: &Sample<'_>, out: &mut [f64]| out[0] = smooth_sign(sample.qd()[joint], width);
+        let (joint, sign) = (site[0], Sign::of(constants));
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = sign.at(sample.qd()[joint]);
         let parameters = [("fc", ParameterKind::Torque, 0.0)];
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
     }
@@ -146,12 +125,12 @@ impl EffectKind for Asymmetric {
         &["viscous_friction", "coulomb_friction"]
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
-        let (joint, width) = (site[0], width_of(constants));
+        let (joint, sign) = (site[0], Sign::of(constants));
         let viscous = ("fv_difference", ParameterKind::PerVelocity, f64::NEG_INFINITY);
         let coulomb = ("fc_difference", ParameterKind::Torque, f64::NEG_INFINITY);
         let part = constant(constants, "part", 2.0);
         let viscous_column = move |sample: &Sample<'_>| sample.qd()[joint].abs();
-        let coulomb_column = move |sample: &Sample<'_>| smooth_sign(sample.qd()[joint], width).abs();
+        let coulomb_column = move |sample: &Sample<'_>| sign.at(sample.qd()[joint]).abs();
         let kind = self.name();
         if part == 0.0 {
             let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = viscous_column(sample);
@@ -259,7 +238,7 @@ impl EffectKind for Stribeck {
         &["viscous_friction", "coulomb_friction"]
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
-        let (joint, width) = (site[0], width_of(constants));
+        let (joint, sign) = (site[0], Sign::of(constants));
         let speed = constant(constants, STRIBECK_VELOCITY, STRIBECK_DEFAULTS.0);
         let exponent = constant(constants, EXPONENT, STRIBECK_DEFAULTS.1);
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
@@ -273,7 +252,7 @@ impl EffectKind for Stribeck {
                 relative.powf(exponent)
             };
             // Far above the Stribeck velocity the exponential is below the last digit of one.
-            out[0] = if power > 40.0 { 0.0 } else { (-power).exp() * smooth_sign(velocity, width) };
+            out[0] = if power > 40.0 { 0.0 } else { (-power).exp() * sign.at(velocity) };
         };
         let parameters = [("fs", ParameterKind::Torque, 0.0)];
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
@@ -314,10 +293,10 @@ impl EffectKind for LoadDependent {
         true
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
-        let (joint, width) = (site[0], width_of(constants));
+        let (joint, sign) = (site[0], Sign::of(constants));
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
             let load = sample.reference_torque().get(joint).copied().unwrap_or_default();
-            out[0] = load.abs() * smooth_sign(sample.qd()[joint], width);
+            out[0] = load.abs() * sign.at(sample.qd()[joint]);
         };
         let parameters = [("mu", ParameterKind::Ratio, 0.0)];
         let needs = Needs { torque: true, ..Needs::default() };

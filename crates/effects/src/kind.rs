@@ -1,8 +1,8 @@
 //! The description of a kind of effect in the catalogue.
 
 use crate::FittedEffect;
-use crate::friction::WIDTH;
 use crate::mechanism::{Mechanism, Mechanisms, ServoFriction};
+use crate::sign::Sign;
 use phiw_codegen::{Expression, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
@@ -125,7 +125,7 @@ pub trait EffectKind: Send + Sync {
             joint: joint.clone(),
             property,
             value: found.value(0),
-            width: found.constant(WIDTH),
+            width: Sign::of(found.constants()).tanh_width(),
         };
         let parts = self.joint_property().into_iter().zip(found.joint_names()).map(of_joint);
         Mechanisms { parts: parts.collect(), left_out: Vec::new() }

@@ -17,10 +17,12 @@ mod mechanism;
 mod position;
 mod position_map;
 mod sensing;
+mod sign;
 mod trigonometric_spline;
 
 pub use catalogue::{Catalogue, sentence};
-pub use columns::{Formula, OwnTorque, ParameterKind, smooth_sign};
+pub use columns::{Formula, OwnTorque, ParameterKind};
 pub use fitted::FittedEffect;
 pub use kind::{Constants, EffectKind, JointRange, Signal, SignalRanges};
 pub use mechanism::{Mechanism, Mechanisms, ServoFriction};
+pub use sign::smooth_sign;

@@ -88,7 +88,9 @@ fn every_formula_is_its_effect() {
     for kind in catalogue.kinds() {
         let mut count = 0;
         for site in kind.sites(&tree) {
-            for constants in kind.scan(&site, &ranges) {
+            let scanned = kind.scan(&site, &ranges);
+            let refined = scanned.last().map(|found| kind.refine(found, 0)).unwrap_or_default();
+            for constants in scanned.into_iter().chain(refined) {
                 let effect = kind.build(&tree, &site, &constants);
                 let (spec, parameters) = (effect.spec(), effect.parameters());
                 let values: Vec<f64> = parameters.iter().map(|_| random.uniform(0.1, 2.0)).collect();

@@ -188,6 +188,28 @@ fn stribeck_friction_is_named() {
     check(stribeck, &[("stribeck_friction", &["elbow"])]);
 }
 
+/// Right models whose friction turned as an arctangent does were given a Stribeck friction: of no other effect
+/// is the sign, however slowly it turns.
+#[test]
+fn a_sign_that_turns_slowly_is_no_stribeck_friction() {
+    let secret = |state: &State<'_>, torque: &mut [f64]| {
+        for (torque, velocity) in torque.iter_mut().zip(state.qd) {
+            let slow = (velocity / 0.04).atan() * std::f64::consts::FRAC_2_PI;
+            *torque += 3.0 * slow - 0.6 * (velocity / 0.01).tanh();
+        }
+    };
+    let tracing = traced(31, &secret);
+    assert!(named(&tracing).is_empty(), "{:?}", named(&tracing));
+    assert_eq!(tracing.verdict, Verdict::Sufficient);
+    let powers: Vec<Option<&f64>> = tracing
+        .specs
+        .iter()
+        .filter(|spec| spec.kind == "coulomb_friction")
+        .map(|spec| spec.constants.get("sign_power"))
+        .collect();
+    assert_eq!(powers, [Some(&1.0), Some(&1.0)]);
+}
+
 #[test]
 fn a_ripple_is_named_with_its_frequency() {
     let ripple = |state: &State<'_>, torque: &mut [f64]| torque[0] += 0.4 * (9.0 * state.q[0] + 0.3).sin();

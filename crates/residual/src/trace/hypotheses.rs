@@ -183,8 +183,9 @@ fn scan(
     }
     let mut unique: Vec<Constants> = Vec::new();
     for mut constants in kind.scan(site, ranges) {
-        for (name, value) in &mut constants {
-            *value = known.get(name).copied().unwrap_or(*value);
+        // What belongs to the joint comes together: how a sign turns with how soon.
+        if constants.keys().any(|name| known.contains_key(name)) {
+            constants.extend(known.clone());
         }
         if !unique.contains(&constants) {
             unique.push(constants);

@@ -67,7 +67,7 @@ impl Default for TraceOptions {
             least_share: 0.2,
             least_share_of_kin: 0.75,
             least_of_others: 0.025,
-            least_of_simpler: 0.01,
+            least_of_simpler: 0.02,
             least_size: 0.01,
             negligible_share: 0.005,
             floor_margin: 1.15,

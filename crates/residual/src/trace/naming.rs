@@ -243,7 +243,10 @@ impl Search<'_> {
             let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
             let squares = Squares { initial, without, with };
             let material = match level {
-                Some(_) => self.is_form_material(trial, own_member, &squares),
+                Some(_) => {
+                    self.is_form_material(trial, own_member, &squares)
+                        || self.is_form_material_beside_all(whole, member, place)
+                }
                 None => self.is_material(trial, own_member, &squares),
             };
             let certainty = certainty(&trial.problem, &trial.fit, own_member);
@@ -280,6 +283,17 @@ impl Search<'_> {
                 && taken * without >= self.options.least_of_simpler * of_simpler * with
                 && (taken / whole).sqrt() >= self.options.least_size
         })
+    }
+
+    /// The same beside all other forms: where two of them are there, neither takes most of what the simpler
+    /// ones leave.
+    fn is_form_material_beside_all(&self, whole: &Trial, member: Member, place: usize) -> bool {
+        let squares = Squares {
+            initial: Vec::new(),
+            without: whole.held_out_squares(&whole.fit_with(|other| other != place)),
+            with: whole.held_out_squares(&whole.fit),
+        };
+        self.is_form_material(whole, member, &squares)
     }
 
     /// Whether a torque's residual is no larger than it was when the held model was fitted: then nothing has

@@ -1,0 +1,151 @@
+//! The sign of a velocity, and how it turns.
+
+use crate::kind::{Constants, SignalRanges, around, constant, values};
+use phiw_codegen::{Expression, Function};
+
+/// The constant of every smoothed sign: the speed over which it turns \[rad/s, m/s\].
+pub(crate) const WIDTH: &str = "sign_width";
+/// The constant that says how it turns: see [`Sign`].
+pub(crate) const POWER: &str = "sign_power";
+/// The powers that are tried where a sign is refined; 0 stands for the hyperbolic tangent.
+const POWERS: [f64; 3] = [0.0, 1.0, 2.0];
+
+/// Speeds over which a sign may turn: the plain sign, then up to 0.064 rad/s (m/s), but no more than half of
+/// the joint's RMS speed.
+pub(crate) fn sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
+    let largest = 0.5 * ranges.joints[joint].velocity_rms;
+    let widths =
+        (0..15).map(|step| 0.0005 * 2.0_f64.powf(0.5 * f64::from(step))).filter(|&width| width <= largest);
+    values(WIDTH, [0.0].into_iter().chain(widths))
+}
+
+/// A few of them, for effects that are not themselves about the sign.
+pub(crate) fn few_sign_widths(joint: usize, ranges: &SignalRanges) -> Vec<Constants> {
+    sign_widths(joint, ranges).into_iter().step_by(5).collect()
+}
+
+/// Signs near one that was found: of other widths, and turning in other ways within the same speed.
+///
+/// How exactly a sign turns is nobody's effect, but where it is wrong, others seem to be there: a Stribeck
+/// friction that makes it turn sooner.
+pub(crate) fn signs_near(found: &Constants, step: usize) -> Vec<Constants> {
+    let mut near = around(found, WIDTH, step);
+    let own = Sign::of(found);
+    if own.width > 0.0 {
+        near.extend(POWERS.into_iter().filter(|power| *power != own.power).map(|power| {
+            let width = own.tanh_width() / Sign { width: 1.0, power }.tanh_width();
+            let mut other = found.clone();
+            other.insert(WIDTH.to_owned(), width);
+            match power {
+                0.0 => other.remove(POWER),
+                power => other.insert(POWER.to_owned(), power),
+            };
+            other
+        }));
+    }
+    near
+}
+
+/// sign(v), smoothed over the speed `width`; the plain sign where `width` is zero.
+#[inline]
+pub fn smooth_sign(velocity: f64, width: f64) -> f64 {
+    // tanh is one to the last digit beyond 20.
+    if velocity.abs() < 20.0 * width {
+        (velocity / width).tanh()
+    } else if velocity == 0.0 {
+        0.0
+    } else {
+        velocity.signum()
+    }
+}
+
+/// A smoothed sign: tanh(v/w), or v/(|v|ᵖ + wᵖ)^(1/p) of a power p, which turns the slower the smaller p is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Sign {
+    /// w \[rad/s, m/s\]; the plain sign where it is zero.
+    pub width: f64,
+    /// p: 1 or 2; 0 stands for the hyperbolic tangent.
+    pub power: f64,
+}
+
+impl Sign {
+    /// The sign of an effect's constants.
+    pub fn of(constants: &Constants) -> Self {
+        Sign { width: constant(constants, WIDTH, 0.0), power: constant(constants, POWER, 0.0) }
+    }
+
+    /// The sign of a velocity \[rad/s, m/s\].
+    #[inline]
+    pub fn at(self, velocity: f64) -> f64 {
+        if self.power == 0.0 || self.width == 0.0 {
+            smooth_sign(velocity, self.width)
+        } else if self.power == 1.0 {
+            velocity / (velocity.abs() + self.width)
+        } else {
+            velocity / velocity.hypot(self.width)
+        }
+    }
+
+    /// The same as a formula.
+    pub fn formula(self, velocity: Expression) -> Expression {
+        if self.power == 0.0 || self.width == 0.0 {
+            return velocity.sign(self.width);
+        }
+        let inverse = |of: Expression, exponent: f64| of.of(Function::Power(exponent));
+        let scale = if self.power == 1.0 {
+            inverse(velocity.clone().magnitude() + Expression::Constant(self.width), -1.0)
+        } else {
+            let square = velocity.clone() * velocity.clone();
+            inverse(square + Expression::Constant(self.width * self.width), -0.5)
+        };
+        velocity * scale
+    }
+
+    /// The width of the hyperbolic tangent that is as large as this one where that is tanh 1 \[rad/s, m/s\].
+    pub fn tanh_width(self) -> f64 {
+        let there = 1.0_f64.tanh();
+        match self.power {
+            0.0 => self.width,
+            1.0 => self.width * there / (1.0 - there),
+            _ => self.width * there / (1.0 - there * there).sqrt(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{POWERS, Sign, WIDTH, signs_near};
+    use crate::kind::values;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_sign_is_odd_rises_and_is_tanh_1_at_the_width_of_its_tangent(
+            width in 1e-4..0.1f64,
+            power in prop::sample::select(POWERS.to_vec()),
+            a in -5.0..5.0f64,
+            b in -5.0..5.0f64,
+        ) {
+            let sign = Sign { width, power };
+            prop_assert_eq!(sign.at(-a), -sign.at(a));
+            prop_assert!(sign.at(a).abs() <= 1.0 && sign.at(a) * a >= 0.0);
+            prop_assert!((sign.at(a) - sign.at(b)) * (a - b) >= 0.0);
+            prop_assert!((sign.at(sign.tanh_width()) - 1.0_f64.tanh()).abs() < 1e-12);
+            prop_assert!(sign.at(1e6) > 1.0 - 1e-6);
+        }
+    }
+
+    #[test]
+    fn other_ways_to_turn_are_tried_within_the_same_speed() {
+        let found = values(WIDTH, [0.02]).remove(0);
+        let near = signs_near(&found, 3);
+        let ways: Vec<Sign> = near.iter().map(Sign::of).filter(|sign| sign.power > 0.0).collect();
+        assert_eq!(ways.len(), 2);
+        assert!(ways.iter().all(|sign| (sign.tanh_width() - 0.02).abs() < 1e-12));
+        assert!(
+            signs_near(&values(WIDTH, [0.0]).remove(0), 0).iter().all(|near| Sign::of(near).width == 0.0)
+        );
+        let back = signs_near(&near[near.len() - 1], 0);
+        assert!(back.iter().map(Sign::of).any(|sign| sign.power == 0.0 && (sign.width - 0.02).abs() < 1e-12));
+    }
+}
