@@ -2,17 +2,22 @@
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, values};
+use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, product, values};
 use crate::sign::Sign;
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
 use phiw_identification::effect::Sample;
 
-/// Viscous and Coulomb friction times a factor that falls from one to zero: exp(−t / `time_constant`), or
-/// with the temperature where the log has one (`time_constant` zero).
+/// Viscous friction, Coulomb friction or both (`part` 0, 1, 2) times a factor that falls from one to zero:
+/// exp(−t / `time_constant`), or with the temperature where the log has one (`time_constant` zero). Neither
+/// is negative: friction that grows as the joint warms up is something else.
 pub struct ThermalDrift;
 
 const TIME_CONSTANT: &str = "time_constant";
+const PART: &str = "part";
+const VISCOUS: f64 = 0.0;
+const COULOMB: f64 = 1.0;
+const BOTH: f64 = 2.0;
 /// Temperatures enter over this span \[K\], so that the parameters are torques at a change that is usual.
 const TEMPERATURE_SPAN: f64 = 10.0;
 const ROOM_TEMPERATURE: f64 = 20.0;
@@ -27,7 +32,10 @@ impl EffectKind for ThermalDrift {
         if ranges.temperature {
             variants.extend(values(TIME_CONSTANT, [0.0]));
         }
-        variants
+        product(&values(PART, [VISCOUS, COULOMB, BOTH]), &variants)
+    }
+    fn declared_constants(&self) -> Option<Constants> {
+        Some(Constants::from([(PART.to_owned(), BOTH)]))
     }
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
         around(found, TIME_CONSTANT, step)
@@ -49,6 +57,7 @@ impl EffectKind for ThermalDrift {
         let joint = site[0];
         let time_constant = constant(constants, TIME_CONSTANT, 60.0);
         let sign = Sign::of(constants);
+        let part = constant(constants, PART, BOTH);
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
             let factor = if time_constant > 0.0 {
                 (-sample.time() / time_constant).exp()
@@ -61,13 +70,35 @@ impl EffectKind for ThermalDrift {
                 }
             };
             let velocity = sample.qd()[joint];
-            out[0] = factor * velocity;
-            out[1] = factor * sign.at(velocity);
+            let both = [factor * velocity, factor * sign.at(velocity)];
+            let of_part = if part == COULOMB { &both[1..] } else { &both[..out.len()] };
+            out.copy_from_slice(of_part);
         };
-        let parameters = [
-            ("fv_cold", ParameterKind::PerVelocity, f64::NEG_INFINITY),
-            ("fc_cold", ParameterKind::Torque, f64::NEG_INFINITY),
-        ];
-        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+        let both = [("fv_cold", ParameterKind::PerVelocity, 0.0), ("fc_cold", ParameterKind::Torque, 0.0)];
+        let parameters = match part {
+            VISCOUS => &both[..1],
+            COULOMB => &both[1..],
+            _ => &both[..],
+        };
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, parameters, columns))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{PART, ThermalDrift};
+    use crate::kind::{Constants, EffectKind};
+    use phiw_dynamics::random_tree::{RandomTreeOptions, random_tree};
+
+    /// "Falls as it warms up" was said of friction that grew, with a negative excess when cold.
+    #[test]
+    fn friction_that_falls_as_it_warms_up_is_never_less_when_cold() {
+        let tree = random_tree(3, &RandomTreeOptions { joints: 2, ..Default::default() }).unwrap();
+        for (part, names) in [(0.0, &["fv_cold"][..]), (1.0, &["fc_cold"]), (2.0, &["fv_cold", "fc_cold"])] {
+            let constants = Constants::from([(PART.to_owned(), part)]);
+            let parameters = ThermalDrift.build(&tree, &[1], &constants).parameters().to_vec();
+            assert!(parameters.iter().map(|parameter| parameter.name.as_str()).eq(names.iter().copied()));
+            assert!(parameters.iter().all(|parameter| parameter.bounds.0 == 0.0));
+        }
     }
 }

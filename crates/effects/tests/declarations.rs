@@ -25,6 +25,9 @@ const PERIOD: f64 = 0.01;
 const SWING: f64 = 5.0;
 const TORQUE: f64 = 9.0;
 
+/// Temperature at the beginning of a motion \[°C\]; joints warm up.
+const WARM: f64 = 15.0;
+
 /// For each parameter of a design, its number in each torque that it acts on, and which torque that is.
 type Columns = Vec<Vec<(usize, f64)>>;
 
@@ -50,7 +53,7 @@ impl Zoo {
             session: (0.0, 60.0),
             period: PERIOD,
             ripple_frequencies: vec![vec![12.0]; joints],
-            temperature: false,
+            temperature: true,
         };
         let (mut effects, mut kinds) = (Vec::new(), Vec::new());
         for kind in Catalogue::default().kinds() {
@@ -137,7 +140,11 @@ impl Zoo {
             signal(&|joint, phase| -state.v[joint] * SWING * phase.sin()),
         ];
         let torque = signal(&|joint, phase| TORQUE * (phase + joint as f64).sin());
-        Block::unfiltered(joints, (0..rows).map(|row| PERIOD * row as f64).collect(), signals, torque)
+        let temperature = signal(&|_, phase| WARM + 10.0 * phase);
+        let mut block =
+            Block::unfiltered(joints, (0..rows).map(|row| PERIOD * row as f64).collect(), signals, torque);
+        block.temp = Some(temperature);
+        block
     }
 
     /// For each parameter of the design, whether a row's columns change with what comes after it.
