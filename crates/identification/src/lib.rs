@@ -34,6 +34,7 @@ mod rivals;
 mod robot_findings;
 mod sample;
 pub mod shard;
+pub mod told;
 mod variants;
 
 pub use accumulate::Fold;
