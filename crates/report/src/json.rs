@@ -96,6 +96,10 @@ pub struct EffectJson {
     /// Probability of this effect against its rivals, 0 to 1.
     #[serde(deserialize_with = "number_or_nan")]
     pub confidence: f64,
+    /// Constants in which it is not linear and that were found by scanning, by joint (several joined by `+`)
+    /// and name.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub constants: JointMap<IndexMap<String, ConstantJson>>,
     /// The effects that the data could not tell from it.
     pub rivals: Vec<RivalJson>,
 }
@@ -111,6 +115,19 @@ pub struct ParameterJson {
     pub std: f64,
     /// The unit of both.
     pub unit: String,
+}
+
+/// A constant that was found by scanning.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ConstantJson {
+    /// Its value (SI units).
+    pub value: f64,
+    /// Its standard deviation; none where the logs tell it too poorly.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub std: Option<f64>,
+    /// Its 95 % interval.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval_95: Option<[f64; 2]>,
 }
 
 /// An effect that the data could not tell from the chosen one.
