@@ -178,16 +178,50 @@ impl Problem {
             _ if row == column => -shape[row],
             _ => 0.0,
         });
-        let unknown = PARAMETERS_PER_BODY * body;
+        self.ask_of_moments(body, &q, ellipsoid);
+        Ok(self)
+    }
+
+    /// The same with all of a body's mass inside a box along the axes of its frame, from its lowest corner to
+    /// its highest \[m\]: ∫ (x − lower)(upper − x) dm ≥ 0 along each axis.
+    ///
+    /// # Errors
+    /// There is no such body, or a corner is not below the other.
+    pub fn with_box(
+        mut self,
+        body: usize,
+        lower: [f64; 3],
+        upper: [f64; 3],
+    ) -> Result<Self, ConsistencyError> {
+        check_index("body", body, self.priors.len())?;
+        for value in lower.into_iter().chain(upper) {
+            check_finite("a number of a box", value)?;
+        }
+        let half_axes: [f64; 3] = std::array::from_fn(|axis| 0.5 * (upper[axis] - lower[axis]));
+        if let Some(&value) = half_axes.iter().find(|half| **half <= 0.0) {
+            return Err(ConsistencyError::Number { what: "half an edge", value, wrong: "not positive" });
+        }
+        let center: [f64; 3] = std::array::from_fn(|axis| 0.5 * (upper[axis] + lower[axis]));
+        for axis in 0..3 {
+            let shape = 1.0 / (half_axes[axis] * half_axes[axis]);
+            let q = Square::from_fn(4, |row, column| match (row, column) {
+                (3, 3) => -lower[axis] * upper[axis] * shape,
+                (3, own) | (own, 3) if own == axis => center[axis] * shape,
+                (row, column) if row == axis && column == axis => -shape,
+                _ => 0.0,
+            });
+            self.ask_of_moments(body, &q, &Ellipsoid { center, half_axes });
+        }
+        Ok(self)
+    }
+
+    /// Asks that tr(PQ) of a body is positive; a start for which it is not becomes `within`, filled evenly.
+    fn ask_of_moments(&mut self, body: usize, q: &Square, within: &Ellipsoid) {
         let one = |value| Square { size: 1, entries: vec![value] };
-        let terms: Vec<(usize, Square)> = gradient_of(&q)
-            .into_iter()
-            .enumerate()
-            .map(|(index, value)| (unknown + index, one(value)))
-            .collect();
-        if self.body_starts[body].0.dot(&q) <= 0.0 {
-            let mass = self.priors[body].entry(3, 3);
-            // The ellipsoid itself, filled evenly.
+        let own = gradient_of(q).into_iter().enumerate();
+        let terms = own.map(|(index, value)| (PARAMETERS_PER_BODY * body + index, one(value))).collect();
+        if self.body_starts[body].0.dot(q) <= 0.0 {
+            let (mass, Ellipsoid { center, half_axes }) = (self.priors[body].entry(3, 3), *within);
             let moment = |row: usize, column: usize| {
                 let own = if row == column { 0.2 * half_axes[row] * half_axes[row] } else { 0.0 };
                 own + center[row] * center[column]
@@ -199,7 +233,6 @@ impl Problem {
             }));
         }
         self.constraints.push(MatrixConstraint { offset: one(0.0), terms, is_bound: false });
-        Ok(self)
     }
 
     /// The same with Σ coefficient·unknown = `value`: a known mass is one coefficient, a known total mass one

@@ -120,6 +120,34 @@ fn all_mass_stays_inside_the_ellipsoid() {
     assert!(inside(&unbounded.standard) > 1.0 && unbounded.objective < solution.objective);
 }
 
+/// Along each axis the mean square distance from the middle is at most that of the box's half edge.
+#[test]
+fn all_mass_stays_inside_the_box() {
+    let mut random = Random::new(9);
+    let (priors, truth) = robot(&mut random, 2, 0);
+    let data = data(&mut random, &truth, 60, 10.0);
+    let (lower, upper) = ([-0.03, -0.03, -0.05], [0.07, 0.03, 0.03]);
+    let free = problem(&priors, 0, &data);
+    let solved = free.clone().with_box(1, lower, upper).unwrap().solve(1.0, &Settings::default()).unwrap();
+    assert!(solved.certified, "{solved:?}");
+    let outside = |standard: &[f64]| -> Vec<f64> {
+        let body: [f64; 10] = standard[10..20].try_into().unwrap();
+        let moments = PseudoInertia::of_parameters(&body);
+        let axis = |axis: usize| {
+            let (center, half) = (0.5 * (lower[axis] + upper[axis]), 0.5 * (upper[axis] - lower[axis]));
+            let about = moments.entry(axis, axis) - 2.0 * center * moments.entry(axis, 3)
+                + center * center * moments.entry(3, 3);
+            about / (half * half * moments.entry(3, 3))
+        };
+        (0..3).map(axis).collect()
+    };
+    assert!(outside(&solved.standard).iter().all(|share| *share <= 1.0), "{:?}", outside(&solved.standard));
+    let unbounded = free.solve(1.0, &Settings::default()).unwrap();
+    assert!(outside(&unbounded.standard).iter().any(|share| *share > 1.0));
+    assert!(unbounded.objective < solved.objective);
+    assert!(free.clone().with_box(1, upper, lower).is_err() && free.with_box(7, lower, upper).is_err());
+}
+
 #[test]
 fn coupled_friction_takes_energy_in_every_motion() {
     let mut random = Random::new(10);

@@ -8,6 +8,7 @@ use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Tree, Workspace};
 use phiw_effects::Catalogue;
 use phiw_identification::Model;
+use phiw_mjcf::read_mjcf_with;
 use phiw_telemetry::{Conditioning, ConditioningOptions, TorqueColumns, stream, survey};
 use phiw_zmp::feet_from_toml;
 use std::io::Write;
@@ -46,6 +47,20 @@ pub fn urdf(bytes: &[u8]) {
         assert!(outcome.is_ok(), "{outcome:?}");
         // A joint that follows one that follows another may be as fast as the file likes.
         assert!(tree.has_mimic() || torque.iter().all(|torque| torque.is_finite()), "{torque:?}");
+    }
+}
+
+/// An MJCF file that includes others, all of these bytes: refused, or a URDF, as [`urdf`].
+pub fn mjcf(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    // After the first file whatever is included is a small one.
+    let mut load = |name: &str| match name.len() % 3 {
+        0 => Err("it is not there".to_owned()),
+        1 => Ok(text.to_owned()),
+        _ => Ok("<mujocoinclude><option timestep=\"0.01\"/></mujocoinclude>".to_owned()),
+    };
+    if let Ok(reading) = read_mjcf_with(text, &mut load) {
+        urdf(reading.urdf.as_bytes());
     }
 }
 

@@ -67,6 +67,9 @@ pub enum Known {
     /// Of a body, by its index in the tree: all of its mass lies within an ellipsoid in its link's frame, as
     /// far as its second moments tell (Wensing, Kim & Slotine 2018, equation 21).
     Inside(usize, Ellipsoid),
+    /// Of a body, by its index in the tree: all of its mass lies within a box along the axes of its link's
+    /// frame, from the lowest corner to the highest \[m\], as far as its second moments tell.
+    InsideBox(usize, [f64; 3], [f64; 3]),
     /// Two bodies, by their indices in the tree, that are mirror images of each other by the plane y = 0 of
     /// the world, with the robot in its configuration of zeros, wherever along y the plane is.
     Mirrored(usize, usize),
@@ -135,7 +138,7 @@ pub fn consistent(
 }
 
 /// One over each torque's residual.
-fn row_weights(
+pub(crate) fn row_weights(
     fit: &Fit,
     folds: &[GroupedFactor],
     settings: &ConsistentSettings,
@@ -218,9 +221,7 @@ impl<'a> Columns<'a> {
         settings: &ConsistentSettings,
     ) -> Result<Problem, IdentificationError> {
         let tree = design.tree();
-        let standard = tree.inertial_parameters();
-        let described = standard.as_chunks::<PARAMETERS_PER_BODY>().0;
-        let priors = possible_priors(described, length(tree), &settings.prior);
+        let priors = prior_bodies(tree, &settings.prior);
         let info = design.effect_parameter_info();
         let mut problem = Problem::new(&priors, self.extras.len())?;
         for (extra, parameter) in self.extras.iter().enumerate() {
@@ -237,6 +238,7 @@ impl<'a> Columns<'a> {
         for known in &settings.known {
             problem = match *known {
                 Known::Inside(body, ellipsoid) => problem.with_ellipsoid(body, &ellipsoid)?,
+                Known::InsideBox(body, lower, upper) => problem.with_box(body, lower, upper)?,
                 Known::Mirrored(body, image) => {
                     let mut mirrored = problem;
                     for (place, row) in mirror_map(tree, body, image).iter().enumerate() {
@@ -321,6 +323,12 @@ impl<'a> Columns<'a> {
             .for_each(|(&parameter, value)| parameters[parameter] = *value);
         parameters
     }
+}
+
+/// The bodies that a robot is taken to have before anything is measured: its description's, made possible.
+pub(crate) fn prior_bodies(tree: &Tree, settings: &PriorSettings) -> Vec<[f64; PARAMETERS_PER_BODY]> {
+    let standard = tree.inertial_parameters();
+    possible_priors(standard.as_chunks::<PARAMETERS_PER_BODY>().0, length(tree), settings)
 }
 
 /// The robot's length \[m\]: the mean distance from a joint to the one before it, of those that are apart;

@@ -15,6 +15,7 @@ mod effect_selector;
 mod error;
 mod factor_rows;
 mod fit;
+mod free_constants;
 pub mod held_joints;
 mod identify;
 mod jackknife;
@@ -34,6 +35,7 @@ mod rivals;
 mod robot_findings;
 mod sample;
 pub mod shard;
+pub mod told;
 mod variants;
 
 pub use accumulate::Fold;
@@ -54,6 +56,7 @@ pub mod fitting {
     pub use crate::accumulate::{FoldFactors, Rests, accumulate, accumulate_folds};
     pub use crate::factor_rows::FactorRows;
     pub use crate::fit::{Fit, TorqueError, fit, merge, torque_error, torques_with_enough_rows};
+    pub use crate::free_constants::{ByConstant, FreeConstant, free_constants};
     pub use crate::identify::Declared;
 }
 

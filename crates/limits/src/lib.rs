@@ -34,6 +34,8 @@ pub struct Limits {
     pub control_points: usize,
     /// Bytes of a TOML file: marker map, support.
     pub toml_bytes: u64,
+    /// Bytes of a mesh, of which only the extent is read.
+    pub mesh_bytes: u64,
     /// Bytes of a `model.json`.
     pub model_bytes: u64,
     /// Bytes of a plan of `phiw plan`. A log takes some 10 kB, the first one some 100 kB for its spectra.
@@ -60,6 +62,7 @@ impl Default for Limits {
             recording_bytes: 256 << 20,
             control_points: 6_000,
             toml_bytes: 1 << 20,
+            mesh_bytes: 256 << 20,
             model_bytes: 64 << 20,
             plan_bytes: 256 << 20,
             factor_file_bytes: 8 << 30,

@@ -1,9 +1,9 @@
 //! Robots read from MJCF: what MuJoCo makes of the same file, and what is refused.
 
 use phiw_dynamics::random_tree::{RandomNumbers, RandomTreeOptions, random_state, random_tree};
-use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+use phiw_dynamics::urdf::{Extent, UrdfOptions, link_shapes, read_urdf};
 use phiw_dynamics::{JointType, Tree, Workspace};
-use phiw_mjcf::{JointModel, MjcfReading, RobotModel, is_mjcf, read_mjcf, write_mjcf};
+use phiw_mjcf::{JointModel, MjcfReading, RobotModel, is_mjcf, read_mjcf, read_mjcf_with, write_mjcf};
 use phiw_sim_mujoco::{MjcfFile, MujocoError};
 
 fn tree_of(reading: &MjcfReading) -> Tree {
@@ -271,4 +271,83 @@ fn a_damaged_file_is_read_or_refused() {
             let _ = read_urdf(&reading.urdf, &UrdfOptions::default());
         }
     }
+}
+
+/// Files by name, as a folder would have them.
+fn from_files<'a>(files: &'a [(&'a str, &'a str)]) -> impl FnMut(&str) -> Result<String, String> + 'a {
+    |name| {
+        let file = files.iter().find(|(known, _)| *known == name);
+        file.map(|(_, text)| (*text).to_owned()).ok_or_else(|| "it is not there".to_owned())
+    }
+}
+
+#[test]
+fn included_files_are_as_if_they_stood_there() {
+    let whole = one_joint(
+        "<body name=\"c\"><joint name=\"k\" axis=\"1 0 0\"/><inertial pos=\"0 0 1\" mass=\"2\" diaginertia=\"1 1 1\"/></body>",
+        "<option gravity=\"0 0 -9.81\"/>",
+    );
+    let files = [
+        (
+            "parts/c.xml",
+            "<mujoco><!-- c --><include file=\"rest.xml\"/>\n<body name=\"c\"><joint name=\"k\" axis=\"1 0 0\"/><include file=\"i.xml\"/></body></mujoco>",
+        ),
+        ("rest.xml", "<mujocoinclude/>"),
+        (
+            "i.xml",
+            "<?xml version=\"1.0\"?><mujocoinclude><inertial pos=\"0 0 1\" mass=\"2\" diaginertia=\"1 1 1\"/></mujocoinclude>",
+        ),
+        ("o.xml", "<mujocoinclude><option gravity=\"0 0 -9.81\"/></mujocoinclude>"),
+    ];
+    let parts = one_joint("<include file=\"parts/c.xml\"/>", "<include file=\"o.xml\"><!-- --></include>");
+    let found = read_mjcf_with(&parts, &mut from_files(&files)).unwrap();
+    assert_eq!(found, read_mjcf(&whole).unwrap());
+    assert_eq!(read_mjcf_with(&whole, &mut from_files(&[])).unwrap(), found, "nothing is asked for");
+}
+
+#[test]
+fn what_cannot_be_included_is_refused_in_words() {
+    let refuses = |include: &str, files: &[(&str, &str)], expected: &str| {
+        let text = one_joint("", &format!("\n<include{include}/>"));
+        let error = read_mjcf_with(&text, &mut from_files(files)).unwrap_err().to_string();
+        assert!(error.contains(expected) && error.lines().count() == 1, "{error}");
+    };
+    let a = " file=\"a.xml\"";
+    let again = "<mujoco><include file=\"a.xml\"/></mujoco>";
+    refuses("", &[], "line 2: <include> has no file");
+    refuses(a, &[], "line 2: it includes `a.xml`, which cannot be read: it is not there");
+    refuses(a, &[("a.xml", again)], "included `a.xml`: line 1: it includes `a.xml` twice");
+    refuses(a, &[("a.xml", "<robot/>")], "included `a.xml`: the root element is <robot>");
+    refuses(a, &[("a.xml", "<mujoco>")], "included `a.xml`: line 1");
+    refuses(
+        a,
+        &[("a.xml", "<mujoco><default class=\"x\"><default/></default></mujoco>")],
+        "with its included files written in, line 2",
+    );
+    let large = format!("<mujoco><!--{}--></mujoco>", "x".repeat(9 << 20));
+    let twice = "<mujoco><include file=\"b.xml\"/><include file=\"c.xml\"/></mujoco>";
+    refuses(a, &[("a.xml", twice), ("b.xml", &large), ("c.xml", &large)], "bytes");
+}
+
+/// Of the same geometry in MuJoCo's words and a URDF's the extents agree.
+#[test]
+fn geometry_is_carried_over() {
+    let geoms = r#"<geom type="capsule" size="0.1" fromto="0 0 0 1 0 0"/><frame pos="0 1 0"><geom type="box" size="0.1 0.2 0.3" pos="0 0 1"/></frame>
+      <geom size="0.05" pos="0 0 -2"/><geom type="ellipsoid" size="0.1 0.1 0.4"/><geom type="mesh" mesh="hull" pos="0 0 5"/><geom type="mesh" mesh="nobody"/><geom type="box" size="no"/>"#;
+    let asset =
+        r#"<compiler meshdir="meshes/"/><asset><mesh name="hull" file="hull.stl" scale="2 2 2"/></asset>"#;
+    let reading = read_mjcf(&one_joint(geoms, asset)).unwrap();
+    let shapes = link_shapes(&reading.urdf).unwrap();
+    let mut extent = Extent::EMPTY;
+    for shape in &shapes {
+        assert_eq!((shape.link.as_str(), shape.visual), ("b", true));
+        extent = shape.shape.extent(shape.placement).map_or(extent, |own| extent.with(own));
+    }
+    for (found, expected) in
+        extent.lower.into_iter().chain(extent.upper).zip([-0.1, -0.1, -2.05, 1.1, 1.2, 1.3])
+    {
+        assert!((found - expected).abs() < 1e-12, "{extent:?}");
+    }
+    assert!(reading.urdf.contains(r#"<mesh filename="meshes/hull.stl" scale="2 2 2"/>"#), "{}", reading.urdf);
+    assert_eq!(shapes.len(), 7, "a capsule is three");
 }

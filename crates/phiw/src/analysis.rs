@@ -2,7 +2,7 @@
 
 use crate::session::Session;
 use crate::traces::Traces;
-use crate::{Error, fingerprint, possible_bodies, warnings};
+use crate::{Error, extents, fingerprint, possible_bodies, told, warnings};
 use phiw_identification::bandwidth::Bandwidth;
 use phiw_identification::consistent::{Consistent, ConsistentSettings, Ellipsoid, Known, consistent};
 use phiw_identification::effect::JointProperty;
@@ -10,6 +10,7 @@ use phiw_identification::fitting::merge;
 use phiw_identification::model::DataFingerprint;
 use phiw_identification::{Data, EffectCatalogue, EffectSpec, Identified, Model, WithRests};
 use phiw_regressor::RegressorError;
+use phiw_report::json::InformationJson;
 use phiw_residual::trace;
 
 /// A residual up to this many times the noise floor is noise.
@@ -25,6 +26,8 @@ pub struct Analysis<'a> {
     pub model: Model,
     /// The same fit over bodies that can exist.
     pub consistent: Consistent,
+    /// What the logs tell of each parameter.
+    pub information: InformationJson,
     /// Torques over time; none where the rows were not at hand.
     pub traces: Option<Traces>,
     /// What the rows at which joints rest add.
@@ -59,10 +62,12 @@ impl<'a> Analysis<'a> {
         };
         let model = Model::of_fit(design, fit, &session.declared, &session.held, cutoffs)?
             .with_sources(&session.xml, fingerprints);
-        let settings = ConsistentSettings { known: known(session)?, ..ConsistentSettings::default() };
+        let (known, unknown_extents) = known(session)?;
+        let settings = ConsistentSettings { known, ..ConsistentSettings::default() };
         let consistent =
             consistent(design, fit, &identified.train_folds, &identified.held_out_folds, &settings)?;
         let model = model.with_consistent(design, &consistent)?;
+        let information = told::information(session, identified, &consistent)?;
         let traces = match rows {
             Rows::Logs(data) => {
                 let folds = [data.train.as_slice(), data.held_out.as_slice()];
@@ -74,6 +79,7 @@ impl<'a> Analysis<'a> {
         let of_traces = || traces.as_ref().map(|traces| traces.with_rests(session.tree.joint_count()));
         let with_rests = with_rests.or_else(of_traces).unwrap_or_default();
         let mut warnings = warnings::all(session, identified);
+        warnings.extend(unknown_extents);
         warnings.extend(possible_bodies::warning(&model, &consistent, fit));
         warnings.extend(warnings::at_rest_where_held_out(session, &at_rest));
         Ok(Analysis {
@@ -81,6 +87,7 @@ impl<'a> Analysis<'a> {
             identified,
             model,
             consistent,
+            information,
             traces,
             with_rests,
             noise_floor,
@@ -137,8 +144,8 @@ impl<'a> Analysis<'a> {
     }
 }
 
-/// What the user knows of the bodies.
-fn known(session: &Session) -> Result<Vec<Known>, Error> {
+/// What the user knows of the bodies, and a warning where geometry that was asked for is not known.
+fn known(session: &Session) -> Result<(Vec<Known>, Option<String>), Error> {
     let bodies = session.tree.bodies();
     let body_of = |link: &String| {
         let links = || bodies.iter().map(|body| body.link.as_str()).collect::<Vec<_>>().join(", ");
@@ -153,6 +160,15 @@ fn known(session: &Session) -> Result<Vec<Known>, Error> {
         let ellipsoid = Ellipsoid { center: [*x, *y, *z], half_axes: [*a, *b, *c] };
         known.push(Known::Inside(body_of(link)?, ellipsoid));
     }
+    let mut warning = None;
+    if session.arguments.inside_geometry {
+        let (extents, unknown) = extents::of_bodies(session);
+        let given: Vec<usize> =
+            session.arguments.inside.iter().map(|(link, _)| body_of(link)).collect::<Result<_, _>>()?;
+        let others = extents.into_iter().filter(|(body, _)| !given.contains(body));
+        known.extend(others.map(|(body, extent)| Known::InsideBox(body, extent.lower, extent.upper)));
+        warning = unknown;
+    }
     for (link, image) in &session.arguments.mirrored {
         known.push(Known::Mirrored(body_of(link)?, body_of(image)?));
     }
@@ -163,7 +179,7 @@ fn known(session: &Session) -> Result<Vec<Known>, Error> {
         }
         known.push(Known::TotalMass(total));
     }
-    Ok(known)
+    Ok((known, warning))
 }
 
 /// Where the rows of the logs are.

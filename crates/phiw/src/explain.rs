@@ -13,15 +13,18 @@ use crate::output::take_folder;
 use crate::report_json::{by_joint, report_json};
 use crate::session::{Session, read_robot};
 use crate::{Error, bandwidth, summary};
+use indexmap::IndexMap;
 use phiw_effects::{Catalogue, SignalRanges};
 use phiw_identification::fitting::TorqueError;
 use phiw_identification::{Data, EffectSpec, Identified, Model, identify};
 use phiw_report::ReportJson;
 use phiw_report::json::{
-    DrawsJson, EffectJson, EvidenceJson, JointMap, NamedInDrawsJson, ParameterJson, ProgramJson,
-    RemainingJson, RivalJson, TorqueErrors, Verdict,
+    ConstantJson, DrawsJson, EffectJson, EvidenceJson, JointMap, NamedInDrawsJson, ParameterJson,
+    ProgramJson, RemainingJson, RivalJson, TorqueErrors, Verdict,
 };
-use phiw_residual::trace::{self, HeldModel, TraceInput, TraceOptions, Tracing, trace};
+use phiw_residual::trace::{
+    self, HeldModel, ScannedConstant, TraceInput, TraceOptions, Tracing, scanned_constants, trace,
+};
 use std::fmt::Write;
 
 /// A model to start from: its effects' specs, its parameters, and what was known if it is held.
@@ -64,6 +67,11 @@ pub fn results(arguments: &ExplainArguments, console: &Console) -> Result<Result
     };
     let draws = Draws::take(arguments.draws, &data, names)?;
     draws.weigh(&mut tracing);
+    // Against a held model its parameters stay as they are.
+    let constants = match arguments.model {
+        Some(_) => Vec::new(),
+        None => scanned_constants(&session.catalogue, &mut tracing.model, &data)?,
+    };
     drop(data);
     drop(sources);
     if arguments.model.is_some() {
@@ -89,7 +97,7 @@ pub fn results(arguments: &ExplainArguments, console: &Console) -> Result<Result
     page.headline.extend(in_draws.clone());
     console.finish();
 
-    let mut report = report(&analysis, &tracing);
+    let mut report = report(&analysis, &tracing, &constants);
     report.phiw.iter_mut().for_each(|program| {
         program.draws = draws.json();
         program.reproduction = reproduction.json();
@@ -218,7 +226,12 @@ fn verdict(verdict: trace::Verdict) -> Verdict {
     }
 }
 
-fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
+fn constant(found: &ScannedConstant) -> (String, ConstantJson) {
+    let (std, interval_95) = (found.free.map(|free| free.std), found.free.map(|free| free.interval_95));
+    (found.name.clone(), ConstantJson { value: found.value, std, interval_95 })
+}
+
+fn report(analysis: &Analysis<'_>, tracing: &Tracing, constants: &[ScannedConstant]) -> ReportJson {
     let joints = analysis.joints();
     let error = |error: &TorqueError| phiw_report::json::TorqueErrorJson {
         rmse: by_joint(&joints, &error.rmse),
@@ -241,7 +254,11 @@ fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
                 parameters.entry(info.joint).or_default();
             of_joint.insert(named.name.clone(), value);
         }
+        let own = constants.iter().filter(|constant| constant.effect == first + index);
+        let own: IndexMap<String, ConstantJson> = own.map(constant).collect();
+        let joints = found.spec.joints.join("+");
         EffectJson {
+            constants: (!own.is_empty()).then_some((joints, own)).into_iter().collect(),
             kind: found.spec.kind.clone(),
             joints: found.spec.joints.clone(),
             parameters,
@@ -304,6 +321,7 @@ fn families(effects: impl Iterator<Item = EffectJson>) -> Vec<EffectJson> {
             {
                 family.joints.extend(effect.joints);
                 family.parameters.extend(effect.parameters);
+                family.constants.extend(effect.constants);
                 family.validate_relative = effect.validate_relative;
                 family.explains = 1.0 - (1.0 - family.explains) * (1.0 - effect.explains);
                 family.confidence = family.confidence.min(effect.confidence);

@@ -2,7 +2,7 @@
 
 mod controlled;
 mod estimate;
-mod motions;
+pub(crate) mod motions;
 mod plan_file;
 mod standing;
 mod telling;
@@ -10,7 +10,7 @@ mod telling;
 use crate::arguments::NextArguments;
 use crate::console::Console;
 use crate::output::check_file;
-use crate::{Error, session};
+use crate::{Error, robot_file, session};
 use estimate::Present;
 use phiw_curriculum::constraint::{Constraint, MotionMargin, Unconstrained, ZmpConstraint};
 use phiw_curriculum::planner::{Belief, MeasuredSoFar, Plan, Policy, plan};
@@ -74,7 +74,8 @@ pub struct Chosen {
 pub fn chosen(arguments: &NextArguments, console: &Console) -> Result<Chosen, Error> {
     let report_json = arguments.out.with_extension("json");
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
-    let session::RobotOfUrdf { tree, xml, findings, held, .. } = session::read_robot(&arguments.session())?;
+    let session::RobotOfUrdf { tree, xml, findings, held, left_out, .. } =
+        session::read_robot(&arguments.session())?;
     let standing = Standing::read(arguments, &xml, &held)?;
     let motions = motions::read(&arguments.motions, &tree, &progress)?;
     let named = [Some(&arguments.urdf), arguments.support.as_ref(), arguments.model.as_ref()];
@@ -106,7 +107,8 @@ pub fn chosen(arguments: &NextArguments, console: &Console) -> Result<Chosen, Er
         ResultFile::new(file_name(&report_json), text),
         ResultFile::new(file_name(&arguments.out), plan_file::csv(motion, &torque, robot.tree())),
     ];
-    Ok(Chosen { files, summary: story.text(&report_json), warnings: story.warnings(), report })
+    let warnings = robot_file::warning(&left_out).into_iter().chain(story.warnings()).collect();
+    Ok(Chosen { files, summary: story.text(&report_json), warnings, report })
 }
 
 fn file_name(path: &Path) -> String {

@@ -1,15 +1,14 @@
-//! What the logs cannot tell, in words.
+//! Parameters of the fit that it leaves out or that are poor, in words.
 
 use crate::analysis::Analysis;
 use crate::parameters;
-use phiw_dynamics::inertia::{PARAMETER_NAMES, PARAMETERS_PER_BODY};
 
 /// A parameter that takes this share of another's effect is named with it.
 const ACTS_LIKE: f64 = 0.05;
 /// More are only counted.
 const NAMED: usize = 3;
 
-/// A line for each thing that the logs cannot tell.
+/// A line for each parameter that could not be separated from others, and one for those that are poor.
 pub fn lines(analysis: &Analysis<'_>) -> Vec<String> {
     let mut lines: Vec<String> = analysis
         .identified
@@ -19,7 +18,6 @@ pub fn lines(analysis: &Analysis<'_>) -> Vec<String> {
         .map(|&parameter| undetermined(analysis, parameter))
         .collect();
     lines.extend(poor(analysis));
-    lines.extend(unfelt(analysis));
     lines
 }
 
@@ -63,17 +61,4 @@ fn poor(analysis: &Analysis<'_>) -> Option<String> {
             poor.join(", ")
         )
     })
-}
-
-/// Standard parameters that no torque feels, body by body.
-fn unfelt(analysis: &Analysis<'_>) -> Vec<String> {
-    let design = &analysis.identified.design;
-    let unfelt = design.base().unidentifiable();
-    let of_body = |(body, joint): (usize, &phiw_dynamics::Body)| {
-        let own = unfelt.iter().filter(|&&parameter| parameter / PARAMETERS_PER_BODY == body);
-        let names: Vec<&str> =
-            own.map(|parameter| PARAMETER_NAMES[parameter % PARAMETERS_PER_BODY]).collect();
-        (!names.is_empty()).then(|| format!("{}: no torque feels {}", joint.joint, names.join(", ")))
-    };
-    design.tree().bodies().iter().enumerate().filter_map(of_body).collect()
 }

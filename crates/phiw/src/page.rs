@@ -3,7 +3,7 @@
 use crate::analysis::Analysis;
 use crate::traces::Role;
 use crate::warnings::file_name;
-use crate::{bandwidth, date, not_identified, parameters, possible_bodies};
+use crate::{bandwidth, date, not_identified, parameters, possible_bodies, told};
 use phiw_identification::LogSet;
 use phiw_identification::effect::EffectSelector;
 use phiw_report::IdentificationPage;
@@ -39,6 +39,7 @@ pub fn page(analysis: &Analysis<'_>, command_line: String) -> IdentificationPage
         },
         parameters: parameters::parameters(analysis),
         base_parameters: parameters::base_parameters(analysis),
+        told: told::section(&analysis.information),
         not_identified: not_identified::lines(analysis),
         urdf_findings: analysis.session.findings.iter().map(ToString::to_string).collect(),
         version: format!("phiw {}", env!("CARGO_PKG_VERSION")),

@@ -60,6 +60,7 @@ pub fn program(analysis: &Analysis<'_>) -> ProgramJson {
         draws: None,
         reproduction: None,
         consistency: Some(possible_bodies::json(analysis)),
+        information: Some(analysis.information.clone()),
     }
 }
 

@@ -11,7 +11,7 @@ use crate::arguments::RetargetArguments;
 use crate::console::Console;
 use crate::input::read_text;
 use crate::output::check_folder;
-use crate::robot_file::as_urdf;
+use crate::robot_file::{RobotText, as_urdf, warning};
 use batch::stem;
 use phiw_bspline_retarget::human::{MapError, MarkerMap};
 use phiw_bspline_retarget::markers::{MarkerRecording, read_recording};
@@ -44,7 +44,8 @@ pub fn retarget(arguments: &RetargetArguments, console: &Console) -> Result<Reta
     let _place = Lock::acquire(&arguments.out, "phiw retarget")?;
     remove_partial_files(&Disk, &arguments.out);
     let limits = Limits::default();
-    let urdf = as_urdf(read_text(&arguments.urdf, limits.urdf_bytes)?, &arguments.urdf)?.urdf;
+    let RobotText { urdf, left_out } =
+        as_urdf(read_text(&arguments.urdf, limits.urdf_bytes)?, &arguments.urdf)?;
     let options = UrdfOptions { held: arguments.hold.clone(), ..UrdfOptions::default() };
     let reading = read_urdf(&urdf, &options)
         .map_err(|source| Error::Urdf { path: arguments.urdf.clone(), source: Box::new(source) })?;
@@ -64,7 +65,9 @@ pub fn retarget(arguments: &RetargetArguments, console: &Console) -> Result<Reta
     }
     let retargeter = Retargeter::new(reading.tree, map, options)
         .map_err(|source| Error::Robot { path: arguments.urdf.clone(), source })?;
-    batch::run(arguments, &urdf, &retargeter, console)
+    let mut outcome = batch::run(arguments, &urdf, &retargeter, console)?;
+    outcome.warnings.splice(0..0, warning(&left_out));
+    Ok(outcome)
 }
 
 /// No two recordings may have the same name: their motions would.

@@ -1,7 +1,9 @@
 //! Robots as files: URDF as it is, MJCF as the URDF of the same robot.
 
 use crate::Error;
-use phiw_mjcf::{is_mjcf, read_mjcf};
+use crate::input::read_text;
+use phiw_limits::Limits;
+use phiw_mjcf::{is_mjcf, read_mjcf_with};
 use std::path::Path;
 
 /// The text of a robot.
@@ -14,7 +16,7 @@ pub struct RobotText {
 }
 
 /// The URDF of a robot whose file has this text: the text itself, or what an MJCF file says as a URDF, with
-/// what it lacks in the comment at its head.
+/// what it lacks in the comment at its head. Files that it includes are read from the folder of `path`.
 ///
 /// # Errors
 /// It is MJCF that is not read.
@@ -22,8 +24,12 @@ pub fn as_urdf(text: String, path: &Path) -> Result<RobotText, Error> {
     if !is_mjcf(&text) {
         return Ok(RobotText { urdf: text, left_out: Vec::new() });
     }
-    let reading =
-        read_mjcf(&text).map_err(|source| Error::Mjcf { path: path.to_owned(), source: Box::new(source) })?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut load = |name: &str| {
+        read_text(&folder.join(name), Limits::default().urdf_bytes).map_err(|error| error.to_string())
+    };
+    let reading = read_mjcf_with(&text, &mut load)
+        .map_err(|source| Error::Mjcf { path: path.to_owned(), source: Box::new(source) })?;
     let mut head = vec!["The robot of an MJCF file.".to_owned()];
     head.extend(reading.left_out.iter().map(|line| format!("- left out: {line}")));
     Ok(RobotText { urdf: phiw_mjcf::comment(&head) + &reading.urdf, left_out: reading.left_out })

@@ -5,7 +5,7 @@ use crate::arguments::SessionArguments;
 use crate::in_memory::text_of;
 use crate::log_inputs::{read_map, train_and_validate};
 use crate::robot_file::{RobotText, as_urdf};
-use phiw_dynamics::urdf::{Finding, UrdfOptions, UrdfReading, read_urdf};
+use phiw_dynamics::urdf::{Finding, LinkInBody, UrdfOptions, UrdfReading, read_urdf};
 use phiw_dynamics::{DimensionError, JointType, Tree};
 use phiw_effects::{Catalogue, SignalRanges};
 use phiw_identification::checks::{InputError, check_excitation};
@@ -32,6 +32,8 @@ pub struct Session {
     pub snapped: usize,
     /// What of an MJCF file a URDF cannot express, in words.
     pub left_out: Vec<String>,
+    /// The links that the robot's bodies are made of.
+    pub links: Vec<LinkInBody>,
     /// Declared effects in the syntax of `--declare`, each kind united, `rigid_body` left out.
     pub declared: Vec<String>,
     /// The kinds that there are.
@@ -84,9 +86,9 @@ impl Session {
         logs: LogSet,
         arguments: SessionArguments,
     ) -> Self {
-        let RobotOfUrdf { tree, xml, findings, held, snapped, left_out } = robot;
+        let RobotOfUrdf { tree, xml, findings, held, snapped, left_out, links } = robot;
         let catalogue = Catalogue::default();
-        Session { tree, xml, findings, held, snapped, left_out, declared, catalogue, logs, arguments }
+        Session { tree, xml, findings, held, snapped, left_out, links, declared, catalogue, logs, arguments }
     }
 
     /// The same error, with the training logs' names if it is about all of them.
@@ -201,6 +203,8 @@ pub(crate) struct RobotOfUrdf {
     pub snapped: usize,
     /// What of an MJCF file a URDF cannot express, in words.
     pub left_out: Vec<String>,
+    /// The links that bodies are made of.
+    pub links: Vec<LinkInBody>,
 }
 
 impl RobotOfUrdf {
@@ -228,6 +232,6 @@ pub(crate) fn robot_of(xml: String, arguments: &SessionArguments) -> Result<Robo
     if reading.tree.is_floating() {
         return Err(Error::FloatingBase { path: path() });
     }
-    let UrdfReading { tree, findings, held, snapped } = reading;
-    Ok(RobotOfUrdf { tree, xml, findings, held, snapped, left_out: Vec::new() })
+    let UrdfReading { tree, findings, held, snapped, links } = reading;
+    Ok(RobotOfUrdf { tree, xml, findings, held, snapped, left_out: Vec::new(), links })
 }

@@ -42,11 +42,21 @@ pub struct SessionArguments {
     #[arg(long, value_name = "LINK=X Y Z A B C,…", value_delimiter = ',', value_parser = inside)]
     #[serde(default)]
     pub inside: Vec<(String, [f64; 6])>,
+    /// The same of all other links that have geometry in the URDF: the box around their boxes, cylinders,
+    /// spheres and meshes (STL, OBJ), what is fixed to a link included. Meshes that are absent are said.
+    #[arg(long)]
+    #[serde(default)]
+    pub inside_geometry: bool,
     /// Links that are mirror images of each other, left and right, with the robot at zero:
     /// --mirrored left_thigh=right_thigh.
     #[arg(long, value_name = "LINK=LINK,…", value_delimiter = ',', value_parser = two_names)]
     #[serde(default)]
     pub mirrored: Vec<(String, String)>,
+    /// Folder of motions, as `phiw retarget` writes them: which of them would tell most of what the logs do
+    /// not tell.
+    #[arg(long, value_name = "DIR")]
+    #[serde(default)]
+    pub motions: Option<PathBuf>,
     /// Cut-off of the low-pass over positions (Hz); by default chosen from the logs' spectra.
     #[arg(long, value_name = "HZ")]
     pub cutoff_hz: Option<f64>,
@@ -103,6 +113,16 @@ impl SessionArguments {
             "--mirrored",
             list(self.mirrored.iter().map(|(link, image)| format!("{link}={image}")).collect()),
         );
+        if self.inside_geometry {
+            words.push("--inside-geometry".to_owned());
+        }
+        let mut option = |name: &str, values: Vec<String>| {
+            if !values.is_empty() {
+                words.push(name.to_owned());
+                words.extend(values.iter().map(|value| quoted(value)));
+            }
+        };
+        option("--motions", paths(self.motions.as_slice()));
         option("--cutoff-hz", number(self.cutoff_hz));
         option("--parallel-cutoff-hz", number(self.parallel_cutoff_hz));
         option("--out", paths(std::slice::from_ref(&self.out)));

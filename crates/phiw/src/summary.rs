@@ -4,8 +4,7 @@ use crate::analysis::Analysis;
 use crate::exported::Carried;
 use crate::generated_code;
 use crate::page::{counted, declared_in_words};
-use crate::possible_bodies;
-use crate::{identified_mjcf, identified_urdf};
+use crate::{identified_mjcf, identified_urdf, possible_bodies, told};
 use phiw_identification::LogSet;
 use phiw_report::number::{percent, significant};
 use phiw_result_folder::ResultFile;
@@ -100,7 +99,7 @@ fn closing(
         counted(base, "base parameter"),
         significant(analysis.condition_number(), 3)
     )?;
-    for line in file_notes(analysis) {
+    for line in told::summary(&analysis.information).into_iter().chain(file_notes(analysis)) {
         writeln!(text, "{line}")?;
     }
     let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();

@@ -5,6 +5,7 @@ mod synthetic;
 
 use next_scene::{JOINTS, Scene, motion, tree, urdf};
 use phiw_dynamics::random_tree::RandomNumbers;
+use phiw_mjcf::{JointModel, RobotModel, write_mjcf};
 use phiw_telemetry::{Recording, TorqueColumns};
 use phiw_zmp::{MotionBalance, Stance, SupportPolygon, ZmpWorkspace, standing_parameters};
 use serde_json::Value;
@@ -269,4 +270,16 @@ fn a_foot_may_be_behind_joints_that_are_held() {
     let margin = |report: &Value| report["next"]["balance"]["margin_m"].as_f64().unwrap();
     assert!((margin(&on_base) - margin(&on_link)).abs() < 1e-12);
     assert_eq!(on_base["next"]["motion"], on_link["next"]["motion"]);
+}
+
+/// The warning of what the reader of MJCF leaves out was `identify`'s alone.
+#[test]
+fn an_mjcf_file_is_read_with_a_warning_of_what_is_left_out() {
+    let scene = Scene::new(&urdf());
+    let tree = tree(&urdf(), false);
+    let mut robot = RobotModel::new(&tree);
+    robot.joints[1] = JointModel { armature: 0.3, ..JointModel::default() };
+    std::fs::write(scene.path("robot.urdf"), write_mjcf(&robot).unwrap()).unwrap();
+    let (_, warnings, _) = scene.next("");
+    assert!(warnings.contains("without what a URDF cannot express: armature of joint_2"), "{warnings}");
 }

@@ -168,3 +168,71 @@ fn bodies_lie_inside_their_ellipsoids_and_mirror_each_other() {
     let refused = identify(&arguments("tool", &[]), &Console::silent()).err().unwrap();
     assert!(refused.to_string().contains("those are link_1, link_2, link_3"));
 }
+
+/// The boxes around what a URDF shows of its links hold their masses; a mesh that is not there stops nothing
+/// and is said.
+#[test]
+fn bodies_lie_inside_the_geometry_of_their_links() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    std::fs::create_dir(path("meshes")).unwrap();
+    std::fs::write(path("meshes/link_2.obj"), "v -50 -60 -60\nv 400 60 60\n").unwrap();
+    synthetic::recording(1, 20.0).write_csv(&path("train.csv")).unwrap();
+    let geometry = |link_2: &str| {
+        let shapes = [
+            (
+                "link_1",
+                "<collision><geometry><mesh filename=\"package://gone/link_1.stl\"/></geometry></collision>",
+            ),
+            ("link_2", link_2),
+            // Off by where the mass is not: 0.15 m along x, and at y = −0.02.
+            (
+                "link_3",
+                "<visual><origin xyz=\"0.15 0 0\" rpy=\"0 1.5707963267948966 0\"/><geometry><cylinder radius=\"0.03\" length=\"0.2\"/></geometry></visual>",
+            ),
+            ("tool", "<visual><geometry><sphere radius=\"0.01\"/></geometry></visual>"),
+        ];
+        shapes.into_iter().fold(
+            synthetic::URDF.replace("<link name=\"tool\"/>", "<link name=\"tool\"></link>"),
+            |urdf, (link, shape)| {
+                let at = urdf.find(&format!("<link name=\"{link}\">")).unwrap();
+                let end = at + urdf[at..].find("</link>").unwrap();
+                format!("{}{shape}{}", &urdf[..end], &urdf[end..])
+            },
+        )
+    };
+    let mesh = "<visual><geometry><mesh filename=\"meshes/link_2.obj\" scale=\"0.001 0.001 0.001\"/></geometry></visual>";
+    std::fs::write(path("robot.urdf"), geometry(mesh)).unwrap();
+    let arguments = SessionArguments {
+        urdf: path("robot.urdf"),
+        train: vec![path("train.csv")],
+        declare: vec!["viscous_friction".to_owned()],
+        inside_geometry: true,
+        out: path("out"),
+        ..SessionArguments::default()
+    };
+    let outcome = identify(&arguments, &Console::silent()).unwrap();
+    assert!(outcome.report.phiw.unwrap().consistency.unwrap().certified);
+    let said = outcome.warnings.iter().find(|warning| warning.contains("--inside-geometry")).unwrap();
+    assert!(
+        said.contains("link_1 (package://gone/link_1.stl is not at hand)") && !said.contains("link_2"),
+        "{said}"
+    );
+    let tree = read_urdf_file(path("out/identified.urdf"), &UrdfOptions::default()).unwrap().tree;
+    assert_eq!(impossible_bodies(&tree.inertial_parameters()), [0; 0]);
+    // The tool's ball reaches from x = 0.29 to 0.31.
+    for (body, lower, upper) in
+        [(1, [-0.05, -0.06, -0.06], [0.4, 0.06, 0.06]), (2, [0.05, -0.03, -0.03], [0.31, 0.03, 0.03])]
+    {
+        let [m, hx, hy, hz, xx, _, yy, _, _, zz] = tree.bodies()[body].inertial;
+        let half = 0.5 * (xx + yy + zz);
+        for (axis, (first, second)) in
+            [(hx, half - xx), (hy, half - yy), (hz, half - zz)].into_iter().enumerate()
+        {
+            let (low, high): (f64, f64) = (lower[axis], upper[axis]);
+            let inside = (low + high) * first - second - low * high * m;
+            assert!(inside > -1e-9 * m, "body {body}, axis {axis}: {inside}");
+        }
+    }
+    assert!(arguments.command_line("identify").contains(" --inside-geometry "));
+}

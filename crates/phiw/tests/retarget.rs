@@ -3,6 +3,8 @@
 use assert_cmd::Command;
 use phiw_bspline_retarget::embedded::embedded_motions;
 use phiw_bspline_retarget::npz::{Array, Npz, NpzWriter};
+use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
+use phiw_mjcf::{JointModel, RobotModel, write_mjcf};
 use phiw_telemetry::{Recording, TorqueColumns};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -311,4 +313,18 @@ fn motions_that_are_cut_short_are_refused_in_one_line() {
         assert!(errors.contains(name) && errors.trim_end().lines().count() == 1, "{errors}");
         assert!(names(&folder.path().join("out")).is_empty());
     }
+}
+
+/// The warning of what the reader of MJCF leaves out was `identify`'s alone.
+#[test]
+fn an_mjcf_file_is_read_with_a_warning_of_what_is_left_out() {
+    let folder = scene();
+    let path = folder.path().join("robot.urdf");
+    let tree = read_urdf_file(&path, &UrdfOptions::default()).unwrap().tree;
+    let mut robot = RobotModel::new(&tree);
+    robot.joints[1] = JointModel { armature: 0.3, ..JointModel::default() };
+    std::fs::write(&path, write_mjcf(&robot).unwrap()).unwrap();
+    let (status, _, errors) = run(&folder, &motions(&folder)[..1], &[]);
+    assert_eq!(status, 0, "{errors}");
+    assert!(errors.contains("without what a URDF cannot express: armature of "), "{errors}");
 }

@@ -36,6 +36,10 @@ pub struct SessionOptions<'py> {
     declare: Vec<String>,
     mass: Vec<(String, f64)>,
     total_mass: Option<f64>,
+    inside: Vec<(String, [f64; 6])>,
+    inside_geometry: bool,
+    mirrored: Vec<(String, String)>,
+    motions: Option<PathBuf>,
     cutoff_hz: Option<f64>,
     parallel_cutoff_hz: Option<f64>,
 }
@@ -155,6 +159,8 @@ pub struct NextOptions<'py> {
     model: Option<String>,
     declare: Vec<String>,
     urdf_error: f64,
+    estimator: String,
+    command_hz: Option<f64>,
     alpha: Option<f64>,
     cutoff_hz: Option<f64>,
     parallel_cutoff_hz: Option<f64>,
@@ -168,6 +174,15 @@ pub fn next_motion<'py>(
     options: NextOptions<'py>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Told<'py>> {
+    let estimator = match options.estimator.as_str() {
+        "unknown-noise" => NextEstimator::UnknownNoise,
+        "least-squares" => NextEstimator::LeastSquares,
+        other => {
+            let what =
+                format!("estimator=\"{other}\" is not known; write \"unknown-noise\" or \"least-squares\"");
+            return Err(InputError::new_err(what));
+        }
+    };
     let (urdf, mut in_memory) = of_robot(robot.get())?;
     let measured = taken(options.measured, &mut in_memory)?;
     in_memory.model = options.model;
@@ -181,8 +196,8 @@ pub fn next_motion<'py>(
         declare: options.declare,
         hold: robot.get().hold.clone(),
         urdf_error: options.urdf_error,
-        estimator: NextEstimator::default(),
-        command_hz: None,
+        estimator,
+        command_hz: options.command_hz,
         alpha: options.alpha,
         cutoff_hz: options.cutoff_hz,
         parallel_cutoff_hz: options.parallel_cutoff_hz,
@@ -289,6 +304,10 @@ fn session(robot: &Robot, options: SessionOptions<'_>) -> PyResult<SessionArgume
         hold: robot.hold.clone(),
         mass: options.mass,
         total_mass: options.total_mass,
+        inside: options.inside,
+        inside_geometry: options.inside_geometry,
+        mirrored: options.mirrored,
+        motions: options.motions,
         cutoff_hz: options.cutoff_hz,
         parallel_cutoff_hz: options.parallel_cutoff_hz,
         quiet: true,

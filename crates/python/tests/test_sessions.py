@@ -290,8 +290,28 @@ def test_the_next_motion_is_chosen(robot, logs, tmp_path):
     assert first.motion["q"].shape == first.motion["tau"].shape == (len(first.motion["t"]), 2)
     then = phiw.next_motion(robot, motions, logs[0], declare="viscous_friction")
     assert str(then) and then.numbers
+    with pytest.raises(phiw.InputError, match='estimator="guess" is not known'):
+        phiw.next_motion(robot, motions, logs[0], estimator="guess")
+    simple = phiw.next_motion(
+        robot, motions, logs[0], declare="viscous_friction", estimator="least-squares", command_hz=100.0
+    )
+    assert simple.numbers
     path = then.write(tmp_path / "next.csv")
     assert path.exists() and json.loads(path.with_suffix(".json").read_text()) == then.numbers
+
+
+def test_what_is_known_of_bodies_holds_in_python_too(robot, logs):
+    """`inside`, `mirrored` and the options of `next` that came last were the command's alone."""
+    links = robot.links if hasattr(robot, "links") else ["link_1", "link_2"]
+    result = phiw.identify(
+        robot, logs[0], declare="viscous_friction", inside={links[1]: [0.2, 0, 0, 0.3, 0.2, 0.2]}
+    )
+    assert result.numbers["phiw"]["consistency"]["certified"]
+    with pytest.raises(phiw.InputError, match="six numbers"):
+        phiw.identify(robot, logs[0], inside={links[1]: [0.2, 0, 0, 0.3, 0.2]})
+    with pytest.raises(phiw.InputError, match="nowhere"):
+        phiw.identify(robot, logs[0], mirrored={links[0]: "nowhere"})
+    assert result.numbers["phiw"]["information"]["narrower_by"] == 10.0
 
 
 def test_markers_become_motions(tmp_path):

@@ -4,6 +4,7 @@ mod base_parameters;
 mod error;
 pub mod factor;
 mod fewest_parameters;
+pub mod information;
 mod joint_torque;
 pub mod least_squares;
 

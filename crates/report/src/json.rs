@@ -96,6 +96,10 @@ pub struct EffectJson {
     /// Probability of this effect against its rivals, 0 to 1.
     #[serde(deserialize_with = "number_or_nan")]
     pub confidence: f64,
+    /// Constants in which it is not linear and that were found by scanning, by joint (several joined by `+`)
+    /// and name.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub constants: JointMap<IndexMap<String, ConstantJson>>,
     /// The effects that the data could not tell from it.
     pub rivals: Vec<RivalJson>,
 }
@@ -111,6 +115,19 @@ pub struct ParameterJson {
     pub std: f64,
     /// The unit of both.
     pub unit: String,
+}
+
+/// A constant that was found by scanning.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ConstantJson {
+    /// Its value (SI units).
+    pub value: f64,
+    /// Its standard deviation; none where the logs tell it too poorly.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub std: Option<f64>,
+    /// Its 95 % interval.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval_95: Option<[f64; 2]>,
 }
 
 /// An effect that the data could not tell from the chosen one.
@@ -169,6 +186,59 @@ pub struct ProgramJson {
     /// What it costs that the bodies can exist.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub consistency: Option<ConsistencyJson>,
+    /// What the logs tell of each parameter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub information: Option<InformationJson>,
+}
+
+/// What the logs tell: what their posterior makes narrower than the prior by a stated factor.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct InformationJson {
+    /// That factor.
+    pub narrower_by: f64,
+    /// Parameters in all: ten of each body, and those of the effects.
+    pub parameters: usize,
+    /// Directions among them that are told.
+    pub directions: usize,
+    /// Parameters that are told by themselves.
+    pub told: Vec<ToldJson>,
+    /// Sums that are told of parameters that are not told by themselves.
+    pub sums: Vec<ToldJson>,
+    /// Parameters that are in neither.
+    pub not_told: Vec<String>,
+    /// Of the motions of a folder, if one was given, those that would tell most of what is not told, best
+    /// first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub motions: Vec<TellingMotionJson>,
+}
+
+/// A parameter, or a sum of several, that the logs tell.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ToldJson {
+    /// In words: `mass of forearm`, `Izz of upper_arm + 0.250 · mass of forearm`.
+    pub name: String,
+    /// Its value, of bodies that can exist.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub value: f64,
+    /// Its posterior standard deviation.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub std: f64,
+    /// The unit of both.
+    pub unit: String,
+}
+
+/// A motion that would tell more.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct TellingMotionJson {
+    /// Its file.
+    pub file: String,
+    /// What it would tell of what is not told (nats).
+    #[serde(deserialize_with = "number_or_nan")]
+    pub nats: f64,
+    /// Directions that would be told beside those that are.
+    pub directions: usize,
+    /// Parameters that would then be told by themselves.
+    pub tells: Vec<String>,
 }
 
 /// Motion held out, reproduced in open loop by the model and by the URDF.

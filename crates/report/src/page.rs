@@ -54,6 +54,8 @@ pub struct IdentificationPage {
     pub parameters: ParametersSection,
     /// Which standard parameters each base parameter regroups.
     pub base_parameters: Vec<BaseParameter>,
+    /// What the logs tell.
+    pub told: ToldSection,
     /// What these logs cannot tell, a line each.
     pub not_identified: Vec<String>,
     /// What was wrong or remarkable in the URDF, a line each.
@@ -63,6 +65,47 @@ pub struct IdentificationPage {
     /// The command line that made the report.
     pub command_line: String,
 }
+
+/// What the logs tell, in words.
+#[derive(Debug, Clone, Default)]
+pub struct ToldSection {
+    /// What told means here.
+    pub note: String,
+    /// Parameters with their values.
+    pub told: Vec<String>,
+    /// Sums with their values.
+    pub sums: Vec<String>,
+    /// What is in neither, a line for each link or joint.
+    pub not_told: Vec<String>,
+    /// Motions that would tell more, best first.
+    pub motions: Vec<String>,
+}
+
+impl ToldSection {
+    fn markup(&self) -> Markup {
+        let parts = [
+            ("By themselves", &self.told),
+            ("In sums only", &self.sums),
+            ("Not at all", &self.not_told),
+            ("Motions that would tell more", &self.motions),
+        ];
+        html! {
+            @if parts.iter().any(|(_, lines)| !lines.is_empty()) {
+                p.note { (self.note) }
+                @for (title, lines) in parts.into_iter().filter(|(_, lines)| !lines.is_empty()) {
+                    @if lines.len() > LINES_UNFOLDED {
+                        details { summary { (title) " (" (lines.len()) ")" } (list(lines)) }
+                    } @else {
+                        p { (title) ":" } (list(lines))
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Longer lists are folded.
+const LINES_UNFOLDED: usize = 12;
 
 /// A file that went in.
 #[derive(Debug, Clone, Default)]
@@ -87,6 +130,7 @@ impl IdentificationPage {
             ("conditioning", "Conditioning of the logs", self.conditioning.markup()),
             ("parameters", "Parameters", self.parameters.markup()),
             ("base-parameters", "Base parameters", parameters::base_markup(&self.base_parameters)),
+            ("told", "What the logs tell", self.told.markup()),
             ("not-identified", "What could not be identified", list(&self.not_identified)),
             ("urdf", "Findings about the URDF", list(&self.urdf_findings)),
         ]

@@ -112,6 +112,13 @@ fn page(number: f64, joints: usize, samples: usize) -> IdentificationPage {
             note: word(),
         },
         base_parameters: vec![BaseParameter { name: word(), regroups: HOSTILE.repeat(5) }; 3],
+        told: ToldSection {
+            note: word(),
+            told: words(),
+            sums: vec![word(); 20],
+            not_told: words(),
+            motions: words(),
+        },
         not_identified: words(),
         urdf_findings: words(),
         version: word(),

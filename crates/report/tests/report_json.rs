@@ -122,6 +122,20 @@ fn additions_of_the_program_come_last() {
                 draws: 9,
             }],
         }),
+        information: Some(InformationJson {
+            narrower_by: 10.0,
+            parameters: 20,
+            directions: 6,
+            told: vec![ToldJson { name: "mass of arm".into(), value: 2.3, std: 0.04, unit: "kg".into() }],
+            sums: Vec::new(),
+            not_told: vec!["Ixx of arm".into()],
+            motions: vec![TellingMotionJson {
+                file: "reach.csv".into(),
+                nats: 3.2,
+                directions: 1,
+                tells: vec!["Izz of arm".into()],
+            }],
+        }),
         consistency: Some(ConsistencyJson {
             prior_weight: 10.0,
             gap: 1e-9,

@@ -3,7 +3,7 @@
 use super::movement::Movement;
 use super::robot::{Inertial, Joint, JointKind, Link, Robot};
 use super::topology::Topology;
-use super::{Finding, UrdfError};
+use super::{Finding, LinkInBody, UrdfError};
 use super::{inertial, joint};
 use crate::inertia::{Inertia, PARAMETERS_PER_BODY};
 use crate::{Body, JointLimits, JointType, Placement, Tree, Vec3};
@@ -45,6 +45,7 @@ struct Assembly<'a> {
     followers: Vec<Follower>,
     pending: Vec<Pending>,
     findings: Vec<Finding>,
+    links: Vec<LinkInBody>,
 }
 
 pub(super) fn assemble(
@@ -52,7 +53,7 @@ pub(super) fn assemble(
     topology: &Topology,
     movements: &[Movement],
     floating_base: bool,
-) -> Result<(Tree, Vec<Finding>), UrdfError> {
+) -> Result<(Tree, Vec<Finding>, Vec<LinkInBody>), UrdfError> {
     robot.links.iter().try_for_each(inertial::check_finite)?;
     robot.joints.iter().try_for_each(joint::check_finite)?;
     let mut assembly = Assembly {
@@ -66,6 +67,7 @@ pub(super) fn assemble(
         velocity_index_of: vec![0; robot.joints.len()],
         followers: Vec::new(),
         pending: Vec::new(),
+        links: Vec::new(),
     };
     match floating_joint(robot, topology, movements)? {
         Some(joint) => assembly.float(topology.child_of[joint]),
@@ -107,6 +109,13 @@ fn floating_joint(
 }
 
 impl Assembly<'_> {
+    /// Notes that a link is a part of a body.
+    fn join(&mut self, link: usize, body: usize, placement: Placement<f64>) {
+        let Link { name, inertial, .. } = &self.robot.links[link];
+        let (link, has_inertia) = (name.clone(), inertial.is_some());
+        self.links.push(LinkInBody { link, has_inertia, body, placement });
+    }
+
     fn inertia(&mut self, link: usize) -> Inertia<f64> {
         let link = &self.robot.links[link];
         match &link.inertial {
@@ -138,6 +147,7 @@ impl Assembly<'_> {
             )
         });
         self.velocity_size = 6;
+        self.join(link, 0, Placement::identity());
         self.push_children(link, Some(0), Placement::identity());
     }
 
@@ -161,6 +171,7 @@ impl Assembly<'_> {
                 let placement = body.map_or(origin, |body| body.placement(position));
                 if let Some(body) = next.body {
                     self.inertias[body] = self.inertias[body] + self.inertia(child).moved(placement);
+                    self.join(child, body, placement);
                 }
                 self.push_children(child, next.body, placement);
             }
@@ -196,10 +207,11 @@ impl Assembly<'_> {
         let inertia = self.inertia(child);
         self.inertias.push(inertia);
         self.bodies.push(body);
+        self.join(child, index, Placement::identity());
         self.push_children(child, Some(index), Placement::identity());
     }
 
-    fn finish(mut self) -> Result<(Tree, Vec<Finding>), UrdfError> {
+    fn finish(mut self) -> Result<(Tree, Vec<Finding>, Vec<LinkInBody>), UrdfError> {
         if self.bodies.is_empty() {
             return Err(UrdfError::NoMovingJoints);
         }
@@ -218,7 +230,7 @@ impl Assembly<'_> {
             joint_bodies: self.joint_bodies,
             gravity: GRAVITY,
         };
-        Ok((tree, self.findings))
+        Ok((tree, self.findings, self.links))
     }
 
     fn report_masses(&mut self) {

@@ -8,6 +8,7 @@ mod assemble;
 mod bodies_only;
 mod error;
 mod finding;
+mod geometry;
 mod guard;
 mod held;
 mod inertial;
@@ -26,6 +27,7 @@ mod write;
 pub use bodies_only::without_geometry;
 pub use error::UrdfError;
 pub use finding::Finding;
+pub use geometry::{Extent, LinkInBody, LinkShape, Shape, link_shapes};
 pub use guard::check as check_xml;
 pub use write::{JointFriction, write_identified_urdf};
 
@@ -59,6 +61,8 @@ pub struct UrdfReading {
     pub held: Vec<(String, f64)>,
     /// Number of angles and axes that were off a right angle by rounding, and have been made exact.
     pub snapped: usize,
+    /// The links that bodies are made of; those that are fixed to the world are in none.
+    pub links: Vec<LinkInBody>,
 }
 
 /// Reads a robot from the text of a URDF.
@@ -82,9 +86,9 @@ pub fn read_urdf(xml: &str, options: &UrdfOptions) -> Result<UrdfReading, UrdfEr
     if joints > limits.moving_joints {
         return Err(UrdfError::TooManyJoints { joints, most: limits.moving_joints });
     }
-    let (tree, findings) = assemble::assemble(&robot, &topology, &movements, options.floating_base)?;
+    let (tree, findings, links) = assemble::assemble(&robot, &topology, &movements, options.floating_base)?;
     let named = |(joint, position): (usize, f64)| (robot.joints[joint].name.clone(), position);
-    Ok(UrdfReading { tree, findings, held: held.into_iter().map(named).collect(), snapped })
+    Ok(UrdfReading { tree, findings, held: held.into_iter().map(named).collect(), snapped, links })
 }
 
 /// The joints of a URDF that are held, by name, patterns resolved as in [`UrdfOptions::held`].

@@ -3,8 +3,9 @@
 use super::MjcfReadError;
 use super::defaults::Defaults;
 use super::element::{Element, line};
-use super::geometry::{Added, added};
+use super::geometry::{Added, added, shapes};
 use super::inertial::{BodyInertia, InertiaRules};
+use super::meshes::Meshes;
 use super::orientation::{Angles, about, direction};
 use super::relations;
 use super::robot::{Joint, Link, Motion, Robot};
@@ -20,6 +21,7 @@ pub(super) struct Reader<'a, 'input> {
     root: Node<'a, 'input>,
     angles: Angles,
     rules: InertiaRules,
+    meshes: Meshes,
     auto_limits: bool,
     defaults: Defaults<'a>,
     robot: Robot,
@@ -50,12 +52,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         }
         if let Some(include) = root.descendants().find(|node| node.has_tag_name("include")) {
             let file = include.attribute("file").unwrap_or_default();
-            return Err(not_read(
-                include,
-                format!(
-                    "it includes `{file}`: write the whole robot into one file (MuJoCo's mj_saveLastXML does)"
-                ),
-            ));
+            return Err(not_read(include, format!("it includes `{file}`, which is not at hand")));
         }
         // The last of several sections decides, as attributes of one.
         let compiler = root.children().rfind(|node| node.has_tag_name("compiler"));
@@ -65,6 +62,7 @@ impl<'a, 'input> Reader<'a, 'input> {
             root,
             angles: Angles::read(compiler.as_ref())?,
             rules: InertiaRules::read(compiler.as_ref())?,
+            meshes: Meshes::read(root, compiler.as_ref())?,
             auto_limits,
             defaults: Defaults::read(root)?,
             robot: Robot {
@@ -77,7 +75,7 @@ impl<'a, 'input> Reader<'a, 'input> {
 
     pub fn read(mut self) -> Result<Robot, MjcfReadError> {
         let world = self.name(Named::Link, None, "world");
-        self.robot.links.push(Link { name: world, inertia: BodyInertia::NONE });
+        self.robot.links.push(Link { name: world, inertia: BodyInertia::NONE, shapes: Vec::new() });
         for world in self.root.children().filter(|node| node.has_tag_name("worldbody")) {
             let class = world.attribute("childclass");
             self.children(world, Place { link: 0, frame: Placement::identity(), class })?;
@@ -158,7 +156,7 @@ impl<'a, 'input> Reader<'a, 'input> {
             } else {
                 self.name(Named::Link, None, &format!("{link}_{}", joint.name))
             };
-            self.robot.links.push(Link { name: own, inertia: BodyInertia::NONE });
+            self.robot.links.push(Link { name: own, inertia: BodyInertia::NONE, shapes: Vec::new() });
             joint.links = [parent, self.robot.links.len() - 1];
             joint.origin = of_parent.inverse().compose(anchor);
             joint.origin = joint.origin.compose(back(&joint));
@@ -168,7 +166,11 @@ impl<'a, 'input> Reader<'a, 'input> {
         }
         if joints.is_empty() {
             let name = self.name(Named::Joint, None, &format!("{link}_fixed"));
-            self.robot.links.push(Link { name: link.clone(), inertia: BodyInertia::NONE });
+            self.robot.links.push(Link {
+                name: link.clone(),
+                inertia: BodyInertia::NONE,
+                shapes: Vec::new(),
+            });
             parent = self.robot.links.len() - 1;
             self.robot.joints.push(Joint {
                 name,
@@ -194,7 +196,35 @@ impl<'a, 'input> Reader<'a, 'input> {
             center: to_link.point(inertia.center),
             tensor: to_link.rotation * inertia.tensor * to_link.rotation.transpose(),
         };
+        let shapes = self.geoms(node, place.class)?.into_iter().flat_map(|(geom, frame)| {
+            let frame = to_link.compose(frame);
+            let own = shapes(&geom, &self.angles, &self.meshes).into_iter();
+            own.map(move |(placement, shape)| (frame.compose(placement), shape))
+        });
+        self.robot.links[parent].shapes = shapes.collect();
         self.children(node, Place { link: parent, frame: to_link, class: place.class })
+    }
+
+    /// The geoms of a body, those in frames included, each with the frame that it stands in.
+    fn geoms(
+        &self,
+        body: Node<'a, 'input>,
+        class: Option<&'a str>,
+    ) -> Result<Vec<(Element<'_, 'input>, Placement<f64>)>, MjcfReadError> {
+        let mut geoms = Vec::new();
+        let mut within = vec![(body, Placement::identity(), class)];
+        while let Some((node, frame, class)) = within.pop() {
+            for child in node.children() {
+                if child.has_tag_name("frame") {
+                    let own = self.angles.placement(&Element::new(child, None))?;
+                    within.push((child, frame.compose(own), child.attribute("childclass").or(class)));
+                }
+                if child.has_tag_name("geom") {
+                    geoms.push((Element::new(child, self.defaults.of(child, class)?), frame));
+                }
+            }
+        }
+        Ok(geoms)
     }
 
     /// A joint with its anchor in the body's frame as its origin.
@@ -261,7 +291,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         &mut self,
         node: Node<'a, 'input>,
         link: &str,
-        class: Option<&str>,
+        class: Option<&'a str>,
     ) -> Result<BodyInertia, MjcfReadError> {
         let inertial = node.children().find(|node| node.has_tag_name("inertial"));
         let from_geometry = self.rules.from_geometry.unwrap_or(inertial.is_none());
@@ -282,33 +312,22 @@ impl<'a, 'input> Reader<'a, 'input> {
         &mut self,
         node: Node<'a, 'input>,
         link: &str,
-        class: Option<&str>,
+        class: Option<&'a str>,
     ) -> Result<BodyInertia, MjcfReadError> {
         let (mut parts, mut unknown) = (Vec::new(), false);
-        let mut within = vec![(node, Placement::identity(), class)];
-        while let Some((node, frame, class)) = within.pop() {
-            for child in node.children() {
-                if child.has_tag_name("frame") {
-                    let own = self.angles.placement(&Element::new(child, None))?;
-                    within.push((child, frame.compose(own), child.attribute("childclass").or(class)));
-                }
-                if !child.has_tag_name("geom") {
-                    continue;
-                }
-                let geom = Element::new(child, self.defaults.of(child, class)?);
-                let group = geom.number("group")?.unwrap_or_default() as i64;
-                if self.rules.groups.is_some_and(|[first, last]| !(first..=last).contains(&group)) {
-                    continue;
-                }
-                match added(&geom, &self.angles)? {
-                    Added::Inertia(part) => parts.push(BodyInertia {
-                        mass: part.mass,
-                        center: frame.point(part.center),
-                        tensor: frame.rotation * part.tensor * frame.rotation.transpose(),
-                    }),
-                    Added::Unknown => unknown = true,
-                    Added::Nothing => {}
-                }
+        for (geom, frame) in self.geoms(node, class)? {
+            let group = geom.number("group")?.unwrap_or_default() as i64;
+            if self.rules.groups.is_some_and(|[first, last]| !(first..=last).contains(&group)) {
+                continue;
+            }
+            match added(&geom, &self.angles)? {
+                Added::Inertia(part) => parts.push(BodyInertia {
+                    mass: part.mass,
+                    center: frame.point(part.center),
+                    tensor: frame.rotation * part.tensor * frame.rotation.transpose(),
+                }),
+                Added::Unknown => unknown = true,
+                Added::Nothing => {}
             }
         }
         if unknown {

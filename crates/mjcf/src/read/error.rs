@@ -62,6 +62,20 @@ pub enum MjcfReadError {
         /// Which, and what is wrong.
         what: String,
     },
+    /// What is wrong in a file that is included.
+    #[error("included `{file}`: {source}")]
+    Included {
+        /// The file, as it is named.
+        file: String,
+        /// What is wrong.
+        source: Box<MjcfReadError>,
+    },
+    /// What is wrong once all included files are written in.
+    #[error("with its included files written in, {source}")]
+    WithIncludes {
+        /// What is wrong.
+        source: Box<MjcfReadError>,
+    },
     /// No body has a joint.
     #[error("no body has a joint: nothing moves that could be identified")]
     NothingMoves,

@@ -9,17 +9,18 @@ mod defaults;
 mod element;
 mod error;
 mod geometry;
+mod include;
 mod inertial;
+mod meshes;
 mod orientation;
 mod relations;
 mod robot;
 mod urdf;
 
 pub use error::MjcfReadError;
+pub use include::Loader;
 
 use bodies::Reader;
-use phiw_dynamics::urdf::check_xml;
-use phiw_limits::Limits;
 
 /// A robot of an MJCF file.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,15 +56,27 @@ pub fn is_mjcf(text: &str) -> bool {
 ///
 /// Hinges, slides and one free joint are read. Bodies without a joint are fixed, several joints of one body
 /// become several, with massless links between them. Joints that follow another by an equality of first order
-/// do so in the URDF. Assets are never looked for.
+/// do so in the URDF. Geometry becomes `<visual>`; assets are never looked for.
 ///
 /// # Errors
 /// The text is no MJCF or asks for too much ([`Limits`]); it includes other files, has ball joints, or makes
 /// bodies by rules (`replicate`, `attach`, `composite`, `flexcomp`); a number is none.
 pub fn read_mjcf(text: &str) -> Result<MjcfReading, MjcfReadError> {
-    check_xml(text, &Limits::default())?;
-    let document = roxmltree::Document::parse(text)
-        .map_err(|error| MjcfReadError::Malformed { line: error.pos().row, why: error.to_string() })?;
+    let document = include::parse(text)?;
     let robot = Reader::new(document.root_element())?.read()?;
     Ok(urdf::reading(robot))
+}
+
+/// The same of a file that may include others, which `load` gives by the names that the file has for them
+/// (paths from the folder of the first file, as MuJoCo takes them).
+///
+/// # Errors
+/// As [`read_mjcf`]; and an included file cannot be had, is no MJCF, or is included twice.
+pub fn read_mjcf_with(text: &str, load: &mut Loader<'_>) -> Result<MjcfReading, MjcfReadError> {
+    match include::with_includes(text, load)? {
+        None => read_mjcf(text),
+        Some(whole) => {
+            read_mjcf(&whole).map_err(|source| MjcfReadError::WithIncludes { source: Box::new(source) })
+        }
+    }
 }

@@ -40,6 +40,8 @@ pub(super) struct Joint {
 pub(super) struct Link {
     pub name: String,
     pub inertia: BodyInertia,
+    /// Its geometry, as a URDF has it, in the link's frame.
+    pub shapes: Vec<(Placement<f64>, String)>,
 }
 
 /// What a file says of a robot.

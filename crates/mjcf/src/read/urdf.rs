@@ -29,6 +29,15 @@ pub(super) fn reading(robot: Robot) -> MjcfReading {
                 i[2][2]
             );
         }
+        for (placement, shape) in &link.shapes {
+            let Placement { rotation, translation } = *placement;
+            let _ = write!(
+                text,
+                "<visual><origin xyz=\"{}\" rpy=\"{}\"/><geometry>{shape}</geometry></visual>",
+                Numbers(&translation.0),
+                Numbers(&roll_pitch_yaw(rotation))
+            );
+        }
         text.push_str("</link>\n");
     }
     for joint in &robot.joints {

@@ -3,83 +3,55 @@
 use super::FleetOutcome;
 use super::plan_file::PlanFile;
 use crate::Error;
-use crate::argument_values::{held_joint, known_mass, positive};
 use crate::arguments::SessionArguments;
 use crate::console::Console;
 use crate::output::check_file;
 use crate::page::counted;
 use crate::session::Session;
 use crate::warnings::of_log;
-use clap::Args;
+use clap::error::Error as ClapError;
+use clap::{ArgMatches, Args, FromArgMatches};
 use phiw_report::number::significant;
 use phiw_result_folder::{Disk, Lock, StreamedFile, check_inputs};
 use phiw_telemetry::Survey;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `phiw plan`.
-#[derive(Clone, Debug, Default, Args)]
+/// Arguments of `phiw plan`: those of a session, with the training logs without an option's name.
+#[derive(Clone, Debug, Default)]
 pub struct PlanArguments {
-    /// The robot's URDF, or MuJoCo's MJCF.
-    #[arg(long, value_name = "ROBOT.urdf")]
-    pub urdf: PathBuf,
-    /// Logs that the model is fitted to: CSV, MCAP, ROS bags, LeRobot folders, npz.
-    #[arg(value_name = "LOG", required = true)]
-    pub train: Vec<PathBuf>,
-    /// Logs that its error is measured on; without any, the last 30 % of each training log are held out.
-    #[arg(long, value_name = "LOG", num_args = 1..)]
-    pub validate: Vec<PathBuf>,
-    /// What the columns of the logs mean: topics, units, gears, currents (docs/log-maps.md). Without it they
-    /// are named as in a log of phiw.
-    #[arg(long, value_name = "MAP.toml")]
-    pub map: Option<PathBuf>,
-    /// Effects beside the rigid body, wherever they can act or on the joints named: viscous_friction,
-    /// coulomb_friction:j1+j2, transmission_coupling:j5+j6, …
-    #[arg(long, value_name = "KIND[:JOINT[+JOINT…]],…", value_delimiter = ',')]
-    pub declare: Vec<String>,
-    /// Joints of the URDF that do not move, at 0 or at a value (rad, m); they need no column in the log. In a
-    /// name, * stands for any letters and ? for one: --hold 'left_*'.
-    #[arg(long, value_name = "JOINT[=VALUE],…", value_delimiter = ',', value_parser = held_joint)]
-    pub hold: Vec<(String, f64)>,
-    /// Masses that are known, as weighed (kg), of the links that joints carry.
-    #[arg(long, value_name = "LINK=KG,…", value_delimiter = ',', value_parser = known_mass)]
-    pub mass: Vec<(String, f64)>,
-    /// Mass of all links that move, as weighed (kg).
-    #[arg(long, value_name = "KG", value_parser = positive)]
-    pub total_mass: Option<f64>,
-    /// Cut-off of the low-pass over positions (Hz); by default chosen from the logs' spectra.
-    #[arg(long, value_name = "HZ")]
-    pub cutoff_hz: Option<f64>,
-    /// Cut-off of the low-pass over the model's columns and the torque alike (Hz); by default the motion's
-    /// bandwidth.
-    #[arg(long, value_name = "HZ")]
-    pub parallel_cutoff_hz: Option<f64>,
+    /// Robot, logs and declared model.
+    pub session: SessionArguments,
     /// The plan.
-    #[arg(long, value_name = "PLAN.json")]
     pub out: PathBuf,
     /// Print nothing but errors.
-    #[arg(long)]
     pub quiet: bool,
 }
 
-impl PlanArguments {
-    /// The same as a session on the logs.
-    fn session(&self) -> SessionArguments {
-        let PlanArguments { urdf, train, validate, map, declare, hold, mass, total_mass, .. } = self.clone();
-        let PlanArguments { cutoff_hz, parallel_cutoff_hz, .. } = *self;
-        SessionArguments {
-            urdf,
-            train,
-            validate,
-            map,
-            declare,
-            hold,
-            mass,
-            total_mass,
-            cutoff_hz,
-            parallel_cutoff_hz,
-            ..SessionArguments::default()
-        }
+impl Args for PlanArguments {
+    fn augment_args(command: clap::Command) -> clap::Command {
+        SessionArguments::augment_args(command)
+            .mut_arg("train", |train| train.long(None).index(1))
+            .mut_arg("out", |out| out.value_name("PLAN.json").help("The plan"))
+    }
+
+    fn augment_args_for_update(command: clap::Command) -> clap::Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for PlanArguments {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, ClapError> {
+        let read = SessionArguments::from_arg_matches(matches)?;
+        let (out, quiet) = (read.out.clone(), read.quiet);
+        // Where results go is told when they are made.
+        let session = SessionArguments { out: PathBuf::new(), quiet: false, ..read };
+        Ok(PlanArguments { session, out, quiet })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), ClapError> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
     }
 }
 
@@ -90,11 +62,10 @@ impl PlanArguments {
 /// An input is wrong, or the plan cannot be written.
 pub fn plan(arguments: &PlanArguments, console: &Console) -> Result<FleetOutcome, Error> {
     check_file(&arguments.out)?;
-    let of_session = arguments.session();
-    check_inputs(&of_session.inputs(), std::slice::from_ref(&arguments.out))?;
+    check_inputs(&arguments.session.inputs(), std::slice::from_ref(&arguments.out))?;
     let _place = Lock::acquire(&arguments.out, "phiw plan")?;
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
-    let session = Session::open(&of_session, &progress)?;
+    let session = Session::open(&arguments.session, &progress)?;
     let file = PlanFile::of_session(&session, &progress)?;
     console.finish();
     write(&arguments.out, file.to_json()?.as_bytes())?;
@@ -120,4 +91,45 @@ pub(super) fn write(path: &Path, content: &[u8]) -> Result<(), Error> {
     let mut file = StreamedFile::create(&Disk, path)?;
     file.write_all(content).map_err(|source| file.unwritable(source))?;
     Ok(file.commit()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::arguments::{Arguments, Command};
+    use clap::Parser;
+
+    /// It had a list of its own, which lacked what was added to the others'.
+    #[test]
+    fn a_plan_takes_every_option_of_a_session() {
+        let options = [
+            "--declare viscous_friction",
+            "--hold j",
+            "--mass a=1",
+            "--total-mass 3",
+            "--mirrored a=b",
+            "--motions m",
+            "--map m.toml",
+            "--cutoff-hz 3",
+            "--parallel-cutoff-hz 2",
+        ];
+        let options = options.iter().flat_map(|option| option.split(' '));
+        let words: Vec<&str> = ["--urdf", "r.urdf"].into_iter().chain(options).collect();
+        let inside = ["--inside-geometry", "--inside", "a=0 0 0 1 1 1"];
+        let plan =
+            ["phiw", "plan", "a.csv", "b.csv"].iter().chain(&words).chain(&inside).chain(&["--out", "p"]);
+        let Command::Plan(plan) = Arguments::try_parse_from(plan).unwrap().command else {
+            panic!("`plan` is read as another command");
+        };
+        let identify = ["phiw", "identify", "--train", "a.csv", "b.csv"];
+        let identify = identify.iter().chain(&words).chain(&inside).chain(&["--out", "o"]);
+        let Command::Identify(identify) = Arguments::try_parse_from(identify).unwrap().command else {
+            panic!("`identify` is read as another command");
+        };
+        assert_eq!(plan.out, std::path::Path::new("p"));
+        let json = |session| serde_json::to_value(session).unwrap();
+        let mut expected = json(&identify.session);
+        expected["out"] = "".into();
+        assert_eq!(json(&plan.session), expected);
+        assert!(Arguments::try_parse_from(["phiw", "plan", "--urdf", "r", "--out", "p"]).is_err(), "no log");
+    }
 }

@@ -25,7 +25,28 @@ pub struct Motions {
 }
 
 /// Reads every CSV file of the folder, in the order of their names.
+///
+/// # Errors
+/// A motion cannot be read, or a joint stands still in all of them.
 pub fn read(folder: &Path, tree: &Tree, progress: Progress<'_>) -> Result<Motions, Error> {
+    let (motions, surveys) = read_with_surveys(folder, tree, progress)?;
+    check_excitation(folder, tree, &surveys)?;
+    Ok(motions)
+}
+
+/// The same where joints may stand still in all of them.
+///
+/// # Errors
+/// A motion cannot be read.
+pub fn read_all(folder: &Path, tree: &Tree, progress: Progress<'_>) -> Result<Motions, Error> {
+    Ok(read_with_surveys(folder, tree, progress)?.0)
+}
+
+fn read_with_surveys(
+    folder: &Path,
+    tree: &Tree,
+    progress: Progress<'_>,
+) -> Result<(Motions, Vec<Survey>), Error> {
     let entries =
         std::fs::read_dir(folder).map_err(|source| Error::Unreadable { path: folder.to_owned(), source })?;
     let hidden = |path: &Path| path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
@@ -51,9 +72,8 @@ pub fn read(folder: &Path, tree: &Tree, progress: Progress<'_>) -> Result<Motion
     };
     let read: Result<Vec<(Motion, Survey)>, Error> = files.par_iter().map(read).collect();
     let (motions, surveys): (Vec<Motion>, Vec<Survey>) = read?.into_iter().unzip();
-    check_excitation(folder, tree, &surveys)?;
     let ranges = SignalRanges::of_surveys(&surveys);
-    Ok(Motions { dataset: MotionDataset::new(joints.len(), motions)?, files, ranges })
+    Ok((Motions { dataset: MotionDataset::new(joints.len(), motions)?, files, ranges }, surveys))
 }
 
 /// What no motion moves, no motion can tell: every condition number would be infinite, and the choice

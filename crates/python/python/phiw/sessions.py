@@ -33,6 +33,10 @@ def identify(
     map: Optional[PathLike] = None,
     mass: Optional[Mapping[str, float]] = None,
     total_mass: Optional[float] = None,
+    inside: Optional[Mapping[str, Sequence[float]]] = None,
+    inside_geometry: bool = False,
+    mirrored: Optional[Mapping[str, str]] = None,
+    motions: Optional[PathLike] = None,
     cutoff_hz: Optional[float] = None,
     parallel_cutoff_hz: Optional[float] = None,
     progress: Optional[Progress] = None,
@@ -64,6 +68,15 @@ def identify(
         Masses of links that are known (kg).
     total_mass : float, optional
         Mass of all links that move (kg).
+    inside : dict, optional
+        Ellipsoids that hold all of a link's mass: centre and half axes (m) in the frame of its joint, six
+        numbers for each link.
+    inside_geometry : bool
+        The same of every other link that has geometry in the URDF.
+    mirrored : dict, optional
+        Links that are mirror images of each other, with the robot at zero.
+    motions : path, optional
+        Folder of motions: which of them would tell most of what the logs do not tell.
     cutoff_hz, parallel_cutoff_hz : float, optional
         Cut-offs of the low-pass over positions, and over columns and torque alike (Hz).
     progress : callable, optional
@@ -74,7 +87,9 @@ def identify(
     Result
     """
     robot = _robot(robot)
-    options = _session_options(robot, train, validate, declare, map, mass, total_mass, cutoff_hz, parallel_cutoff_hz)
+    known = _known(mass, total_mass, inside, inside_geometry, mirrored)
+    shared = {"motions": motions, "cutoff_hz": cutoff_hz, "parallel_cutoff_hz": parallel_cutoff_hz}
+    options = _session_options(robot, train, validate, declare, map, {**known, **shared})
     return Result(*_phiw.identify(robot, options, progress))
 
 
@@ -91,6 +106,10 @@ def explain(
     draws: int = 0,
     mass: Optional[Mapping[str, float]] = None,
     total_mass: Optional[float] = None,
+    inside: Optional[Mapping[str, Sequence[float]]] = None,
+    inside_geometry: bool = False,
+    mirrored: Optional[Mapping[str, str]] = None,
+    motions: Optional[PathLike] = None,
     cutoff_hz: Optional[float] = None,
     parallel_cutoff_hz: Optional[float] = None,
     progress: Optional[Progress] = None,
@@ -115,7 +134,9 @@ def explain(
     Result
     """
     robot = _robot(robot)
-    options = _session_options(robot, train, validate, declare, map, mass, total_mass, cutoff_hz, parallel_cutoff_hz)
+    known = _known(mass, total_mass, inside, inside_geometry, mirrored)
+    shared = {"motions": motions, "cutoff_hz": cutoff_hz, "parallel_cutoff_hz": parallel_cutoff_hz}
+    options = _session_options(robot, train, validate, declare, map, {**known, **shared})
     own = {
         "model": None if model is None else model_text(model),
         "exclude": _names(exclude),
@@ -185,6 +206,8 @@ def next_motion(
     model: Optional[Model] = None,
     declare: Names = (),
     urdf_error: float = 0.3,
+    estimator: str = "unknown-noise",
+    command_hz: Optional[float] = None,
     alpha: Optional[float] = None,
     cutoff_hz: Optional[float] = None,
     parallel_cutoff_hz: Optional[float] = None,
@@ -207,6 +230,11 @@ def next_motion(
         Effects beside the rigid body.
     urdf_error : float
         How far off the URDF's inertial parameters may be, as a share of each body's magnitude.
+    estimator : "unknown-noise" or "least-squares"
+        How the logs are estimated from. The first needs logs that say what the controller commanded
+        (``tau_cmd.<joint>``) or was asked for (``qref.<joint>``); where one does not, the second is taken.
+    command_hz : float, optional
+        Commands a second of the robot's controller (Hz); by default seen in the logs.
     alpha : float, optional
         The part that the support is reduced by, 0 to 1.
     """
@@ -219,6 +247,8 @@ def next_motion(
         "model": None if model is None else model_text(model),
         "declare": _names(declare),
         "urdf_error": urdf_error,
+        "estimator": estimator,
+        "command_hz": command_hz,
         "alpha": alpha,
         "cutoff_hz": cutoff_hz,
         "parallel_cutoff_hz": parallel_cutoff_hz,
@@ -310,22 +340,37 @@ def _session_options(
     validate: Logs,
     declare: Names,
     map: Optional[PathLike],
-    mass: Optional[Mapping[str, float]],
-    total_mass: Optional[float],
-    cutoff_hz: Optional[float],
-    parallel_cutoff_hz: Optional[float],
+    others: Dict[str, Any],
 ) -> Dict[str, Any]:
     training = taken_logs(train, robot.joints, "train", map is not None)
     if not training:
         raise InputError("train holds no log: give at least one")
-    known: List[Tuple[str, float]] = [(link, float(kg)) for link, kg in (mass or {}).items()]
     return {
         "train": training,
         "validate": taken_logs(validate, robot.joints, "validate", map is not None),
         "map": map,
         "declare": _names(declare),
-        "mass": known,
+        **others,
+    }
+
+
+def _known(
+    mass: Optional[Mapping[str, float]],
+    total_mass: Optional[float],
+    inside: Optional[Mapping[str, Sequence[float]]],
+    inside_geometry: bool,
+    mirrored: Optional[Mapping[str, str]],
+) -> Dict[str, Any]:
+    ellipsoids: List[Tuple[str, List[float]]] = []
+    for link, numbers in (inside or {}).items():
+        ellipsoid = [float(number) for number in numbers]
+        if len(ellipsoid) != 6 or not np.all(np.isfinite(ellipsoid)) or min(ellipsoid[3:]) <= 0.0:
+            raise InputError(f"inside[{link!r}] is not a centre and half axes above zero: six numbers (m)")
+        ellipsoids.append((link, ellipsoid))
+    return {
+        "mass": [(link, float(kg)) for link, kg in (mass or {}).items()],
         "total_mass": total_mass,
-        "cutoff_hz": cutoff_hz,
-        "parallel_cutoff_hz": parallel_cutoff_hz,
+        "inside": ellipsoids,
+        "inside_geometry": inside_geometry,
+        "mirrored": list((mirrored or {}).items()),
     }

@@ -4,6 +4,7 @@ mod bytes;
 mod case;
 mod ground;
 mod logs;
+mod mjcf;
 mod model_files;
 mod motions;
 mod recordings;
@@ -23,6 +24,7 @@ pub fn classes() -> Vec<Class> {
     [
         logs::classes(),
         robots::classes(),
+        mjcf::classes(),
         recordings::classes(),
         motions::classes(),
         model_files::classes(),
