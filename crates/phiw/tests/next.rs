@@ -63,7 +63,7 @@ fn margin(plan: &Recording, parameters: &[f64]) -> f64 {
 #[test]
 fn before_any_log_the_urdf_is_believed_and_few_motions_are_allowed() {
     let scene = Scene::new(&urdf());
-    let (summary, warnings, report) = scene.next("--support DIR/support.toml");
+    let (summary, warnings, report) = scene.next("--support DIR/support.toml --base-error 0.02");
     let next = &report["next"];
     // 5 % of twenty motions.
     assert_eq!((next["candidates"].as_u64(), next["allowed"].as_u64()), (Some(20), Some(1)), "{report}");
@@ -97,7 +97,7 @@ fn before_any_log_the_urdf_is_believed_and_few_motions_are_allowed() {
 #[test]
 fn logs_correct_the_estimate_and_open_the_way_to_livelier_motions() {
     let scene = Scene::new(&wrong_urdf());
-    let support = "--support DIR/support.toml --declare viscous_friction";
+    let support = "--support DIR/support.toml --base-error 0.02 --declare viscous_friction";
     let (_, _, first) = scene.next(support);
     let believed = torque_error(&scene.planned(), &urdf(), synthetic::VISCOUS);
     let (summary, _, one) = scene.next(&format!("{support} --measured DIR/log_1.csv"));
@@ -131,8 +131,9 @@ fn the_margin_is_as_uncertain_as_it_says() {
     let (base_link, bodies) = believed.split_at(10);
     let scales =
         [phiw_regressor::parameter_scales(base_link), phiw_regressor::parameter_scales(bodies)].concat();
-    let more =
-        format!("--support DIR/support.toml --declare viscous_friction --alpha 0.05 --urdf-error {SHARE}");
+    let more = format!(
+        "--support DIR/support.toml --false-fall-rate 0.5 --declare viscous_friction --alpha 0.05 --urdf-error {SHARE}"
+    );
     let (mut squares, mut told, mut count) = ([0.0; 2], [0.0; 2], 0.0);
     for seed in 0..16 {
         let mut random = RandomNumbers::new(1000 + seed);
@@ -189,7 +190,8 @@ fn what_a_log_hardly_tells_is_left_to_the_urdf() {
             log.q.extend(q);
         }
         log.write_csv(&scene.path("log.csv")).unwrap();
-        let (_, _, report) = scene.next("--support DIR/support.toml --measured DIR/log.csv");
+        let (_, _, report) =
+            scene.next("--support DIR/support.toml --base-error 0.02 --measured DIR/log.csv");
         let error = torque_error(&scene.planned(), &urdf(), [0.0; 3]);
         println!("torque error {error:.4} from a log in which the last joint moves by {tremor} rad");
         assert!(error < 0.02, "{error}");
@@ -203,7 +205,7 @@ fn a_model_file_stands_for_the_fit() {
     let identify = "identify --urdf DIR/robot.urdf --train DIR/log_1.csv DIR/log_2.csv --declare viscous_friction --out DIR/model";
     assert_eq!(scene.run(identify).0, 0);
     let (summary, _, report) = scene.next(
-        "--support DIR/support.toml --model DIR/model/model.json --measured DIR/log_1.csv DIR/log_2.csv",
+        "--support DIR/support.toml --base-error 0.02 --model DIR/model/model.json --measured DIR/log_1.csv DIR/log_2.csv",
     );
     assert_eq!(report["next"]["estimate"]["source"], "model");
     assert!(summary.contains("parameters from the model"), "{summary}");
@@ -211,7 +213,8 @@ fn a_model_file_stands_for_the_fit() {
     assert!(report["next"]["balance"]["margin_std_m"].as_f64().unwrap() > 0.0);
     assert!(report["next"]["condition_number"]["before"].as_f64().is_some());
     // Without logs there is no Φ yet, but the parameters are the model's.
-    let (_, _, report) = scene.next("--support DIR/support.toml --model DIR/model/model.json");
+    let (_, _, report) =
+        scene.next("--support DIR/support.toml --base-error 0.02 --model DIR/model/model.json");
     assert_eq!(report["next"]["condition_number"]["before"], Value::Null);
     assert!(torque_error(&scene.planned(), &urdf(), synthetic::VISCOUS) < 0.03);
 }
@@ -257,7 +260,7 @@ fn limits_and_a_moving_start_are_pointed_out() {
 #[test]
 fn a_foot_may_be_behind_joints_that_are_held() {
     let scene = Scene::new(&urdf());
-    let (_, _, on_base) = scene.next("--support DIR/support.toml --hold joint_1");
+    let (_, _, on_base) = scene.next("--support DIR/support.toml --base-error 0.02 --hold joint_1");
     // link_1 is 0.3 m above the base, and not turned when joint_1 is at 0.
     let text = std::fs::read_to_string(scene.path("support.toml")).unwrap();
     std::fs::write(
@@ -265,7 +268,7 @@ fn a_foot_may_be_behind_joints_that_are_held() {
         text.replace("\"base\"", "\"link_1\"").replace(", 0.0]", ", -0.3]"),
     )
     .unwrap();
-    let (_, _, on_link) = scene.next("--support DIR/support.toml --hold joint_1");
+    let (_, _, on_link) = scene.next("--support DIR/support.toml --base-error 0.02 --hold joint_1");
     let margin = |report: &Value| report["next"]["balance"]["margin_m"].as_f64().unwrap();
     assert!((margin(&on_base) - margin(&on_link)).abs() < 1e-12);
     assert_eq!(on_base["next"]["motion"], on_link["next"]["motion"]);

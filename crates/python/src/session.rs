@@ -4,8 +4,8 @@ use crate::arrays::{Doubles, array};
 use crate::robot::Robot;
 use crate::work::{InputError, raised, run};
 use phiw::arguments::{
-    CheckArguments, Derivatives, ExplainArguments, InMemory, MotionFormat, NextArguments, NextEstimator,
-    PredictArguments, RetargetArguments, SessionArguments,
+    CheckArguments, Derivatives, ExplainArguments, FALSE_FALL_RATE, InMemory, MotionFormat, NextArguments,
+    NextEstimator, PredictArguments, RetargetArguments, SessionArguments,
 };
 use phiw::identify::Results;
 use phiw_identification::Interruption;
@@ -181,6 +181,9 @@ pub fn next_motion<'py>(
         declare: options.declare,
         hold: robot.get().hold.clone(),
         urdf_error: options.urdf_error,
+        slower: Vec::new(),
+        false_fall_rate: FALSE_FALL_RATE,
+        base_error: None,
         estimator: NextEstimator::default(),
         command_hz: None,
         alpha: options.alpha,
