@@ -242,33 +242,36 @@ fn through_files(scene: &Scene, known: KnownOfController) -> Figures {
 
 #[test]
 fn five_iterations_through_files_are_those_of_the_curriculum() {
-    both_are_the_same(KnownOfController::Commands, 0.3);
+    both_are_the_same(KnownOfController::Commands, 1e-6, 0.3);
 }
 
 /// Logs without commands, that say what the controller was asked for and not with which gains it answered:
-/// `qref.<joint>`.
+/// `qref.<joint>`. The file has positions alone: speeds and accelerations of the reference are differences of
+/// them, so that the numbers are not those to the last digit.
 #[test]
 fn five_iterations_through_files_that_know_the_reference_alone_are_those_of_the_curriculum() {
-    both_are_the_same(KnownOfController::Reference, 0.6);
+    both_are_the_same(KnownOfController::Reference, 5e-3, 0.3);
 }
 
-/// In process and through files; at the end the error is less than this share of the first belief's.
-fn both_are_the_same(known: KnownOfController, share: f64) {
+/// In process and through files, to a share of `tolerance`; at the end the error is less than this share of the first belief's.
+fn both_are_the_same(known: KnownOfController, tolerance: f64, share: f64) {
     let scene = Scene::new(&believed());
     let (own, files) = (in_process(&scene, known), through_files(&scene, known));
     println!("motions {:?}, cond {:?}", files.motions, files.condition_number);
     assert_eq!(own.motions, files.motions);
     let all = |figures: &Figures| {
-        [&figures.alpha, &figures.margin, &figures.condition_number, &figures.misfit]
-            .map(Clone::clone)
-            .concat()
+        [&figures.alpha, &figures.margin, &figures.condition_number].map(Clone::clone).concat()
     };
-    for (own, file) in all(&own).into_iter().zip(all(&files)) {
-        assert!((own - file).abs() < 1e-6 * (1.0 + own.abs()), "in process {own}, through files {file}");
-    }
-    for (own, file) in own.parameters.iter().zip(&files.parameters) {
-        assert!((own - file).abs() < 1e-6, "in process {own}, through files {file}");
-    }
+    let apart = |own: &[f64], files: &[f64]| {
+        let pairs = own.iter().zip(files);
+        pairs.map(|(own, file)| (own - file).abs() / (1.0 + own.abs())).fold(0.0, f64::max)
+    };
+    let plans = apart(&all(&own), &all(&files));
+    let parameters = apart(&own.parameters, &files.parameters);
+    let misfits = apart(&own.misfit, &files.misfit);
+    println!("apart at most: plans {plans:e}, parameters {parameters:e}, misfits {misfits:e}");
+    // χ² is a square of small differences.
+    assert!(plans.max(parameters) < tolerance && misfits < 20.0 * tolerance);
     // And they are right.
     let (_, robot, _) = declared(&scene);
     let truth = robot.base().from_standard(&tree(&urdf(), false).inertial_parameters()).unwrap();
