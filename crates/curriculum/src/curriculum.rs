@@ -1,7 +1,7 @@
 //! Algorithm 1, lines 10 to 17: select, measure, estimate, relax; and, where the model may grow, look for
 //! what it lacks.
 
-use crate::constraint::Constraint;
+use crate::constraint::{Certainty, Constraint};
 use crate::end::{EndCriterion, FixedCount};
 use crate::experiment::check_noise;
 use crate::growth::{Found, Growth, Rivalry, rivals_to_separate, unconfirmed};
@@ -144,6 +144,7 @@ impl<'a> Curriculum<'a> {
             misfit = self.misfit(&learning)?;
             next.model = learning.model;
             next.evidence = Some(learning.evidence);
+            next.certainty = Certainty::of(self.robot, &learning.estimate);
             estimate = Some(learning.estimate);
         }
         let condition_number = self.measured(&next)?.map(|measured| measured.condition_number());
@@ -158,6 +159,8 @@ impl<'a> Curriculum<'a> {
             forced: plan.forced,
             alpha: plan.alpha,
             margin_m: Some(plan.safety.margin_m).filter(|margin| margin.is_finite()),
+            sure_margin_m: Some(plan.safety.sure_margin_m).filter(|margin| margin.is_finite()),
+            kept: trial.kept,
             fell_at_s: trial.fell_at_s,
             still_share: trial.measured.still_share(),
             tracking_error: trial.tracking_error,
@@ -350,6 +353,7 @@ impl<'a> Curriculum<'a> {
             dataset: self.dataset,
             candidates: self.candidates,
             model: &run.model,
+            certainty: run.certainty.as_ref(),
             initial: &run.initial,
             rivalry: open_rivalry(&run.rivals, &run.history),
         };

@@ -11,6 +11,8 @@ pub enum EndReason {
     Count,
     /// Another motion would change little.
     Converged,
+    /// No motion was allowed, and nothing was run.
+    NothingAllowed,
 }
 
 /// Decides after each iteration whether it was the last.

@@ -34,16 +34,18 @@ pub enum CurriculumError {
     },
     /// Every motion is expected to topple the robot.
     #[error(
-        "none of the {motions} motions keeps the ZMP over the support under the present estimate: the safest, {safest}, leaves it by {:.1} mm; \
-         add calmer motions, or start from a better model", 1e3 * outside_m
+        "none of the {motions} motions keeps the ZMP over the support under the present estimate: the safest, {safest}, leaves it by {:.1} mm; {safer}",
+        1e3 * outside_m
     )]
     NothingSafe {
         /// How many there are.
         motions: usize,
         /// The one that comes nearest.
         safest: String,
-        /// How far its ZMP is outside \[m\].
+        /// How far its ZMP may be outside \[m\], the uncertainty included where it counts.
         outside_m: f64,
+        /// Which safer motion would do.
+        safer: String,
     },
     /// The robot has fallen on every motion.
     #[error(

@@ -4,6 +4,7 @@ use crate::CurriculumError;
 use crate::motion::Motion;
 use phiw_estimation::{Estimator, MotionLog, Robot, RobotModel};
 use rand::Rng;
+use serde::{Deserialize, Serialize};
 
 /// What happened when a motion was tried.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,6 +15,21 @@ pub struct Trial {
     pub fell_at_s: Option<f64>,
     /// RMS of each joint's tracking error \[rad, m\].
     pub tracking_error: Vec<f64>,
+    /// How the balance was kept, as a force plate under the base would have it; none where there is no such.
+    pub kept: Option<KeptBalance>,
+}
+
+/// How a robot kept its balance in a motion that was run: its true ZMP against the support.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct KeptBalance {
+    /// Smallest signed distance of the ZMP from the border \[m\], over all instants; noise of the torques
+    /// shakes it. None where the robot did not press on the floor at some instant.
+    pub margin_m: Option<f64>,
+    /// Share of the time in which the ZMP was outside.
+    pub outside_share: f64,
+    /// Smallest margin of the ZMP's mean over the time in which an inverted pendulum of the robot's height
+    /// falls, weighted by how long ago it was \[m\]: what would have tipped over a base that stands free.
+    pub tipping_margin_m: f64,
 }
 
 /// Tries motions on a robot: line 13 of Algorithm 1.

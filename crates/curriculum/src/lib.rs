@@ -18,5 +18,5 @@ mod record;
 
 pub use curriculum::{Curriculum, CurriculumSettings, unreliable_model};
 pub use error::CurriculumError;
-pub use experiment::{Experiment, Trial};
+pub use experiment::{Experiment, KeptBalance, Trial};
 pub use record::{CurriculumRun, IterationRecord};

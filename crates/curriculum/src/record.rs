@@ -1,6 +1,8 @@
 //! What is written down of an iteration, and of a run: everything that is needed to go on.
 
+use crate::constraint::Certainty;
 use crate::end::EndReason;
+use crate::experiment::KeptBalance;
 use crate::growth::Rivalry;
 use crate::selection::Choice;
 use phiw_estimation::{Evidence, MotionLog, RobotModel, TorqueMisfit};
@@ -22,6 +24,12 @@ pub struct IterationRecord {
     /// Smallest distance of the reference's ZMP from the border of the support, under the belief of the time
     /// \[m\]; none without one.
     pub margin_m: Option<f64>,
+    /// What was left of it with the uncertainty taken off, where the constraint counts that \[m\].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sure_margin_m: Option<f64>,
+    /// How the motion that was run kept the balance; none where nobody measures that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kept: Option<KeptBalance>,
     /// When the robot fell, since the motion's start \[s\]. Its log then counts for nothing.
     pub fell_at_s: Option<f64>,
     /// Share of the log's rows in which the base stood still; only these count.
@@ -66,6 +74,10 @@ pub struct CurriculumRun {
     pub first_alpha: Option<f64>,
     /// All that was measured; none before the first measurement, and once the run has ended.
     pub evidence: Option<Evidence>,
+    /// How sure the present belief is; none before the first measurement, or from an estimator that does not
+    /// know.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certainty: Option<Certainty>,
     /// The logs themselves, where the model may grow: new columns need them.
     pub logs: Vec<MotionLog>,
     /// Beliefs that the logs can not tell apart; the next motion is to separate them.
@@ -88,6 +100,7 @@ impl CurriculumRun {
             initial,
             first_alpha: None,
             evidence: None,
+            certainty: None,
             logs: Vec::new(),
             rivals: Vec::new(),
             excluded: Vec::new(),

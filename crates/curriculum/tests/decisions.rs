@@ -14,7 +14,11 @@ use phiw_estimation::RobotModel;
 fn safety(reductions: &[f64]) -> Vec<Safety> {
     reductions
         .iter()
-        .map(|&largest_reduction| Safety { largest_reduction, margin_m: 0.1 * largest_reduction })
+        .map(|&largest_reduction| Safety {
+            largest_reduction,
+            margin_m: 0.1 * largest_reduction,
+            sure_margin_m: 0.1 * largest_reduction,
+        })
         .collect()
 }
 
@@ -121,6 +125,8 @@ fn record(cond: Option<f64>, change: Option<f64>, uncertainty: Option<f64>) -> I
         forced: false,
         alpha: 0.5,
         margin_m: None,
+        sure_margin_m: None,
+        kept: None,
         fell_at_s: None,
         still_share: 1.0,
         tracking_error: Vec::new(),

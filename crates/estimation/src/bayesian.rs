@@ -100,6 +100,7 @@ impl Estimator for BayesianLeastSquares {
             parameters: present.to_vec(),
             standard_deviations: vec![f64::NAN; count],
             covariance: None,
+            noise: None,
         };
         let mut covariance = Mat::from_fn(count, count, |_, _| f64::NAN);
         for (row, &parameter) in kept.iter().enumerate() {

@@ -57,6 +57,19 @@ pub struct TorqueNoise {
     pub felt: f64,
 }
 
+impl TorqueNoise {
+    /// White noise of this standard deviation \[N·m, N\] that moves the robot and is in no log.
+    pub fn white(std: f64) -> Self {
+        TorqueNoise { std, correlation: 0.0, felt: 0.0 }
+    }
+
+    /// From the standard deviation of what is news in it.
+    fn of_news((colour, std): (&Colour, &f64)) -> Self {
+        let Colour { correlation, felt } = *colour;
+        TorqueNoise { std: std / (1.0 - correlation * correlation).sqrt(), correlation, felt }
+    }
+}
+
 impl ConcentratedLikelihood {
     /// For a robot of which this was believed at first.
     pub fn new(initial: RobotModel) -> Self {
@@ -78,13 +91,8 @@ impl ConcentratedLikelihood {
         evidence: &Evidence,
         parameters: &[f64],
     ) -> Result<Vec<TorqueNoise>, EstimationError> {
-        let noise = |(colour, std): (&Colour, &f64)| TorqueNoise {
-            std: std / (1.0 - colour.correlation * colour.correlation).sqrt(),
-            correlation: colour.correlation,
-            felt: colour.felt,
-        };
         self.looked_at(design, evidence, parameters, |_, colours, std| {
-            Ok(colours.iter().zip(std).map(noise).collect())
+            Ok(colours.iter().zip(std).map(TorqueNoise::of_news).collect())
         })
     }
 
@@ -385,12 +393,16 @@ impl Estimator for ConcentratedLikelihood {
             last = Some(again);
         }
         let w = &parts.map * &x;
+        if last.is_none() {
+            std_of_noise = parts.profile(self, &colours)?.noise(&w);
+        }
         let covariance = covariance.map(|own: Mat<f64>| &parts.map * own * parts.map.transpose());
         let deviation = |k: usize| covariance.as_ref().map_or(f64::NAN, |own| own[(k, k)].max(0.0).sqrt());
         Ok(Estimate {
             parameters: w.col_as_slice(0).to_vec(),
             standard_deviations: (0..w.nrows()).map(deviation).collect(),
             covariance,
+            noise: Some(colours.iter().zip(&std_of_noise).map(TorqueNoise::of_news).collect()),
         })
     }
 

@@ -1,6 +1,6 @@
 //! What an estimator is asked, and what it answers.
 
-use crate::{EstimationError, Evidence, RobotModel, TorqueMisfit};
+use crate::{EstimationError, Evidence, RobotModel, TorqueMisfit, TorqueNoise};
 use faer::Mat;
 use phiw_identification::Design;
 
@@ -13,6 +13,8 @@ pub struct Estimate {
     pub standard_deviations: Vec<f64>,
     /// Their covariance; none from an estimator that does not know it.
     pub covariance: Option<Mat<f64>>,
+    /// The noise of each torque that moved the robot; none from an estimator that does not know it.
+    pub noise: Option<Vec<TorqueNoise>>,
 }
 
 /// Estimates parameters from all that has been measured.

@@ -107,6 +107,7 @@ fn spread(kept: &[usize], present: &[f64], parameters: &[f64], deviations: &[f64
         parameters: present.to_vec(),
         standard_deviations: vec![f64::NAN; present.len()],
         covariance: None,
+        noise: None,
     };
     for ((&parameter, value), deviation) in kept.iter().zip(parameters).zip(deviations) {
         estimate.parameters[parameter] = *value;

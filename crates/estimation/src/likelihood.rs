@@ -6,7 +6,7 @@ use super::sensitivity::Sensitivity;
 use super::settings::{NewtonSettings, ScoreSettings};
 use super::{Estimate, Estimator, Evidence};
 use crate::robot::spheres;
-use crate::{EstimationError, RobotModel};
+use crate::{EstimationError, RobotModel, TorqueNoise};
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 use phiw_dynamics::check::check_size;
@@ -153,6 +153,7 @@ impl Estimator for MotionLikelihood {
             parameters: (0..w.nrows()).map(|k| w[(k, 0)]).collect(),
             standard_deviations: (0..w.nrows()).map(deviation).collect(),
             covariance,
+            noise: Some(self.torque_noise.iter().map(|&std| TorqueNoise::white(std)).collect()),
         })
     }
 

@@ -242,6 +242,12 @@ impl RobotModel {
         RobotModel { standard, effects: self.effects.iter().map(effect).collect() }
     }
 
+    /// The same belief with bodies that exist: spheres with the masses and centres of mass of its own.
+    pub fn of_spheres(&self) -> Self {
+        let standard = spheres(&self.standard, &NewtonSettings::default());
+        RobotModel { standard, effects: self.effects.clone() }
+    }
+
     /// The tree with this model's standard parameters.
     ///
     /// # Errors

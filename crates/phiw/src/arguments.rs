@@ -306,6 +306,18 @@ pub struct NextArguments {
     /// Commands a second of the robot's controller (Hz); by default seen in the logs.
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub command_hz: Option<f64>,
+    /// Slower versions of all motions beside them, so many times slower: --slower 2,4.
+    #[arg(long, value_name = "TIMES,…", value_delimiter = ',', value_parser = positive)]
+    pub slower: Vec<f64>,
+    /// How often a motion that is allowed may leave the support, such as 0.001: so many standard deviations of
+    /// the ZMP, by all that is not known of the robot and by the noise that moves it, are taken from its
+    /// margin. By default none are: the standard deviation is told beside the margin.
+    #[arg(long, value_name = "RATE", value_parser = positive)]
+    pub false_fall_rate: Option<f64>,
+    /// How far off the URDF may be for the link that stands on the floor, as a share of its magnitude; no log
+    /// tells it, so weigh it and measure it. By default as --urdf-error.
+    #[arg(long, value_name = "SHARE", value_parser = share, requires = "false_fall_rate")]
+    pub base_error: Option<f64>,
     /// The part that the support is reduced by, 0 to 1; by default from cond(Φ), as in the paper's equation
     /// (20).
     #[arg(long, value_name = "ALPHA", value_parser = share)]

@@ -12,7 +12,7 @@ use crate::console::Console;
 use crate::output::check_file;
 use crate::{Error, robot_file, session};
 use estimate::Present;
-use phiw_curriculum::constraint::{Constraint, MotionMargin, Unconstrained, ZmpConstraint};
+use phiw_curriculum::constraint::{Constraint, FalseFalls, MotionMargin, Unconstrained, ZmpConstraint};
 use phiw_curriculum::planner::{Belief, MeasuredSoFar, Plan, Policy, plan};
 use phiw_curriculum::relaxation::{ConditionRelaxation, ConstantReduction, Relaxation};
 use phiw_curriculum::selection::SmallestCondition;
@@ -77,7 +77,7 @@ pub fn chosen(arguments: &NextArguments, console: &Console) -> Result<Chosen, Er
     let session::RobotOfUrdf { tree, xml, findings, held, left_out, .. } =
         session::read_robot(&arguments.session())?;
     let standing = Standing::read(arguments, &xml, &held)?;
-    let motions = motions::read(&arguments.motions, &tree, &progress)?;
+    let motions = motions::read(&arguments.motions, &tree, &progress)?.with_slower(&arguments.slower)?;
     let named = [Some(&arguments.urdf), arguments.support.as_ref(), arguments.model.as_ref()];
     let inputs = named.into_iter().flatten().chain(&arguments.measured).chain(&motions.files).cloned();
     check_inputs(&inputs.collect::<Vec<_>>(), &[arguments.out.clone(), report_json.clone()])?;
@@ -115,6 +115,18 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
+/// How what is not known counts in the constraint; none where it does not.
+fn false_falls(arguments: &NextArguments) -> Option<FalseFalls> {
+    let default = FalseFalls::default();
+    arguments.false_fall_rate.map(|rate| FalseFalls {
+        rate,
+        belief_share: arguments.urdf_error,
+        base_link_share: arguments.base_error.unwrap_or(arguments.urdf_error),
+        control_period_s: arguments.command_hz.map_or(default.control_period_s, f64::recip),
+        ..default
+    })
+}
+
 /// The curriculum's plan with the policy for a real robot.
 fn planned(
     arguments: &NextArguments,
@@ -123,7 +135,13 @@ fn planned(
     motions: &motions::Motions,
 ) -> Result<Plan, Error> {
     let constraint: Box<dyn Constraint> = match &standing.stance {
-        Some(stance) => Box::new(ZmpConstraint::new(stance.clone())),
+        Some(stance) => {
+            let constraint = ZmpConstraint::new(stance.clone());
+            Box::new(match false_falls(arguments) {
+                Some(false_falls) => constraint.counting(false_falls),
+                None => constraint,
+            })
+        }
         None => Box::new(Unconstrained),
     };
     let relaxation: Box<dyn Relaxation> = match arguments.alpha {
@@ -136,6 +154,7 @@ fn planned(
         dataset: &motions.dataset,
         candidates: &present.candidates,
         model: &present.model,
+        certainty: present.certainty.as_ref(),
         initial: &present.prior.model,
         rivalry: None,
     };

@@ -5,7 +5,7 @@ mod next_scene;
 mod synthetic;
 
 use next_scene::{JOINTS, Scene, tree, urdf};
-use phiw_curriculum::constraint::ZmpConstraint;
+use phiw_curriculum::constraint::{FalseFalls, ZmpConstraint};
 use phiw_curriculum::end::FixedCount;
 use phiw_curriculum::motion::{Motion, MotionDataset};
 use phiw_curriculum::relaxation::ConditionRelaxation;
@@ -24,6 +24,9 @@ use rand_chacha::ChaCha8Rng;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 const ITERATIONS: u64 = 5;
+/// What `phiw next` knows by default of the error of a URDF, and what it is told of the link on the floor.
+const URDF_ERROR: f64 = 0.3;
+const BASE_ERROR: f64 = 0.02;
 const SOLE: [[f64; 2]; 4] = [[0.22, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.22, -0.2]];
 
 /// What is believed at first: bodies that are too heavy or too light.
@@ -109,6 +112,7 @@ fn true_robot(
         sensors: Sensors::exact(0.01),
         timing: Timing { longest_step_s: 1e-3, settle_s: 0.2, ..Timing::default() },
         fall_tilt_rad: 0.3,
+        stance: None,
         stillness: Default::default(),
         noise_correlation: 0.0,
         measuring: Measuring {
@@ -152,7 +156,11 @@ fn in_process(scene: &Scene, known: KnownOfController) -> Figures {
     let controller = Box::new(FeedForward { gains: gains(&truth) });
     let experiment = Seeded { robot: true_robot(&truth, controller, known), next: AtomicU64::new(0) };
     let stance = Stance::new(SupportPolygon::from_points(&SOLE).unwrap(), [0.0; 2], 0.0).unwrap();
-    let constraint = ZmpConstraint::new(stance);
+    let constraint = ZmpConstraint::new(stance).counting(FalseFalls {
+        belief_share: URDF_ERROR,
+        base_link_share: BASE_ERROR,
+        ..FalseFalls::default()
+    });
     let estimator = ConcentratedLikelihood::new(initial.clone());
     let curriculum = Curriculum {
         robot: &robot,
@@ -173,7 +181,11 @@ fn in_process(scene: &Scene, known: KnownOfController) -> Figures {
     Figures {
         motions: run.history.iter().map(|record| record.motion.clone()).collect(),
         alpha: run.history.iter().map(|record| record.alpha).collect(),
-        margin: run.history.iter().map(|record| record.margin_m.unwrap()).collect(),
+        margin: run
+            .history
+            .iter()
+            .flat_map(|record| [record.margin_m.unwrap(), record.sure_margin_m.unwrap()])
+            .collect(),
         condition_number: run.history.iter().map(|record| record.condition_number.unwrap()).collect(),
         parameters: run.model.parameters(&robot).unwrap()[..robot.base().count()].to_vec(),
         misfit: run.history.last().unwrap().misfit.iter().map(|misfit| misfit.chi_squared).collect(),
@@ -194,9 +206,12 @@ fn through_files(scene: &Scene, known: KnownOfController) -> Figures {
     let mut logs = String::new();
     for iteration in 0..=ITERATIONS {
         let measured = if logs.is_empty() { String::new() } else { format!("--measured{logs}") };
-        let more = format!("--support DIR/support.toml --declare viscous_friction {measured}");
+        let more = format!(
+            "--support DIR/support.toml --false-fall-rate 0.001 --base-error {BASE_ERROR} --declare viscous_friction {measured}"
+        );
         let (_, _, report) = scene.next(&more);
         let next = &report["next"];
+        assert_eq!(next["estimate"]["source"], if iteration == 0 { "urdf" } else { "controlled_logs" });
         let number = |path: &str| next.pointer(path).and_then(serde_json::Value::as_f64).unwrap();
         if iteration > 0 {
             figures.condition_number.push(number("/condition_number/before"));
@@ -209,7 +224,7 @@ fn through_files(scene: &Scene, known: KnownOfController) -> Figures {
             break;
         }
         figures.alpha.push(number("/balance/alpha"));
-        figures.margin.push(number("/balance/margin_m"));
+        figures.margin.extend([number("/balance/margin_m"), number("/balance/sure_margin_m")]);
         let name = next["motion"].as_str().unwrap().to_owned();
         let motion = dataset.motions().iter().find(|motion| motion.name == name).unwrap();
         figures.motions.push(name);
@@ -227,27 +242,41 @@ fn through_files(scene: &Scene, known: KnownOfController) -> Figures {
 
 #[test]
 fn five_iterations_through_files_are_those_of_the_curriculum() {
+    both_are_the_same(KnownOfController::Commands, 1e-6, 0.3);
+}
+
+/// Logs without commands, that say what the controller was asked for and not with which gains it answered:
+/// `qref.<joint>`. The file has positions alone: speeds and accelerations of the reference are differences of
+/// them, so that the numbers are not those to the last digit.
+#[test]
+fn five_iterations_through_files_that_know_the_reference_alone_are_those_of_the_curriculum() {
+    both_are_the_same(KnownOfController::Reference, 5e-3, 0.3);
+}
+
+/// In process and through files, to a share of `tolerance`; at the end the error is less than this share of the first belief's.
+fn both_are_the_same(known: KnownOfController, tolerance: f64, share: f64) {
     let scene = Scene::new(&believed());
-    let (own, files) =
-        (in_process(&scene, KnownOfController::Commands), through_files(&scene, KnownOfController::Commands));
+    let (own, files) = (in_process(&scene, known), through_files(&scene, known));
     println!("motions {:?}, cond {:?}", files.motions, files.condition_number);
     assert_eq!(own.motions, files.motions);
     let all = |figures: &Figures| {
-        [&figures.alpha, &figures.margin, &figures.condition_number, &figures.misfit]
-            .map(Clone::clone)
-            .concat()
+        [&figures.alpha, &figures.margin, &figures.condition_number].map(Clone::clone).concat()
     };
-    for (own, file) in all(&own).into_iter().zip(all(&files)) {
-        assert!((own - file).abs() < 1e-6 * (1.0 + own.abs()), "in process {own}, through files {file}");
-    }
-    for (own, file) in own.parameters.iter().zip(&files.parameters) {
-        assert!((own - file).abs() < 1e-6, "in process {own}, through files {file}");
-    }
+    let apart = |own: &[f64], files: &[f64]| {
+        let pairs = own.iter().zip(files);
+        pairs.map(|(own, file)| (own - file).abs() / (1.0 + own.abs())).fold(0.0, f64::max)
+    };
+    let plans = apart(&all(&own), &all(&files));
+    let parameters = apart(&own.parameters, &files.parameters);
+    let misfits = apart(&own.misfit, &files.misfit);
+    println!("apart at most: plans {plans:e}, parameters {parameters:e}, misfits {misfits:e}");
+    // χ² is a square of small differences.
+    assert!(plans.max(parameters) < tolerance && misfits < 20.0 * tolerance);
     // And they are right.
     let (_, robot, _) = declared(&scene);
     let truth = robot.base().from_standard(&tree(&urdf(), false).inertial_parameters()).unwrap();
     let first = robot.base().from_standard(&tree(&believed(), false).inertial_parameters()).unwrap();
     let error = |w: &[f64]| w.iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
     println!("error {} from {}", error(&files.parameters), error(&first));
-    assert!(error(&files.parameters) < 0.3 * error(&first));
+    assert!(error(&files.parameters) < share * error(&first));
 }

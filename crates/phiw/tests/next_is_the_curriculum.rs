@@ -5,7 +5,7 @@ mod next_scene;
 mod synthetic;
 
 use next_scene::{JOINTS, Scene, tree, urdf};
-use phiw_curriculum::constraint::ZmpConstraint;
+use phiw_curriculum::constraint::{Certainty, FalseFalls, ZmpConstraint};
 use phiw_curriculum::end::FixedCount;
 use phiw_curriculum::motion::{Motion, MotionDataset};
 use phiw_curriculum::planner::Plan;
@@ -44,6 +44,8 @@ impl Experiment for Nobody {
 
 /// What `phiw next` knows by default of the error of a URDF.
 const URDF_ERROR: f64 = 0.3;
+/// What it is told of the link on the floor.
+const BASE_ERROR: f64 = 0.02;
 
 /// The plan of a curriculum that has these logs of the scene, standing on a sole of `size` times the scene's.
 fn curriculum_plan(scene: &Scene, logs: &[&str], size: f64) -> Result<Plan, CurriculumError> {
@@ -65,6 +67,7 @@ fn curriculum_plan(scene: &Scene, logs: &[&str], size: f64) -> Result<Plan, Curr
         };
         let all = evidence.last().unwrap().clone();
         let estimate = estimator.estimate(&design, &all, &initial, &initial.parameters(&robot)?)?;
+        run.certainty = Certainty::of(&robot, &estimate);
         run.model = initial.with_parameters(&robot, robot.declared(), &estimate.parameters)?;
         let candidates = MotionCandidates::new(&robot, robot.declared(), &dataset, &[1.0; JOINTS])?;
         for evidence in &evidence {
@@ -82,7 +85,11 @@ fn curriculum_plan(scene: &Scene, logs: &[&str], size: f64) -> Result<Plan, Curr
         candidates: &candidates,
         experiment: &Nobody,
         selection: &SmallestCondition,
-        constraint: &ZmpConstraint::new(stance),
+        constraint: &ZmpConstraint::new(stance).counting(FalseFalls {
+            belief_share: URDF_ERROR,
+            base_link_share: BASE_ERROR,
+            ..FalseFalls::default()
+        }),
         relaxation: &ConditionRelaxation::default(),
         estimator: &LeastSquares,
         growth: None,
@@ -137,6 +144,8 @@ fn record(condition_number: f64, model: &RobotModel) -> IterationRecord {
         forced: false,
         alpha: 0.0,
         margin_m: None,
+        sure_margin_m: None,
+        kept: None,
         fell_at_s: None,
         still_share: 1.0,
         tracking_error: Vec::new(),
@@ -157,7 +166,9 @@ fn the_choice_alpha_and_margin_are_the_same() {
         let plan = curriculum_plan(&scene, logs, 1.0).unwrap();
         let measured: String = logs.iter().map(|log| format!(" DIR/{log}")).collect();
         let measured = if logs.is_empty() { measured } else { format!("--measured{measured}") };
-        let more = format!("--support DIR/support.toml --declare viscous_friction {measured}");
+        let more = format!(
+            "--support DIR/support.toml --false-fall-rate 0.001 --base-error {BASE_ERROR} --declare viscous_friction {measured}"
+        );
         let (_, _, report) = scene.next(&more);
         let next = &report["next"];
         let number = |path: &str| next.pointer(path).and_then(Value::as_f64).unwrap();
@@ -178,6 +189,7 @@ fn the_choice_alpha_and_margin_are_the_same() {
         for (path, expected) in [
             ("/balance/alpha", plan.alpha),
             ("/balance/margin_m", plan.safety.margin_m),
+            ("/balance/sure_margin_m", plan.safety.sure_margin_m),
             ("/balance/largest_alpha", plan.safety.largest_reduction),
             ("/condition_number/after", merit),
         ] {
@@ -193,8 +205,7 @@ fn both_refuse_where_no_motion_keeps_the_balance() {
     // A sole of nine millimetres.
     let text = next_scene::SUPPORT.replace("0.22", "0.0044").replace("0.2,", "0.004,");
     std::fs::write(scene.path("support.toml"), text).unwrap();
-    let line =
-        "next --urdf DIR/robot.urdf --motions DIR/motions --out DIR/next.csv --support DIR/support.toml";
+    let line = "next --urdf DIR/robot.urdf --motions DIR/motions --out DIR/next.csv --support DIR/support.toml --false-fall-rate 0.001 --base-error 0.02";
     let (status, _, message) = scene.run(line);
     assert_eq!(status, 2);
     let refusal = curriculum_plan(&scene, &[], 0.02).unwrap_err();
@@ -221,7 +232,7 @@ fn a_first_log_that_leaves_parameters_undetermined_does_not_open_every_motion() 
     }
     (log.qd, log.qdd) = (None, None);
     log.write_csv(&scene.path("still.csv")).unwrap();
-    let support = "--support DIR/support.toml --declare viscous_friction --measured DIR/still.csv";
+    let support = "--support DIR/support.toml --false-fall-rate 0.001 --base-error 0.02 --declare viscous_friction --measured DIR/still.csv";
     let alpha = |logs: &str| {
         let (_, _, report) = scene.next(&format!("{support} {logs}"));
         (

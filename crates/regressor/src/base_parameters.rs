@@ -230,6 +230,43 @@ impl BaseParameters {
         Ok((0..self.count()).map(|row| solution[(row, 0)]).collect())
     }
 
+    /// The covariance of the standard parameters, row by row and symmetric, where these follow the base
+    /// parameters as in [`Self::to_standard`]: `of_base` is the covariance of those (`count` × `count`), and
+    /// what they leave open is as uncertain as `share` of the magnitudes of `reference` (the posterior of a
+    /// Gaussian belief of that size). A row and column of `of_base` that `determined` denies is that of the
+    /// belief itself; with none determined all is the belief's.
+    ///
+    /// # Errors
+    /// A size does not fit.
+    pub fn covariance_of_standard(
+        &self,
+        (of_base, determined): (MatRef<'_, f64>, &[bool]),
+        reference: &[f64],
+        share: f64,
+    ) -> Result<Mat<f64>, RegressorError> {
+        check_size("standard parameters", reference.len(), self.standard_size)?;
+        check_size("determined base parameters", determined.len(), self.count())?;
+        check_size("the covariance of base parameters", of_base.nrows().min(of_base.ncols()), self.count())?;
+        let scales = parameter_scales(reference);
+        let believed = |k: usize| (share * scales[k]).powi(2);
+        let weighted = self.weighted(reference);
+        let gram = &weighted * self.map.transpose();
+        // Of the belief: standard parameters on base parameters, and the base parameters' own covariance.
+        let follow = gram.full_piv_lu().solve(&weighted);
+        let of_base = Mat::from_fn(self.count(), self.count(), |row, column| {
+            match (determined[row], determined[column]) {
+                (true, true) => of_base[(row, column)],
+                (false, false) => share * share * gram[(row, column)],
+                _ => 0.0,
+            }
+        });
+        let known = follow.transpose() * (of_base - &gram * faer::Scale(share * share)) * &follow;
+        Ok(Mat::from_fn(self.standard_size, self.standard_size, |row, column| {
+            let own = if row == column { believed(row) } else { 0.0 };
+            own + 0.5 * (known[(row, column)] + known[(column, row)])
+        }))
+    }
+
     /// A belief about the standard parameters, as rows for a factor: each is `reference`, give or take
     /// `share` of [`parameter_scales`].
     ///

@@ -107,6 +107,44 @@ proptest! {
         assert_relative(&[dot(&pulled, &step)], &[dot(&gradient, &moved)], 1e-7);
     }
 
+    /// Standard parameters vary with the base parameters as these vary, and beside them as they were believed
+    /// to; where nothing is known all is the belief's.
+    #[test]
+    fn standard_parameters_are_as_uncertain_as_the_base_parameters_and_the_belief(
+        (tree, _, _) in trees(), share in 0.05..1.0, known in 0.01..0.5,
+    ) {
+        prop_assume!(!tree.has_mimic());
+        let base = BaseParameters::of_tree(&tree, BaseParametersOptions::default()).unwrap();
+        let reference = tree.inertial_parameters();
+        let (count, scales) = (base.count(), parameter_scales(&reference));
+        let own = faer::Mat::from_fn(count, count, |row, column| {
+            known * known * if row == column { 1.0 } else { 0.3 / (1.0 + (row + column) as f64) }
+        });
+        let covariance = |determined: bool| {
+            let determined = vec![determined; count];
+            base.covariance_of_standard((own.as_ref(), &determined), &reference, share).unwrap()
+        };
+        let (nothing, unfelt) = (covariance(false), base.unidentifiable());
+        let all = covariance(true);
+        let through = base.map() * &all * base.map().transpose();
+        let largest = scales.iter().fold(0.0_f64, |largest, scale| largest.max(share * scale).max(known)).powi(2);
+        for row in 0..count {
+            for column in 0..count {
+                prop_assert!((through[(row, column)] - own[(row, column)]).abs() < 1e-6 * largest);
+            }
+        }
+        for (row, scale) in scales.iter().enumerate() {
+            for column in 0..scales.len() {
+                let believed = if row == column { (share * scale).powi(2) } else { 0.0 };
+                prop_assert!((nothing[(row, column)] - believed).abs() < 1e-8 * largest);
+                // A parameter that no torque feels stays as it was.
+                if unfelt.contains(&row) {
+                    prop_assert!((all[(row, column)] - believed).abs() < 1e-8 * largest);
+                }
+            }
+        }
+    }
+
     /// A belief about standard parameters says of the base parameters what many draws of the standard ones
     /// say: the rows have mean zero and unit variance, independent of each other.
     #[test]

@@ -2,6 +2,7 @@
 #![warn(missing_docs)]
 
 mod controller;
+mod kept_balance;
 mod measuring;
 mod simulated_robot;
 mod standing_controller;

@@ -1,5 +1,6 @@
 //! A simulated robot that tries motions, over any backend.
 
+use crate::kept_balance::kept_balance;
 use crate::measuring::{KnownOfController, asked};
 use crate::{Controller, Measuring};
 use phiw_curriculum::motion::Motion;
@@ -8,6 +9,7 @@ use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
 use phiw_estimation::{Asked, KnownEffect, Logged, MotionLog, Robot, RobotModel};
 use phiw_identification::effect::JointProperty;
 use phiw_plant::{Friction, History, Plant, PlantEffect, PlantRun, PlantSetup, Sensors, Timing};
+use phiw_zmp::Stance;
 use rand::Rng;
 
 /// Makes a backend of the robot as it is built.
@@ -40,6 +42,8 @@ pub struct SimulatedRobot {
     pub timing: Timing,
     /// Tilt of its base at which it counts as fallen \[rad\].
     pub fall_tilt_rad: f64,
+    /// What a robot that is bolted down would stand on, for [`Trial::kept`]; none if nobody asks.
+    pub stance: Option<Stance>,
     /// When what it stands with counts as still.
     pub stillness: Stillness,
     /// Makes the backend.
@@ -102,6 +106,7 @@ impl SimulatedRobot {
             sensors: Sensors::exact(timing.control_period_s),
             timing,
             fall_tilt_rad: 0.3,
+            stance: None,
             stillness: Stillness::default(),
             build: Box::new(build),
         })
@@ -250,8 +255,13 @@ impl SimulatedRobot {
             true => MotionLog { asked: Some(self.asked(robot, model, motion, &measured)?), ..measured },
             false => measured,
         };
-        let tracking_error = run.tracking_error.clone();
-        Ok(Trial { measured, fell_at_s: run.fell_at_s, tracking_error })
+        let kept = |stance| kept_balance(&run.history, &self.tree, robot.base_link(), stance);
+        Ok(Trial {
+            measured,
+            fell_at_s: run.fell_at_s,
+            tracking_error: run.tracking_error.clone(),
+            kept: self.stance.as_ref().map(kept).transpose()?.flatten(),
+        })
     }
 }
 

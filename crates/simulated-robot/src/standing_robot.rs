@@ -70,6 +70,7 @@ impl Experiment for StandingRobot {
             measured: self.measured(&run.history, motion.duration_s(), &mut noise)?,
             fell_at_s: run.fell_at_s,
             tracking_error: run.tracking_error,
+            kept: None,
         })
     }
 }

@@ -72,7 +72,7 @@ fn what_is_no_motion_says_what_it_lacks() {
 
 #[test]
 fn five_percent_of_the_motions_pass_at_first() {
-    let safety = |reduction: f64| Safety { largest_reduction: reduction, margin_m: 0.0 };
+    let safety = |reduction: f64| Safety { largest_reduction: reduction, margin_m: 0.0, sure_margin_m: 0.0 };
     let motions: Vec<Safety> = (0..98).map(|index| safety(f64::from(index) / 100.0)).collect();
     let alpha = ConditionRelaxation::default().first(&motions);
     assert_eq!(motions.iter().filter(|safety| safety.largest_reduction >= alpha).count(), 5);
@@ -170,6 +170,8 @@ fn record(cond: f64, change: f64) -> IterationRecord {
         forced: false,
         alpha: 0.5,
         margin_m: None,
+        sure_margin_m: None,
+        kept: None,
         fell_at_s: None,
         still_share: 1.0,
         tracking_error: Vec::new(),
@@ -231,6 +233,7 @@ fn the_controller_s_torque_is_that_of_the_model() {
         sensors: phiw_plant::Sensors::exact(0.01),
         timing: phiw_plant::Timing { settle_s: 0.0, ..Default::default() },
         fall_tilt_rad: 0.3,
+        stance: None,
         stillness: Default::default(),
         noise_correlation: 0.0,
         measuring: Default::default(),

@@ -3,7 +3,7 @@
 mod arm;
 
 use arm::Arm;
-use phiw_curriculum::constraint::{Constraint, Safety};
+use phiw_curriculum::constraint::{Believed, Constraint, Safety};
 use phiw_curriculum::end::{EndReason, FixedCount};
 use phiw_curriculum::motion::Motion;
 use phiw_curriculum::relaxation::{ConditionRelaxation, Learnt, Maximum, Relaxation};
@@ -134,9 +134,9 @@ impl Constraint for Numbered {
     fn name(&self) -> &'static str {
         "numbered"
     }
-    fn safety(&self, _: &Robot, _: &RobotModel, motion: &Motion) -> Result<Safety, CurriculumError> {
+    fn safety(&self, _: &Robot, _: &Believed<'_>, motion: &Motion) -> Result<Safety, CurriculumError> {
         let number: f64 = motion.name.trim_start_matches("sine_").parse().unwrap();
-        Ok(Safety { largest_reduction: 0.1 * number + 1e-9, margin_m: 0.0 })
+        Ok(Safety { largest_reduction: 0.1 * number + 1e-9, margin_m: 0.0, sure_margin_m: 0.0 })
     }
 }
 

@@ -146,3 +146,37 @@ fn a_reference_is_sampled_where_it_is_asked() {
     assert!(Motion::of_reference("line", "", 2, (1, 0.1), line).is_err());
     assert_eq!(Timing::default().control_period_s, 0.01, "what the tests above take for the control period");
 }
+
+/// What a force plate under the base sees of a motion that is followed exactly is the reference's own ZMP.
+#[test]
+fn the_balance_that_was_kept_is_that_of_the_motion() {
+    let arm = Arm::new(0.0);
+    let link = [30.0, 0.3, -0.2, 6.0, 2.0, 0.0, 2.0, 0.0, 0.0, 1.0];
+    let robot = Robot::with_viscous_friction(arm.tree.clone(), link, Catalogue::default()).unwrap();
+    let standing = phiw_zmp::standing_parameters(&link, &arm.truth.standard);
+    let stance = |shift: f64| {
+        let corners = [[0.1, 0.1], [-0.1, 0.1], [-0.1, -0.1], [0.1, -0.1]].map(|[x, y]| [x + shift, y]);
+        let polygon = phiw_zmp::SupportPolygon::from_points(&corners).unwrap();
+        phiw_zmp::Stance::new(polygon, [shift, 0.0], 0.0).unwrap()
+    };
+    let motion = &arm.dataset.motions()[2];
+    for shift in [0.0, 0.08, 5.0] {
+        let stance = stance(shift);
+        let experiment = SimulatedRobot { stance: Some(stance.clone()), ..arm.experiment() };
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let kept = experiment.perform(&robot, &arm.truth, motion, &mut rng).unwrap().kept.unwrap();
+        let samples = (0..motion.samples()).map(|sample| motion.sample(sample));
+        let mut workspace = phiw_zmp::ZmpWorkspace::new(&arm.tree);
+        let balance =
+            phiw_zmp::MotionBalance::of_motion(&arm.tree, &standing, &stance, samples, &mut workspace)
+                .unwrap();
+        println!("{kept:?} {}", balance.multi_body.margin);
+        let margin = kept.margin_m.unwrap();
+        assert!((margin - balance.multi_body.margin).abs() < 3e-3, "{kept:?} {balance:?}");
+        // A mean leaves out what is short.
+        assert!(kept.tipping_margin_m >= margin - 1e-3);
+        assert_eq!(kept.outside_share > 0.0, margin < 0.0);
+    }
+    let without = arm.experiment().perform(&robot, &arm.truth, motion, &mut ChaCha8Rng::seed_from_u64(1));
+    assert_eq!(without.unwrap().kept, None);
+}

@@ -98,6 +98,7 @@ impl Humanoid {
             sensors: phiw_plant::Sensors::exact(1e-3),
             timing: Timing { control_period_s: 1e-3, longest_step_s: 5e-4, settle_s: 1.0 },
             fall_tilt_rad: 0.3,
+            stance: None,
             stillness: Default::default(),
             noise_correlation: 0.0,
             measuring: Default::default(),

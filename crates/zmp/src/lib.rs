@@ -18,6 +18,6 @@ pub use error::SupportError;
 pub use feet::{FeetError, feet_from_toml};
 pub use motion_balance::{MotionBalance, Stance, WorstZmp};
 pub use rows::{BalanceRows, standard_deviation};
-pub use support_polygon::{NearestEdge, SupportPolygon};
+pub use support_polygon::{NearestEdge, SupportPolygon, SureMargin};
 pub use workspace::{ZmpWorkspace, standing_parameters};
 pub use zero_moment_point::{ZmpModel, multi_body_zmp, point_mass_zmp};

@@ -192,6 +192,46 @@ impl SupportPolygon {
         };
         1.0 - self.edges().map(share).fold(0.0, f64::max)
     }
+
+    /// [`SupportPolygon::signed_margin`] and [`SupportPolygon::largest_reduction`] of a point that is not
+    /// known exactly: from the distance to each edge `deviations` of its standard deviations across that edge
+    /// are taken. `covariance` is that of x and y \[m²\]: xx, xy, yy.
+    ///
+    /// Outside of the polygon the margin is that to the line of the edge that is furthest off, which is never
+    /// more than the distance to the border. A covariance that is not a number leaves no margin.
+    pub fn sure_margin(
+        &self,
+        zmp: [f64; 2],
+        [xx, xy, yy]: [f64; 3],
+        deviations: f64,
+        about: [f64; 2],
+    ) -> SureMargin {
+        let mut sure = SureMargin { margin: f64::INFINITY, largest_reduction: 1.0 };
+        for (corner, _, [x, y]) in self.edges() {
+            let variance = x * x * xx + 2.0 * x * y * xy + y * y * yy;
+            let reach = deviations * variance.max(0.0).sqrt();
+            let reach = if variance.is_nan() { f64::INFINITY } else { reach };
+            let way = (beyond(about, [x, y], zmp) + reach).max(0.0);
+            let whole = beyond(about, [x, y], corner);
+            let share = match way {
+                0.0 => 0.0,
+                way if whole > 0.0 => way / whole,
+                _ => f64::INFINITY,
+            };
+            sure.margin = sure.margin.min(-beyond(corner, [x, y], zmp) - reach);
+            sure.largest_reduction = sure.largest_reduction.min(1.0 - share);
+        }
+        sure
+    }
+}
+
+/// How far inside a polygon a point is that is not known exactly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SureMargin {
+    /// What is left of the margin \[m\]; −∞ where nothing is known of the point.
+    pub margin: f64,
+    /// The largest α at which the reduced polygon still has room for it; negative where the whole has not.
+    pub largest_reduction: f64,
 }
 
 /// How far the point is beyond the line through `corner` \[m\].

@@ -250,3 +250,38 @@ fn reductions_that_mean_nothing_are_refused() {
     assert_eq!(polygon.reduced(0.5, [1.0, 0.0]).unwrap_err().to_string(), message);
     assert_eq!(Stance::new(polygon, [1.0, 0.0], 0.0).unwrap_err().to_string(), message);
 }
+
+/// The same as without an uncertainty where there is none; and with one, what a circle or an ellipse of points
+/// about the ZMP leaves.
+#[test]
+fn a_sure_margin_has_room_for_the_ellipse_of_what_is_not_known() {
+    let polygon = SupportPolygon::from_points(&SOLE).unwrap();
+    let about = [0.02, 0.01];
+    for zmp in [[0.0, 0.0], [0.12, -0.1], [0.02, 0.17]] {
+        let sure = polygon.sure_margin(zmp, [0.0; 3], 3.0, about);
+        assert!((sure.margin - polygon.signed_margin(zmp)).abs() < 1e-12);
+        assert!((sure.largest_reduction - polygon.largest_reduction(zmp, about)).abs() < 1e-12);
+        // An ellipse with half axes of 2·0.01 m and 2·0.002 m, turned by 0.5 rad.
+        let (long, short, turn) = (0.01_f64, 0.002_f64, 0.5_f64);
+        let (sine, cosine) = turn.sin_cos();
+        let xx = (long * cosine).powi(2) + (short * sine).powi(2);
+        let yy = (long * sine).powi(2) + (short * cosine).powi(2);
+        let xy = (long * long - short * short) * sine * cosine;
+        let sure = polygon.sure_margin(zmp, [xx, xy, yy], 2.0, about);
+        let points = (0..36_000).map(|k| {
+            let (s, c) = (f64::from(k) * std::f64::consts::TAU / 36_000.0).sin_cos();
+            let [along, across] = [2.0 * long * c, 2.0 * short * s];
+            [zmp[0] + along * cosine - across * sine, zmp[1] + along * sine + across * cosine]
+        });
+        let (mut margin, mut reduction) = (f64::INFINITY, f64::INFINITY);
+        for point in points {
+            margin = margin.min(polygon.signed_margin(point));
+            reduction = reduction.min(polygon.largest_reduction(point, about));
+        }
+        assert!((sure.margin - margin).abs() < 1e-7, "{} {margin}", sure.margin);
+        assert!((sure.largest_reduction - reduction).abs() < 1e-6);
+    }
+    // Nothing known of the point leaves nothing.
+    let nothing = polygon.sure_margin([0.0; 2], [f64::INFINITY, 0.0, f64::NAN], 1.0, about);
+    assert_eq!([nothing.margin, nothing.largest_reduction], [f64::NEG_INFINITY; 2]);
+}

@@ -1,6 +1,7 @@
 //! Motions to choose from: the robot's motion dataset (Q₁ʳ, …, Q_Kʳ).
 
 mod limits;
+mod slower;
 mod steps;
 
 pub use limits::{Excess, MotionLimits, Unrest};
@@ -38,6 +39,8 @@ pub struct Motion {
     pub name: String,
     /// What is done in it, such as the names of the paper's Table 1; may be empty.
     pub task: String,
+    /// How many times slower it is than the motion that it was made of; 1 for one as it was recorded.
+    pub times_slower: f64,
     period_s: f64,
     joints: usize,
     /// Positions, velocities and accelerations, row-major `[sample × joints]`.
@@ -74,7 +77,14 @@ impl Motion {
             let sample = place % length / joints;
             return Err(wrong(format!("sample {sample} has a number that is not finite: fill gaps first")));
         }
-        Ok(Motion { name: name.to_owned(), task: task.to_owned(), period_s, joints, signals })
+        Ok(Motion {
+            name: name.to_owned(),
+            task: task.to_owned(),
+            times_slower: 1.0,
+            period_s,
+            joints,
+            signals,
+        })
     }
 
     /// The first `samples` samples of a reference, one every `period_s` \[s\]. `reference` writes positions

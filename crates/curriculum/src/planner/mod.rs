@@ -1,10 +1,11 @@
 //! Lines 11 and 12 of Algorithm 1: what to do next, from what is believed and what has been measured.
 
 mod permission;
+mod safer;
 
 pub use permission::{NoneAllowed, Permission, permission};
 
-use crate::constraint::{Constraint, Safety};
+use crate::constraint::{Believed, Certainty, Constraint, Safety};
 use crate::growth::Rivalry;
 use crate::motion::MotionDataset;
 use crate::random::{Purpose, random};
@@ -24,6 +25,8 @@ pub struct Belief<'a> {
     pub candidates: &'a MotionCandidates,
     /// What is believed now. The constraint judges motions by it.
     pub model: &'a RobotModel,
+    /// How sure that is; none where nothing has been measured. A constraint that counts uncertainty asks.
+    pub certainty: Option<&'a Certainty>,
     /// What was believed before anything was measured. α of the first iteration follows from it.
     pub initial: &'a RobotModel,
     /// Two beliefs that the motion has to distinguish; none if it is chosen for the parameters.
@@ -99,18 +102,30 @@ pub fn plan(
     policy: &Policy<'_>,
 ) -> Result<Plan, CurriculumError> {
     let Belief { robot, dataset, .. } = *belief;
-    let safety = policy.constraint.all(robot, belief.model, dataset)?;
+    let believed = Believed { model: belief.model, certainty: belief.certainty };
+    let safety = policy.constraint.all(robot, &believed, dataset)?;
     let first_alpha = match measured.first_alpha {
         Some(alpha) => alpha,
         None if belief.initial == belief.model => policy.relaxation.first(&safety),
-        None => policy.relaxation.first(&policy.constraint.all(robot, belief.initial, dataset)?),
+        None => {
+            let initial = Believed::unmeasured(belief.initial);
+            policy.relaxation.first(&policy.constraint.all(robot, &initial, dataset)?)
+        }
     };
     let learnt = Learnt::of(first_alpha, measured.condition_numbers, measured.torque_uncertainties);
     let alpha = learnt.map_or(first_alpha, |learnt| policy.relaxation.next(&learnt));
     let (allowed, forced) = match permission(&safety, measured.excluded, alpha, policy.none_allowed) {
         Permission::Allowed(motions) => (motions, false),
         Permission::Forced(safest) => (vec![safest], true),
-        Permission::Refused(safest) => return Err(refusal(dataset, &safety, safest)),
+        Permission::Refused(Some(safest)) => {
+            return Err(CurriculumError::NothingSafe {
+                motions: dataset.len(),
+                safest: dataset.motions()[safest].name.clone(),
+                outside_m: -safety[safest].sure_margin_m,
+                safer: safer::in_words(policy.constraint, robot, &believed, (dataset, &safety))?,
+            });
+        }
+        Permission::Refused(None) => return Err(CurriculumError::FellOnAll { motions: dataset.len() }),
     };
     let (choice, separates) = match belief.rivalry {
         Some(rivalry) => (separating(belief, rivalry, &allowed, policy)?, Some(rivalry.names())),
@@ -128,17 +143,6 @@ pub fn plan(
     };
     let safety = safety[choice.motion];
     Ok(Plan { choice, separates, allowed, forced, alpha, first_alpha, safety })
-}
-
-fn refusal(dataset: &MotionDataset, safety: &[Safety], safest: Option<usize>) -> CurriculumError {
-    match safest {
-        Some(safest) => CurriculumError::NothingSafe {
-            motions: dataset.len(),
-            safest: dataset.motions()[safest].name.clone(),
-            outside_m: -safety[safest].margin_m,
-        },
-        None => CurriculumError::FellOnAll { motions: dataset.len() },
-    }
 }
 
 /// The motion on which two rivals differ most, torques counted by their limits.

@@ -90,6 +90,15 @@ pub struct RunArguments {
     /// Who looks for what the model lacks, where the loop is closed.
     #[arg(long, default_value = "score")]
     pub detector: Detector,
+    /// Count what is not known in the constraint: so often may a motion that it allows leave the support, and
+    /// where it allows none nothing is run. Without it, the method decides: 0.001 for ours, else uncertainty
+    /// does not count, and the least violation is run.
+    #[arg(long, value_name = "RATE")]
+    pub false_fall_rate: Option<f64>,
+    /// Slower versions of all motions beside them, so many times slower. Without it, the method decides: 2
+    /// for ours, else none.
+    #[arg(long, value_name = "TIMES,…", value_delimiter = ',')]
+    pub slower: Vec<f64>,
     /// A whole method: the paper's as it is printed, or ours for a robot that nobody knows. It decides
     /// estimator, constants of α and sensors.
     #[arg(long = "as", value_name = "METHOD", conflicts_with_all = ["estimator", "prior", "relaxation"])]

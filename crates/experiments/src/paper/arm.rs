@@ -56,8 +56,10 @@ impl Arm {
     pub fn selection(self, dataset: &MotionDataset, tasks: &[String; 2]) -> Box<dyn Selection> {
         let of_task = |task: &String| {
             let motions = dataset.motions().iter().enumerate();
-            let members =
-                motions.filter(|(_, motion)| motion.task == *task).map(|(index, _)| index).collect();
+            let members = motions
+                .filter(|(_, motion)| motion.task == *task && motion.times_slower == 1.0)
+                .map(|(index, _)| index)
+                .collect();
             Box::new(OfTask { members })
         };
         match self {

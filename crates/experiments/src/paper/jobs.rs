@@ -7,9 +7,8 @@ use super::setup::{Setup, Validation};
 use super::subject::SubjectName;
 use crate::plant::engine::Engine;
 use crate::plant::secret::SecretKind;
-use phiw_curriculum::end::FixedCount;
-use phiw_curriculum::planner::NoneAllowed;
-use phiw_curriculum::{Curriculum, CurriculumRun, CurriculumSettings, unreliable_model};
+use phiw_curriculum::end::{EndReason, FixedCount};
+use phiw_curriculum::{Curriculum, CurriculumError, CurriculumRun, CurriculumSettings, unreliable_model};
 use phiw_estimation::RowsAt;
 use phiw_plant::PlantEffect;
 use rayon::prelude::*;
@@ -138,10 +137,7 @@ impl Job {
             growth: (self.arm == Arm::Closed).then_some(growth.as_ref()),
             end: &FixedCount(setup.settings.iterations),
             rows_at: RowsAt::Periods,
-            settings: CurriculumSettings {
-                none_allowed: NoneAllowed::LeastViolation,
-                ..CurriculumSettings::default()
-            },
+            settings: CurriculumSettings { none_allowed: setup.none_allowed(), ..Default::default() },
         };
         while file.run.ended.is_none() {
             if left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_err() {
@@ -150,14 +146,24 @@ impl Job {
             if self.representative {
                 file.details.extend(setup.detail(&curriculum, &file.run)?);
             }
-            curriculum.step(&mut file.run)?;
             if file.scores.is_empty() {
                 file.scores.push(setup.score(&file.run.initial, None, validation)?);
             }
-            file.scores.push(setup.score(&file.run.model, file.run.evidence.as_ref(), validation)?);
+            match curriculum.step(&mut file.run) {
+                // Nothing is run, and what was believed stays.
+                Err(CurriculumError::NothingSafe { .. } | CurriculumError::FellOnAll { .. }) => {
+                    file.run.ended = Some(EndReason::NothingAllowed);
+                }
+                step => step?,
+            }
+            let score = setup.score(&file.run.model, file.run.evidence.as_ref(), validation)?;
+            let last = file.run.ended == Some(EndReason::NothingAllowed);
+            let scores = if last { setup.settings.iterations + 1 } else { file.scores.len() + 1 };
+            file.scores.resize(scores, score);
             if file.run.ended.is_some() {
                 file.detection = setup.detection(&file)?;
                 file.run.evidence = None;
+                file.run.certainty = None;
                 file.run.logs.clear();
                 file.run.rivals.clear();
             }

@@ -6,6 +6,8 @@ use super::ending::Savings;
 use super::reliability;
 use super::report::Results;
 use super::run_file::RunFile;
+use phiw_curriculum::KeptBalance;
+use phiw_curriculum::end::EndReason;
 use phiw_identification::accuracy::{Reliability, ReliabilityCriterion};
 use phiw_report::statistics::median;
 
@@ -24,6 +26,7 @@ pub fn rows(results: &Results) -> Vec<[String; 4]> {
     table.choices();
     table.torques();
     table.durations();
+    table.kept();
     for arm in [Curriculum, Random, TorqueOptimal, Greedy] {
         table.standing(arm);
     }
@@ -175,6 +178,42 @@ impl Table<'_> {
             measured_s.join(", "),
             "errors fall with the time that is measured, and tasks differ in how long they take",
         );
+    }
+
+    /// How often the constraint allowed nothing, and how the balance was kept on a base that is bolted down.
+    fn kept(&mut self) {
+        let (results, home) = (self.results, self.home);
+        for arm in [Curriculum, TaskA, TaskB].into_iter().chain(self.others()) {
+            let runs: Vec<&RunFile> = results.of(home, arm).collect();
+            let history = || runs.iter().flat_map(|run| &run.run.history);
+            let forced = history().filter(|record| record.forced).count();
+            let refused = runs.iter().filter(|run| run.run.ended == Some(EndReason::NothingAllowed)).count();
+            if results.has(home, arm) {
+                self.row(
+                    &format!(
+                        "{}: iterations that were forced, and runs that ended since nothing was allowed",
+                        arm.name()
+                    ),
+                    "none reported",
+                    format!("{forced} of {}, {refused} of {}", history().count(), runs.len()),
+                    "forced: the constraint allows no motion, and the one that violates it least is run",
+                );
+            }
+            let kept: Vec<&KeptBalance> = history().filter_map(|record| record.kept.as_ref()).collect();
+            if !kept.is_empty() {
+                let outside =
+                    kept.iter().filter(|kept| kept.margin_m.is_none_or(|margin| margin < 0.0)).count();
+                let tipping = kept.iter().filter(|kept| kept.tipping_margin_m < 0.0).count();
+                let time =
+                    kept.iter().map(|kept| 100.0 * kept.outside_share).sum::<f64>() / kept.len() as f64;
+                self.row(
+                    &format!("{}: motions whose true ZMP left the support at an instant; in its mean over a fall's time; share of the time outside [%]", arm.name()),
+                    "none reported",
+                    format!("{outside}, {tipping} of {}; {time:.1}", kept.len()),
+                    "the base is bolted down; the noise of the torques shakes the ZMP at every instant",
+                );
+            }
+        }
     }
 
     /// The runs of an arm on a base that may topple, if there are any.

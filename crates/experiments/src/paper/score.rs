@@ -2,7 +2,7 @@
 
 use super::setup::{Setup, Validation};
 use phiw_curriculum::selection::Question;
-use phiw_curriculum::{Curriculum, CurriculumRun};
+use phiw_curriculum::{Curriculum, CurriculumError, CurriculumRun};
 use phiw_estimation::{
     EstimationError, Estimator, Evidence, LeastSquares, MotionLog, RobotModel, RowsAt, WeightedLeastSquares,
 };
@@ -99,7 +99,11 @@ impl Setup {
     /// # Errors
     /// The run is not of this robot.
     pub fn detail(&self, curriculum: &Curriculum<'_>, run: &CurriculumRun) -> anyhow::Result<Option<Detail>> {
-        let Some(plan) = curriculum.plan(run)? else { return Ok(None) };
+        let plan = match curriculum.plan(run) {
+            Err(CurriculumError::NothingSafe { .. } | CurriculumError::FellOnAll { .. }) => return Ok(None),
+            plan => plan?,
+        };
+        let Some(plan) = plan else { return Ok(None) };
         let measured = curriculum.measured(run)?;
         let question = Question {
             dataset: curriculum.dataset,

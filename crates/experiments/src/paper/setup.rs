@@ -16,6 +16,7 @@ use phiw::console::Console;
 use phiw_curriculum::Experiment;
 use phiw_curriculum::constraint::ZmpConstraint;
 use phiw_curriculum::motion::{Motion, MotionDataset};
+use phiw_curriculum::planner::NoneAllowed;
 use phiw_curriculum::relaxation::Relaxation;
 use phiw_curriculum::selection::MotionCandidates;
 use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
@@ -88,6 +89,12 @@ pub struct Settings {
     /// What the estimate falls back on.
     #[serde(default)]
     pub prior: PriorName,
+    /// The rate of false falls that the constraint is asked for; none where uncertainty does not count.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub false_fall_rate: Option<f64>,
+    /// How many times slower motions are done beside those as they were recorded.
+    #[serde(default)]
+    pub slower: Vec<f64>,
     /// What α follows.
     #[serde(default)]
     pub relaxation: RelaxationName,
@@ -153,7 +160,8 @@ impl Setup {
     /// Something is not there or does not read.
     pub fn new(arguments: &RunArguments, out: &Path, console: &Console) -> anyhow::Result<Self> {
         let timing = timing(arguments.backend);
-        let subject = Subject::read(arguments.robot, timing.control_period_s)?;
+        let subject = Subject::read(arguments.robot, timing.control_period_s)?
+            .with_rotors((arguments.robot, arguments.method), timing.control_period_s)?;
         match subject.standing {
             Some(_) => ensure!(
                 arguments.secret.is_empty(),
@@ -170,12 +178,15 @@ impl Setup {
                 Motions::retargeted(source, arguments.per_task, &subject, &folder, console)?
             }
         };
+        let slower = method::slower(arguments, &subject);
         let dataset = MotionDataset::new(subject.tree.joint_count(), motions.identification)?;
+        let dataset = dataset.with_slower(&slower)?;
         let weights = subject.row_weights(if arguments.noise > 0.0 { arguments.noise } else { NOISELESS });
         let candidates = MotionCandidates::new(&robot, robot.declared(), &dataset, &weights)?;
         let (prior, relaxation) = method::method(arguments, &subject);
         let relaxation_of_alpha = method::relaxation(relaxation, arguments.method);
-        let constraint = ZmpConstraint::of_the_paper(subject.stance.clone());
+        let false_fall_rate = method::false_fall_rate(arguments, &subject);
+        let constraint = method::constraint(&subject.stance, false_fall_rate);
         let settings = Settings {
             backend: format!("{:?}", arguments.backend).to_lowercase(),
             robot: arguments.robot,
@@ -197,6 +208,8 @@ impl Setup {
             method: arguments.method,
             estimator: arguments.estimator(),
             prior,
+            false_fall_rate,
+            slower,
             relaxation,
             detector: arguments.detector,
             noise: arguments.noise,
@@ -231,6 +244,14 @@ impl Setup {
         let logs = self.validation_logs(backend, secret)?;
         let declared = self.validation_of(&self.truth, &logs)?;
         Ok(Validation { logs, declared })
+    }
+
+    /// What happens where no motion is allowed: where uncertainty counts, nothing.
+    pub fn none_allowed(&self) -> NoneAllowed {
+        match self.settings.false_fall_rate {
+            Some(_) => NoneAllowed::Refuse,
+            None => NoneAllowed::LeastViolation,
+        }
     }
 
     /// Where motions are tried: the robot in an engine with noise, and with what is in it that nobody
@@ -276,6 +297,7 @@ impl Setup {
             sensors: Sensors::exact(timing(backend).control_period_s),
             timing: timing(backend),
             fall_tilt_rad: 0.3,
+            stance: (!standing).then(|| self.subject.stance.clone()),
             stillness: Default::default(),
             noise_correlation: 0.0,
             measuring: Default::default(),

@@ -1,5 +1,6 @@
 //! The robot under test: what is true of it, and what is declared.
 
+use super::arguments::Method;
 use super::whole_body::{self, Standing};
 use crate::environment;
 use anyhow::Context;
@@ -8,6 +9,7 @@ use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
 use phiw_dynamics::{Foot, Tree, World};
 use phiw_effects::Catalogue;
 use phiw_estimation::{Robot, RobotModel};
+use phiw_identification::EffectSpec;
 use phiw_plant::{Friction, GainSettings, Gains, PlantEffect, apparent_inertia};
 use phiw_zmp::{Stance, SupportPolygon, feet_from_toml};
 use serde::{Deserialize, Serialize};
@@ -33,6 +35,8 @@ const HELD: [&str; 2] = ["torso/joint_3", "head/joint_1"];
 pub const VISCOUS_SHARE: f64 = 0.02;
 /// The fastest that a joint is taken to be [rad/s]; the Torobo's file has placeholders.
 pub const FASTEST: f64 = 4.0;
+/// Inertia of each rotor of the Torobo \[kg·m²\], as its file says in words since a URDF has no place for it.
+const TOROBO_ARMATURE: f64 = 0.1;
 /// Base of the Torobo: mass \[kg\], half a side of its square sole and height of its centre \[m\].
 const BASE: [f64; 3] = [25.0, 0.2, 0.2];
 
@@ -54,6 +58,10 @@ pub struct Subject {
     pub base_link: InertialParameters,
     /// Coefficients of viscous friction \[N·m·s/rad\].
     pub viscous: Vec<f64>,
+    /// Inertia of each rotor at its joint \[kg·m²\]; empty where nobody says. The plant has it.
+    pub rotor_inertia: Vec<f64>,
+    /// Whether it is declared.
+    pub declares_rotors: bool,
     /// K_p and K_d.
     pub gains: Gains,
     /// Its legs on the floor, for a robot with legs. `tree` then has virtual joints for the base; `viscous`
@@ -111,7 +119,39 @@ impl Subject {
             .collect();
         let gains = arm_gains(&tree, &viscous, control_period_s)?;
         let base_link = floating.bodies()[0].inertial;
-        Ok(Subject { urdf, hold, tree, floating, feet, stance, base_link, viscous, gains, standing: None })
+        let (rotor_inertia, declares_rotors, standing) = (Vec::new(), false, None);
+        Ok(Subject {
+            urdf,
+            hold,
+            tree,
+            floating,
+            feet,
+            stance,
+            base_link,
+            viscous,
+            rotor_inertia,
+            declares_rotors,
+            gains,
+            standing,
+        })
+    }
+
+    /// The same with the rotors that the robot's file knows of, in a whole method: the paper's has no column
+    /// for them.
+    ///
+    /// # Errors
+    /// None that a robot that was read can cause.
+    pub fn with_rotors(
+        self,
+        (name, method): (SubjectName, Option<Method>),
+        control_period_s: f64,
+    ) -> anyhow::Result<Self> {
+        let (SubjectName::Torobo, Some(method)) = (name, method) else { return Ok(self) };
+        let rotor_inertia = vec![TOROBO_ARMATURE; self.tree.joint_count()];
+        let inertia = apparent_inertia(&self.tree, &rotor_inertia, &self.tree.neutral_configuration())?;
+        let settings = GainSettings::default();
+        let gains = Gains::held(&self.tree, &inertia, &self.viscous, control_period_s, &settings)?;
+        Ok(Subject { rotor_inertia, declares_rotors: method == Method::Ours, gains, ..self })
     }
 
     /// What is declared.
@@ -122,7 +162,16 @@ impl Subject {
         match &self.standing {
             Some(standing) => standing.robot(),
             None => {
-                Ok(Robot::with_viscous_friction(self.tree.clone(), self.base_link, Catalogue::default())?)
+                let kinds = match self.declares_rotors {
+                    true => &["viscous_friction", "rotor_inertia"][..],
+                    false => &["viscous_friction"],
+                };
+                let joints: Vec<&str> = self.tree.joint_names().collect();
+                let of_kind = |kind: &&str| -> Vec<EffectSpec> {
+                    joints.iter().map(|joint| EffectSpec::new(kind, &[*joint])).collect()
+                };
+                let declared = kinds.iter().flat_map(of_kind).collect();
+                Ok(Robot::new(self.tree.clone(), self.base_link, declared, Catalogue::default())?)
             }
         }
     }
@@ -132,16 +181,19 @@ impl Subject {
     /// # Errors
     /// As above.
     pub fn truth(&self, robot: &Robot) -> anyhow::Result<RobotModel> {
-        Ok(robot.truth(&self.viscous)?)
+        let rotors = if self.declares_rotors { self.rotor_inertia.as_slice() } else { &[] };
+        Ok(robot.truth(&[&self.viscous, rotors].concat())?)
     }
 
-    /// The frictions, in the plant.
+    /// The frictions and the rotors, in the plant.
     pub fn frictions(&self) -> Vec<PlantEffect> {
         let friction = |(joint, &coefficient): (usize, &f64)| PlantEffect::Friction {
             joint,
             law: Friction::Viscous { coefficient },
         };
-        self.viscous.iter().enumerate().map(friction).collect()
+        let rotor = |(joint, &inertia): (usize, &f64)| PlantEffect::RotorInertia { joint, inertia };
+        let rotors = self.rotor_inertia.iter().enumerate().map(rotor);
+        self.viscous.iter().enumerate().map(friction).chain(rotors).collect()
     }
 
     /// The floor, for a robot that stands on it.

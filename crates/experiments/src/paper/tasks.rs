@@ -1,6 +1,6 @@
 //! The two tasks of the task-specific models.
 
-use phiw_curriculum::constraint::Constraint;
+use phiw_curriculum::constraint::{Believed, Constraint};
 use phiw_curriculum::motion::MotionDataset;
 use phiw_curriculum::relaxation::Relaxation;
 use phiw_curriculum::{CurriculumError, unreliable_model};
@@ -28,7 +28,7 @@ pub fn two_tasks(
         return Ok(["open", "scoop"].map(str::to_owned));
     }
     for seed in 0..INITIAL_MODELS {
-        let safety = constraint.all(robot, &unreliable_model(truth, seed), dataset)?;
+        let safety = constraint.all(robot, &Believed::unmeasured(&unreliable_model(truth, seed)), dataset)?;
         let alpha = relaxation.first(&safety);
         let motions = dataset.motions().iter().zip(&safety);
         for (motion, _) in motions.filter(|(_, safety)| safety.largest_reduction >= alpha) {

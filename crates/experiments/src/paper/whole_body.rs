@@ -95,6 +95,8 @@ pub fn subject() -> anyhow::Result<Subject> {
         stance,
         base_link: [0.0; PARAMETERS_PER_BODY],
         viscous,
+        rotor_inertia: Vec::new(),
+        declares_rotors: false,
         gains,
         standing: Some(standing),
     })
@@ -186,6 +188,7 @@ impl Subject {
                 ..Timing::default()
             },
             fall_tilt_rad: 0.3,
+            stance: None,
             stillness: Default::default(),
             noise_correlation: 0.0,
             measuring: Default::default(),

@@ -109,6 +109,8 @@ fn arguments(backend: Engine, out: &Path) -> RunArguments {
         control: 0,
         // At this noise the residual has a colour, and a trace needs one effect where a score test takes two.
         detector: Detector::Trace,
+        false_fall_rate: None,
+        slower: Vec::new(),
         method: None,
         estimator: EstimatorName::Likelihood,
         prior: None,

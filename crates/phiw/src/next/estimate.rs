@@ -7,6 +7,7 @@ use crate::arguments::{NextArguments, NextEstimator};
 use crate::model_file::ModelFile;
 use crate::session::Session;
 use phiw_curriculum::CurriculumError;
+use phiw_curriculum::constraint::Certainty;
 use phiw_curriculum::selection::{MotionCandidates, Triangle};
 use phiw_dynamics::Tree;
 use phiw_dynamics::inertia::InertialParameters;
@@ -54,6 +55,8 @@ pub struct Present {
     pub estimate: Estimate,
     /// The present belief.
     pub model: RobotModel,
+    /// How sure that is.
+    pub certainty: Option<Certainty>,
     /// What each motion would tell.
     pub candidates: MotionCandidates,
     /// R of all that has been measured, in the columns of the candidates; none if no log is given.
@@ -126,6 +129,7 @@ impl Present {
         let measured = measured.map(|measured| (measured.after_each.len(), measured.seconds));
         Ok(Present {
             source,
+            certainty: Certainty::of(&robot, &estimate),
             robot,
             design,
             prior,

@@ -18,10 +18,22 @@ const STANDING_STILL: f64 = 1e-3;
 pub struct Motions {
     /// The motions, by name.
     pub dataset: MotionDataset,
-    /// Their files, in the same order.
+    /// Their files, in the same order; slower versions come after all of them, in the same order again.
     pub files: Vec<PathBuf>,
     /// What signals they have.
     pub ranges: SignalRanges,
+}
+
+impl Motions {
+    /// The same with slower versions of all motions after them.
+    pub fn with_slower(self, times: &[f64]) -> Result<Self, Error> {
+        Ok(Motions { dataset: self.dataset.with_slower(times)?, ..self })
+    }
+
+    /// The file that a motion of the dataset comes from.
+    pub fn file(&self, motion: usize) -> &Path {
+        &self.files[motion % self.files.len()]
+    }
 }
 
 /// Reads every CSV file of the folder, in the order of their names.

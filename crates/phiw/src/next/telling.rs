@@ -77,7 +77,7 @@ impl Telling<'_> {
         let motion = self.motion();
         let mut text = String::new();
         // Writing to a string does not fail.
-        let file = self.motions.files[self.plan.choice.motion].display();
+        let file = self.motions.file(self.plan.choice.motion).display();
         let _ = writeln!(text, "next: {} ({} s, {file})", motion.name, significant(motion.duration_s(), 3));
         let _ = writeln!(text, "because {}", self.reason());
         if let Some(balance) = self.balance {
@@ -95,8 +95,13 @@ impl Telling<'_> {
 
     fn balance_text(&self, balance: &MotionMargin) -> String {
         let mm = |value: f64| significant(1e3 * value, 3);
+        let sure = self.arguments.false_fall_rate.map_or_else(String::new, |rate| {
+            let left = mm(self.plan.safety.sure_margin_m);
+            format!("; {left} mm are left at one false fall in {}", significant(1.0 / rate, 3))
+        });
         format!(
-            "balance: α {}; the ZMP stays {} ± {} mm inside the support (nearest at {} s), of which ± {} mm no torque can tell; {} mm by equation (8)",
+            "balance: α {}; the ZMP stays {} ± {} mm inside the support (nearest at {} s), of which ± {} mm no \
+             torque can tell{sure}; {} mm by equation (8)",
             significant(self.plan.alpha, 3),
             mm(balance.balance.multi_body.margin),
             mm(balance.margin_std),
@@ -234,9 +239,11 @@ impl Telling<'_> {
         let balance = self.balance.map(|balance| {
             json!({
                 "alpha": plan.alpha,
-                "largest_alpha": balance.balance.multi_body.largest_reduction,
+                "largest_alpha": plan.safety.largest_reduction,
                 "margin_m": balance.balance.multi_body.margin,
                 "margin_std_m": balance.margin_std,
+                "sure_margin_m": plan.safety.sure_margin_m,
+                "false_fall_rate": self.arguments.false_fall_rate,
                 "untold_std_m": balance.unidentifiable_std,
                 "zmp_m": balance.balance.multi_body.zmp,
                 "at_s": balance.worst_s,
@@ -249,8 +256,9 @@ impl Telling<'_> {
             "joints": joints,
             "next": {
                 "motion": motion.name,
-                "file": self.motions.files[plan.choice.motion].display().to_string(),
+                "file": self.motions.file(plan.choice.motion).display().to_string(),
                 "duration_s": motion.duration_s(),
+                "times_slower": motion.times_slower,
                 "written": self.arguments.out.display().to_string(),
                 "reason": self.reason(),
                 "candidates": self.motions.dataset.len(),

@@ -78,6 +78,7 @@ impl Arm {
             sensors: Sensors::exact(0.01),
             timing: Timing { longest_step_s: 1e-3, settle_s: 0.2, ..Timing::default() },
             fall_tilt_rad: 0.3,
+            stance: None,
             stillness: Default::default(),
             noise_correlation: 0.0,
             measuring: Default::default(),
