@@ -14,6 +14,8 @@ use phiw_identification::effect::Sample;
 pub struct ThermalDrift;
 
 const TIME_CONSTANT: &str = "time_constant";
+/// Shortest time in which a drive's grease warms up \[s\]: what falls sooner is a transient of something else.
+const SHORTEST_S: f64 = 5.0;
 const PART: &str = "part";
 const VISCOUS: f64 = 0.0;
 const COULOMB: f64 = 1.0;
@@ -28,7 +30,9 @@ impl EffectKind for ThermalDrift {
     }
     fn scan(&self, _site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         let duration = ranges.session.1 - ranges.session.0;
-        let mut variants = values(TIME_CONSTANT, [1.0, 0.5, 0.25, 0.125].map(|share| share * duration));
+        let times = [1.0, 0.5, 0.25, 0.125].map(|share| share * duration);
+        let mut variants =
+            values(TIME_CONSTANT, times.into_iter().filter(|time| *time >= SHORTEST_S || *time == duration));
         if ranges.temperature {
             variants.extend(values(TIME_CONSTANT, [0.0]));
         }
@@ -38,7 +42,9 @@ impl EffectKind for ThermalDrift {
         Some(Constants::from([(PART.to_owned(), BOTH)]))
     }
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
-        around(found, TIME_CONSTANT, step)
+        let mut near = around(found, TIME_CONSTANT, step);
+        near.retain(|constants| constants.get(TIME_CONSTANT).is_some_and(|time| *time >= SHORTEST_S));
+        near
     }
     fn telling_motion(&self) -> &'static str {
         "the same motion cold and warm"

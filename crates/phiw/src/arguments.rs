@@ -309,8 +309,8 @@ pub struct NextArguments {
     /// Slower versions of all motions beside them, so many times slower: --slower 2,4.
     #[arg(long, value_name = "TIMES,…", value_delimiter = ',', value_parser = positive)]
     pub slower: Vec<f64>,
-    /// How often a motion that is allowed may leave the support, such as 0.001: so many standard deviations of
-    /// the ZMP, by all that is not known of the robot and by the noise that moves it, are taken from its
+    /// How often a motion that is allowed may leave the support, such as 0.001: so many standard deviations
+    /// of the ZMP, by all that is not known of the robot and by the noise that moves it, are taken from its
     /// margin. By default none are: the standard deviation is told beside the margin.
     #[arg(long, value_name = "RATE", value_parser = positive)]
     pub false_fall_rate: Option<f64>,

@@ -253,7 +253,8 @@ fn five_iterations_through_files_that_know_the_reference_alone_are_those_of_the_
     both_are_the_same(KnownOfController::Reference, 5e-3, 0.3);
 }
 
-/// In process and through files, to a share of `tolerance`; at the end the error is less than this share of the first belief's.
+/// In process and through files, to a share of `tolerance`; at the end the error is less than this share of
+/// the first belief's.
 fn both_are_the_same(known: KnownOfController, tolerance: f64, share: f64) {
     let scene = Scene::new(&believed());
     let (own, files) = (in_process(&scene, known), through_files(&scene, known));

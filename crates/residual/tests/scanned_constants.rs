@@ -98,8 +98,9 @@ fn log(tree: &Tree, seed: u64, noise: f64, late: f64, more: fn(f64, f64) -> f64)
     log
 }
 
-/// The constant of a case on one log, from a start that is off by up to a few per cent, as a search leaves it:
-/// its standard deviation and 95 % interval; and whether the interval of the viscous friction holds its truth.
+/// The constant of a case on one log, from a start that is off by up to a few per cent, as a search leaves
+/// it: its standard deviation and 95 % interval; and whether the interval of the viscous friction holds its
+/// truth.
 fn found(case: &Case, seed: u64) -> (f64, [f64; 2], bool) {
     let tree = read_urdf(URDF, &UrdfOptions::default()).unwrap().tree;
     let catalogue = Catalogue::default();

@@ -188,8 +188,8 @@ fn stribeck_friction_is_named() {
     check(stribeck, &[("stribeck_friction", &["elbow"])]);
 }
 
-/// Right models whose friction turned as an arctangent does were given a Stribeck friction: of no other effect
-/// is the sign, however slowly it turns.
+/// Right models whose friction turned as an arctangent does were given a Stribeck friction: how slowly a sign
+/// turns is no effect of its own.
 #[test]
 fn a_sign_that_turns_slowly_is_no_stribeck_friction() {
     let secret = |state: &State<'_>, torque: &mut [f64]| {

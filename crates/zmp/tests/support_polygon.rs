@@ -251,8 +251,8 @@ fn reductions_that_mean_nothing_are_refused() {
     assert_eq!(Stance::new(polygon, [1.0, 0.0], 0.0).unwrap_err().to_string(), message);
 }
 
-/// The same as without an uncertainty where there is none; and with one, what a circle or an ellipse of points
-/// about the ZMP leaves.
+/// The same as without an uncertainty where there is none; and with one, what a circle or an ellipse of
+/// points about the ZMP leaves.
 #[test]
 fn a_sure_margin_has_room_for_the_ellipse_of_what_is_not_known() {
     let polygon = SupportPolygon::from_points(&SOLE).unwrap();

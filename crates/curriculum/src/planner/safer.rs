@@ -45,8 +45,8 @@ pub(super) fn in_words(
     let most = SLOWER[SLOWER.len() - 1];
     Ok(match nearest {
         Some((motion, Safety { sure_margin_m, .. })) if sure_margin_m.is_finite() => format!(
-            "even {most} times slower the nearest, {}, leaves it by {:.1} mm, so its postures do: add motions that stay \
-             nearer to the middle of the support, or start from a better model",
+            "even {most} times slower the nearest, {}, leaves it by {:.1} mm, so its postures do: add calmer motions \
+             that stay nearer to the middle of the support, or start from a better model",
             motion.name,
             -1e3 * sure_margin_m
         ),

@@ -46,12 +46,13 @@ pub fn slower(arguments: &RunArguments, subject: &Subject) -> Vec<f64> {
     }
 }
 
-/// The constraint (12): the paper's, or the one that counts what is not known.
-pub fn constraint(stance: &Stance, false_fall_rate: Option<f64>) -> ZmpConstraint {
+/// The constraint (12): the paper's, or the one that counts what is not known. Until a log has told it, the
+/// noise of the torques is the experiment's, as a share of their limits: what drives deliver is known.
+pub fn constraint(stance: &Stance, false_fall_rate: Option<f64>, noise: f64) -> ZmpConstraint {
     match false_fall_rate {
         None => ZmpConstraint::of_the_paper(stance.clone()),
         Some(rate) => ZmpConstraint { period_s: LOOK_EVERY_S, ..ZmpConstraint::new(stance.clone()) }
-            .counting(FalseFalls::at_rate(rate)),
+            .counting(FalseFalls { unmeasured_noise: noise, ..FalseFalls::at_rate(rate) }),
     }
 }
 

@@ -186,7 +186,7 @@ impl Setup {
         let (prior, relaxation) = method::method(arguments, &subject);
         let relaxation_of_alpha = method::relaxation(relaxation, arguments.method);
         let false_fall_rate = method::false_fall_rate(arguments, &subject);
-        let constraint = method::constraint(&subject.stance, false_fall_rate);
+        let constraint = method::constraint(&subject.stance, false_fall_rate, arguments.noise);
         let settings = Settings {
             backend: format!("{:?}", arguments.backend).to_lowercase(),
             robot: arguments.robot,

@@ -59,8 +59,8 @@ pub fn is_mjcf(text: &str) -> bool {
 /// do so in the URDF. Geometry becomes `<visual>`; assets are never looked for.
 ///
 /// # Errors
-/// The text is no MJCF or asks for too much ([`Limits`]); it includes other files, has ball joints, or makes
-/// bodies by rules (`replicate`, `attach`, `composite`, `flexcomp`); a number is none.
+/// The text is no MJCF or asks for too much ([`phiw_limits::Limits`]); it includes other files, has ball
+/// joints, or makes bodies by rules (`replicate`, `attach`, `composite`, `flexcomp`); a number is none.
 pub fn read_mjcf(text: &str) -> Result<MjcfReading, MjcfReadError> {
     let document = include::parse(text)?;
     let robot = Reader::new(document.root_element())?.read()?;
