@@ -1,9 +1,9 @@
 //! What a fit would be with some constants of its effects free, to first order.
 //!
-//! An effect that is not linear in a constant c has, at its fitted values β, the derivative Σ β ∂column/∂c. As
-//! one more column beside the model's, its parameter is how far c is from its best value, and its deviation
-//! that of c: the curvature of the error along c, the model's own parameters free. The parameters' intervals
-//! then no longer take c for known.
+//! An effect that is not linear in a constant c has, at its fitted values β, the derivative Σ β ∂column/∂c.
+//! As one more column beside the model's, its parameter is how far c is from its best value, and its
+//! deviation that of c: the curvature of the error along c, the model's own parameters free. The
+//! parameters' intervals then no longer take c for known.
 
 use crate::effect::{EffectParameter, Entry, Evaluator, Needs, Sample};
 use crate::fit::{Fit, merge};
@@ -109,9 +109,9 @@ pub struct FreeConstant {
 }
 
 /// Widens a fit by what constants leave open that were chosen before it. `folds` have the columns of the
-/// fit's design, then one for the derivative by each constant; `constants` are the values, each with the reach
-/// within which first order may hold. What comes back has no number for a constant whose deviation, or whose
-/// way to its best value, is longer than that.
+/// fit's design, then one for the derivative by each constant; `constants` are the values, each with the
+/// reach within which first order may hold. What comes back has no number for a constant whose deviation,
+/// or whose way to its best value, is longer than that.
 ///
 /// # Errors
 /// The folds are of another design.

@@ -16,8 +16,8 @@ const NAMED: usize = 4;
 /// For each body of the session's robot the box that holds its geometry, where that is known of all of its
 /// links, and a warning of what is not.
 ///
-/// A link is what is seen of it and what collides, as far as each of the two can be read as a whole: where one
-/// is of meshes that are not at hand, the other alone is taken.
+/// A link is what is seen of it and what collides, as far as each of the two can be read as a whole: where
+/// one is of meshes that are not at hand, the other alone is taken.
 pub fn of_bodies(session: &Session) -> (BTreeMap<usize, Extent>, Option<String>) {
     let shapes = link_shapes(&session.xml).unwrap_or_default();
     let mut meshes = Meshes { urdf: &session.arguments.urdf, read: BTreeMap::new() };
@@ -37,8 +37,8 @@ pub fn of_bodies(session: &Session) -> (BTreeMap<usize, Extent>, Option<String>)
     (extents, warning(&unknown))
 }
 
-/// The extent of a link's geometry in its body's frame, which may be empty of a link without inertia; why not,
-/// where it is not known.
+/// The extent of a link's geometry in its body's frame, which may be empty of a link without inertia; why
+/// not, where it is not known.
 fn of_link(part: &LinkInBody, shapes: &[LinkShape], meshes: &mut Meshes<'_>) -> Result<Extent, String> {
     let mut whole = Extent::EMPTY;
     let mut why = None;

@@ -53,8 +53,8 @@ fn parameters_are_named_by_link_and_the_truth_is_where_the_report_says() {
     // The first joint stands upright: nothing feels how heavy its link is.
     let untold = &information.not_told;
     assert!(untold.iter().any(|name| name == "mass of link_1"), "{untold:?}");
-    // The elbow is 0.4 m along x, turned by 0.5 rad about z: m₂c₂ₓ + 0.4·m₃ + cos ½·m₃c₃ₓ + …, of which the last
-    // is known by itself.
+    // The elbow is 0.4 m along x, turned by 0.5 rad about z: m₂c₂ₓ + 0.4·m₃ + cos ½·m₃c₃ₓ + …, of which the
+    // last is known by itself.
     let sum = information
         .sums
         .iter()
