@@ -34,7 +34,8 @@ pub enum CurriculumError {
     },
     /// Every motion is expected to topple the robot.
     #[error(
-        "none of the {motions} motions keeps the ZMP over the support under the present estimate: the safest, {safest}, leaves it by {:.1} mm; {safer}",
+        "none of the {motions} motions keeps the ZMP over the support under the present estimate: the \
+         safest, {safest}, leaves it by {:.1} mm; {safer}",
         1e3 * outside_m
     )]
     NothingSafe {
@@ -57,7 +58,8 @@ pub enum CurriculumError {
     },
     /// Noise is stated twice.
     #[error(
-        "the estimator counts on a noise of {assumed} N·m (N) in the torque of {joint}, where the experiment makes {made}: give it the experiment's own torque_noise()"
+        "the estimator counts on a noise of {assumed} N·m (N) in the torque of {joint}, where the \
+         experiment makes {made}: give it the experiment's own torque_noise()"
     )]
     Noise {
         /// The joint.

@@ -68,7 +68,7 @@ fn k_is_the_quantile_of_the_normal_distribution() {
         [(0.9, 0.0), (0.5, 0.0), (0.158_655, 1.0), (0.05, 1.644_854), (1e-3, 3.090_232), (1e-6, 4.753_424)]
     {
         let found = FalseFalls::at_rate(rate).deviations();
-        assert!((found - k).abs() < 5e-4, "{rate}: {found}, {k}");
+        assert!((found - k).abs() < 1e-5, "{rate}: {found}, {k}");
     }
 }
 

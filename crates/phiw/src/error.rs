@@ -109,7 +109,8 @@ pub enum Error {
         second: PathBuf,
     },
     /// Logs of the plan without factors.
-    #[error("the factors of {} are missing; reduce {} with phiw reduce and give the file, too", first_of(logs), if logs.len() == 1 { "it" } else { "them" })]
+    #[error("the factors of {} are missing; reduce {} with phiw reduce and give the file, \
+         too", first_of(logs), if logs.len() == 1 { "it" } else { "them" })]
     FactorsMissing {
         /// The logs.
         logs: Vec<String>,
@@ -262,7 +263,8 @@ pub enum Error {
     #[error(transparent)]
     Output(#[from] phiw_result_folder::ResultError),
     /// A motion would get the name of its own reason.
-    #[error("--out {}: this is the motion's file, a log; its reason goes beside it as .json: name it {}", out.display(), out.with_extension("csv").display())]
+    #[error("--out {}: this is the motion's file, a log; its reason goes beside it as .json: name it \
+         {}", out.display(), out.with_extension("csv").display())]
     MotionNamedJson {
         /// What was asked for.
         out: PathBuf,

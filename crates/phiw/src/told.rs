@@ -192,11 +192,11 @@ pub fn section(information: &InformationJson) -> ToldSection {
     let line = |told: &ToldJson| format!("{}: {}", told.name, value(told));
     ToldSection {
         note: format!(
-            "Told is what the logs make at least {} times narrower than it was believed before: a body as the URDF has it, its mass give or take itself; \
-             an effect, up to a joint's whole torque. {} of {} directions of all parameters are. Values are those of bodies that can exist (identified.urdf), ± one standard deviation.",
-            significant(information.narrower_by, 3),
-            information.directions,
-            information.parameters
+            "Told is what the logs make at least {} times narrower than it was believed before: a body as \
+             the URDF has it, its mass give or take itself; an effect, up to a joint's whole torque. {} of \
+             {} directions of all parameters are. Values are those of bodies that can exist \
+             (identified.urdf), ± one standard deviation.",
+            information.narrower_by, information.directions, information.parameters
         ),
         told: information.told.iter().map(line).collect(),
         sums: information.sums.iter().map(line).collect(),
@@ -243,7 +243,7 @@ pub fn summary(information: &InformationJson) -> Vec<String> {
     let InformationJson { told, sums, not_told, narrower_by, .. } = information;
     let mut lines = vec![format!(
         "told by the logs ({} times narrower than believed before): {} parameters by themselves, {} sums; not at all: {} (report.html names them)",
-        significant(*narrower_by, 3),
+        narrower_by,
         told.len(),
         sums.len(),
         not_told.len()

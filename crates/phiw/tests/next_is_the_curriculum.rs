@@ -205,7 +205,8 @@ fn both_refuse_where_no_motion_keeps_the_balance() {
     // A sole of nine millimetres.
     let text = next_scene::SUPPORT.replace("0.22", "0.0044").replace("0.2,", "0.004,");
     std::fs::write(scene.path("support.toml"), text).unwrap();
-    let line = "next --urdf DIR/robot.urdf --motions DIR/motions --out DIR/next.csv --support DIR/support.toml --false-fall-rate 0.001 --base-error 0.02";
+    let line = "next --urdf DIR/robot.urdf --motions DIR/motions --out DIR/next.csv --support \
+         DIR/support.toml --false-fall-rate 0.001 --base-error 0.02";
     let (status, _, message) = scene.run(line);
     assert_eq!(status, 2);
     let refusal = curriculum_plan(&scene, &[], 0.02).unwrap_err();

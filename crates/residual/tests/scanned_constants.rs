@@ -190,3 +190,34 @@ fn a_model_without_such_constants_costs_no_pass() {
     assert!(scanned_constants(&catalogue, &mut model, &nothing).unwrap().is_empty());
     assert_eq!(format!("{before:?}"), format!("{:?}", model.fit.intervals_95));
 }
+
+/// A search chooses among three ways in which a sign turns, and converts the width with them. The derivative
+/// by `sign_power` was taken halfway between two of them, and the width's over the step to another way.
+#[test]
+fn the_way_in_which_a_sign_turns_is_no_constant_with_an_interval() {
+    let tree = read_urdf(URDF, &UrdfOptions::default()).unwrap().tree;
+    let catalogue = Catalogue::default();
+    let recording = log(&tree, 3, 0.3, 0.0, |_, v| 3.0 * v / v.hypot(0.2));
+    let conditioning =
+        Conditioning::choose(&[recording.survey().unwrap()], &ConditioningOptions::default()).unwrap();
+    let blocks = recording.blocks(&conditioning).unwrap();
+    let mut spec = EffectSpec::new("coulomb_friction", &["j"]).with("sign_power", 2.0);
+    spec = spec.with("sign_width", 0.2);
+    let specs = [EffectSpec::new("viscous_friction", &["j"]), spec];
+    let effects = specs.iter().map(|spec| vec![catalogue.build(spec, &tree).unwrap()]).collect();
+    let data = Data {
+        train: (0..11)
+            .map(|fold| Fold { log: 0, start: 5.0 * f64::from(fold), end: 5.0 * f64::from(fold + 1) })
+            .collect(),
+        held_out: vec![Fold { log: 0, start: 55.0, end: 60.0 }],
+        sources: vec![&blocks as &dyn BlockSource],
+        rest_speeds: vec![0.0],
+    };
+    let mut model = identify(&tree, effects, &data).unwrap();
+    let constants = scanned_constants(&catalogue, &mut model, &data).unwrap();
+    let [width] = constants.as_slice() else { panic!("{constants:?}") };
+    assert_eq!(width.name, "sign_width");
+    let free = width.free.unwrap();
+    let [low, high] = free.interval_95;
+    assert!(low <= 0.2 && 0.2 <= high && free.std < 0.1, "{free:?}");
+}

@@ -61,7 +61,9 @@ impl Experiment for StandingRobot {
         rng: &mut dyn Rng,
     ) -> Result<Trial, CurriculumError> {
         if self.plant.sensors != Sensors::exact(self.plant.timing.control_period_s) {
-            let problem = "motors and base of a robot on its feet are measured exactly: leave its sensors at Sensors::exact, and set wrench_noise".to_owned();
+            let problem = "motors and base of a robot on its feet are measured exactly: leave its sensors \
+                 at Sensors::exact, and set wrench_noise"
+                .to_owned();
             return Err(CurriculumError::Motion { name: "as measured".to_owned(), problem });
         }
         let run = self.plant.run(robot, model, &of_motors(motion)?, rng)?;

@@ -1,5 +1,7 @@
 //! What a constraint that counts uncertainty is asked for.
 
+use statrs::function::erf::erfc_inv;
+
 /// How the balance of a motion is judged under a belief that is not certain.
 ///
 /// From the distance of the ZMP to each edge of the support k standard deviations of the ZMP are taken. They
@@ -46,15 +48,9 @@ impl FalseFalls {
     }
 
     /// k: how many standard deviations are taken from the margin. The normal distribution exceeds k of its
-    /// standard deviations with the probability of the rate (Abramowitz and Stegun 1964, 26.2.23, right to
-    /// 5·10⁻⁴); 0 for a rate of a half or more.
+    /// standard deviations with the probability of the rate; 0 for a rate of a half or more.
     pub fn deviations(&self) -> f64 {
-        if self.rate >= 0.5 {
-            return 0.0;
-        }
-        let t = (-2.0 * self.rate.max(f64::MIN_POSITIVE).ln()).sqrt();
-        let above = 2.515_517 + t * (0.802_853 + t * 0.010_328);
-        let below = 1.0 + t * (1.432_788 + t * (0.189_269 + t * 0.001_308));
-        t - above / below
+        let rate = self.rate.clamp(f64::MIN_POSITIVE, 0.5);
+        std::f64::consts::SQRT_2 * erfc_inv(2.0 * rate)
     }
 }

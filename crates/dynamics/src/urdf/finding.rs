@@ -130,11 +130,13 @@ impl fmt::Display for Finding {
             ),
             Finding::IndefiniteInertia { link, smallest } => write!(
                 f,
-                "link `{link}`: its inertia has the negative principal moment {smallest:.3e} kg·m²: no real body has it, and forward dynamics may fail"
+                "link `{link}`: its inertia has the negative principal moment {smallest:.3e} kg·m²: no \
+                 real body has it, and forward dynamics may fail"
             ),
             Finding::TriangleInequality { link, principal: [a, b, c] } => write!(
                 f,
-                "link `{link}`: its principal moment {c:.3e} kg·m² exceeds the sum of the other two ({a:.3e}, {b:.3e}): no real body has it; do not hold identified parameters against it"
+                "link `{link}`: its principal moment {c:.3e} kg·m² exceeds the sum of the other two \
+                 ({a:.3e}, {b:.3e}): no real body has it; do not hold identified parameters against it"
             ),
             Finding::MasslessBody { joint, link, whole_branch: false } => {
                 write!(
@@ -144,7 +146,8 @@ impl fmt::Display for Finding {
             }
             Finding::MasslessBody { joint, link, whole_branch: true } => write!(
                 f,
-                "joint `{joint}` moves link `{link}`, and nothing behind it has mass: its torque is zero and forward dynamics is singular; hold the joint or give the link an <inertial>"
+                "joint `{joint}` moves link `{link}`, and nothing behind it has mass: its torque is zero \
+                 and forward dynamics is singular; hold the joint or give the link an <inertial>"
             ),
             Finding::MissingLimits { joint, missing } => {
                 write!(f, "joint `{joint}`: no limit for {}: taken as infinite", missing.join(", "))
@@ -164,7 +167,8 @@ impl fmt::Display for Finding {
             }
             Finding::Mimic { joint, leader, ratio, offset } => write!(
                 f,
-                "joint `{joint}` follows `{leader}` (ratio {ratio}, offset {offset}): it has no coordinate of its own, its torque is added to the leader's"
+                "joint `{joint}` follows `{leader}` (ratio {ratio}, offset {offset}): it has no \
+                 coordinate of its own, its torque is added to the leader's"
             ),
             Finding::MimicStill { joint, position } => {
                 write!(f, "joint `{joint}` follows a joint that does not move: taken as fixed at {position}")

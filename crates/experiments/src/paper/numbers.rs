@@ -80,7 +80,8 @@ impl Table<'_> {
                 name,
                 "…, 0.243",
                 medians(&series[1..], 3),
-                "the noise moves the robot, and is not in the log: the columns of Φ are correlated with it, which (4) takes for physics; more logs do not help",
+                "the noise moves the robot, and is not in the log: the columns of Φ are correlated with \
+                 it, which (4) takes for physics; more logs do not help",
             );
         }
     }
@@ -207,7 +208,11 @@ impl Table<'_> {
                 let time =
                     kept.iter().map(|kept| 100.0 * kept.outside_share).sum::<f64>() / kept.len() as f64;
                 self.row(
-                    &format!("{}: motions whose true ZMP left the support at an instant; in its mean over a fall's time; share of the time outside [%]", arm.name()),
+                    &format!(
+                        "{}: motions whose true ZMP left the support at an instant; in its mean over \
+                         a fall's time; share of the time outside [%]",
+                        arm.name()
+                    ),
                     "none reported",
                     format!("{outside}, {tipping} of {}; {time:.1}", kept.len()),
                     "the base is bolted down; the noise of the torques shakes the ZMP at every instant",
@@ -262,7 +267,9 @@ impl Table<'_> {
             ),
             "left for the future",
             format!(
-                "{:.2} ({} of {} runs end earlier), a fixed count takes {:.2} to the same torque error; torque error {then:.2} N·m, {after:.2} with all; RMSE_w {then_w:.3}, {after_w:.3} with all",
+                "{:.2} ({} of {} runs end earlier), a fixed count takes {:.2} to the same torque error; \
+                 torque error {then:.2} N·m, {after:.2} with all; RMSE_w {then_w:.3}, {after_w:.3} with \
+                 all",
                 savings.iterations, savings.earlier, savings.runs, savings.same_error_after
             ),
             "each motion averages more of the noise away, so fewer of them cannot leave quite the same error",

@@ -32,9 +32,9 @@ pub enum SubjectName {
 const HELD: [&str; 2] = ["torso/joint_3", "head/joint_1"];
 /// Viscous friction: share of the torque limit that it takes at the speed limit. A real drive has some
 /// percent.
-pub const VISCOUS_SHARE: f64 = 0.02;
+const VISCOUS_SHARE: f64 = 0.02;
 /// The fastest that a joint is taken to be [rad/s]; the Torobo's file has placeholders.
-pub const FASTEST: f64 = 4.0;
+const FASTEST: f64 = 4.0;
 /// Inertia of each rotor of the Torobo \[kg·m²\], as its file says in words since a URDF has no place for it.
 const TOROBO_ARMATURE: f64 = 0.1;
 /// Base of the Torobo: mass \[kg\], half a side of its square sole and height of its centre \[m\].
@@ -112,11 +112,7 @@ impl Subject {
             feet.iter().flat_map(|foot| &foot.sole).map(|&[x, y, _]| [x, y]).collect();
         let support = SupportPolygon::from_points(&corners)?;
         let stance = Stance::new(support.bounds().polygon()?, [0.0, 0.0], 0.0)?;
-        let joints = tree.joint_count();
-        let limits = |joint: usize| tree.joint(joint).limits;
-        let viscous: Vec<f64> = (0..joints)
-            .map(|joint| VISCOUS_SHARE * limits(joint).effort / limits(joint).velocity.min(FASTEST))
-            .collect();
+        let viscous = viscous_frictions(&tree);
         let gains = arm_gains(&tree, &viscous, control_period_s)?;
         let base_link = floating.bodies()[0].inertial;
         let (rotor_inertia, declares_rotors, standing) = (Vec::new(), false, None);
@@ -237,6 +233,12 @@ impl Subject {
             None => self.tree.joint_names().map(str::to_owned).collect(),
         }
     }
+}
+
+/// The viscous friction of each joint of a plant, from its limits \[N·m·s/rad\].
+pub fn viscous_frictions(tree: &Tree) -> Vec<f64> {
+    let limits = (0..tree.joint_count()).map(|joint| tree.joint(joint).limits);
+    limits.map(|limits| VISCOUS_SHARE * limits.effort / limits.velocity.min(FASTEST)).collect()
 }
 
 /// Small gains, critically damped, that stay stable when commands are held for `control_period_s`.

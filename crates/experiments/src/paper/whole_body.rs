@@ -7,7 +7,7 @@
 
 mod pelvis;
 
-use super::subject::{FASTEST, Subject, VISCOUS_SHARE, arm_gains};
+use super::subject::{Subject, arm_gains, viscous_frictions};
 use crate::environment;
 use crate::plant::engine::Engine;
 use anyhow::Context;
@@ -75,11 +75,8 @@ pub fn subject() -> anyhow::Result<Subject> {
     let support = SupportPolygon::from_points(&standing.legs.sole_corners())?.bounds().polygon()?;
     let about = support.centroid();
     let stance = Stance::new(support, about, 0.0)?;
-    let joints = floating.joint_count();
     let limits = |joint: usize| floating.joint(joint).limits;
-    let viscous: Vec<f64> = (0..joints)
-        .map(|joint| VISCOUS_SHARE * limits(joint).effort / limits(joint).velocity.min(FASTEST))
-        .collect();
+    let viscous = viscous_frictions(&floating);
     let mut gains = arm_gains(&floating, &viscous, CONTROL_PERIOD_S)?;
     for joint in standing.legs.joints().iter().map(|&joint| joint - BASE) {
         gains.position[joint] = LEG_STIFFNESS * limits(joint).effort;

@@ -22,7 +22,7 @@
 //! # How it is run
 //!
 //! `cargo xtask undeclared --all` is the full experiment on the old suites, 1000 cases of each family of
-//! seeds, and `--suite wide` that on the wide ones, 1170 cases of the reporting seeds; `--resume` goes on
+//! seeds, and `--suite wide` that on the wide ones, 1492 cases of the reporting seeds; `--resume` goes on
 //! with one that was stopped. `--suite wide_right --false-name-rates 0.005,0.01,0.05,0.1` calibrates the
 //! guard: it passes `--false-name-rate` to the tracer. `--suite`, `--situation`, `--kind`, `--robot` and
 //! `--count` choose among the cases, `--case SEED` traces one and shows its truth, and `--generate DIR` only
@@ -151,7 +151,10 @@ fn suites(text: &str) -> Result<std::sync::Arc<Suites>, String> {
             "old" => suites.extend(Suite::OLD),
             "wide" => suites.extend(Suite::WIDE),
             name => suites.push(<Suite as clap::ValueEnum>::from_str(name, false).map_err(|_| {
-                format!("no suite {name:?}; there are old and wide, or single ones of them: one, two, three, control, outside, wide_right, wide_effects, wide_outside, new_kinds")
+                format!(
+                    "no suite {name:?}; there are old and wide, or single ones of them: one, two, \
+                     three, control, outside, wide_right, wide_effects, wide_outside, new_kinds"
+                )
             })?),
         }
     }

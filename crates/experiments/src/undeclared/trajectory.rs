@@ -14,7 +14,8 @@ const SHORT_RESTS: [f64; 2] = [0.1, 0.7];
 /// The same where joints rest for long.
 const LONG_RESTS: [f64; 2] = [0.8, 3.0];
 
-/// Shortest and longest ramp of a stroke, as a share of its time.
+/// Shortest and longest ramp of a stroke, as a share of its time. With 0.3 its constant speed is three
+/// quarters of the highest of a minimum-jerk move that takes as long; longer ramps would need more.
 const RAMPS: [f64; 2] = [0.1, 0.3];
 
 /// Position, velocity, acceleration of one joint.
@@ -139,7 +140,6 @@ impl Trajectory {
     /// Strokes of constant speed from pose to pose, all joints together, with short rests.
     pub fn strokes(tree: &Tree, rng: &mut CaseRng, start: f64, duration: f64, reach: Option<Reach>) -> Self {
         let mut motion = Self::moves(tree, rng, start, duration, reach, SHORT_RESTS);
-        // Longer ramps than a minimum-jerk move has would be faster between them.
         let share = rng.uniform(RAMPS[0], RAMPS[1]);
         for joint in &mut motion.joints {
             if let JointMotion::PointToPoint { ramp, .. } = joint {

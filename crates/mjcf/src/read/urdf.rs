@@ -18,7 +18,8 @@ pub(super) fn reading(robot: Robot) -> MjcfReading {
         if inertia.mass != 0.0 || i.iter().flatten().any(|moment| *moment != 0.0) {
             let _ = write!(
                 text,
-                "<inertial><origin xyz=\"{}\"/><mass value=\"{}\"/><inertia ixx=\"{}\" ixy=\"{}\" ixz=\"{}\" iyy=\"{}\" iyz=\"{}\" izz=\"{}\"/></inertial>",
+                "<inertial><origin xyz=\"{}\"/><mass value=\"{}\"/><inertia ixx=\"{}\" ixy=\"{}\" \
+                 ixz=\"{}\" iyy=\"{}\" iyz=\"{}\" izz=\"{}\"/></inertial>",
                 Numbers(&inertia.center.0),
                 inertia.mass,
                 i[0][0],

@@ -177,10 +177,19 @@ impl Telling<'_> {
             ));
         }
         if self.present.source == Source::Logs && self.arguments.estimator == NextEstimator::UnknownNoise {
-            warnings.push("the logs do not say what the controller commanded (tau_cmd.<joint>) or was asked for (qref.<joint>): noise is taken to be in the logs and not in the motion, which makes inertias and frictions wrong where it moved the robot".to_owned());
+            warnings.push(
+                "the logs do not say what the controller commanded (tau_cmd.<joint>) or was \
+                 asked for (qref.<joint>): noise is taken to be in the logs and not in the motion, which \
+                 makes inertias and frictions wrong where it moved the robot"
+                    .to_owned(),
+            );
         }
         if !self.after().is_finite() {
-            warnings.push("even with this motion some parameters stay undetermined, and cond(Φ) says little: add motions of more variety".to_owned());
+            warnings.push(
+                "even with this motion some parameters stay undetermined, and cond(Φ) says \
+                 little: add motions of more variety"
+                    .to_owned(),
+            );
         }
         let (limits, tree) = (MotionLimits::default(), self.present.robot.tree());
         for Excess { joint, what, value, limit } in limits.excesses(self.motion(), self.torque, tree) {
@@ -198,7 +207,11 @@ impl Telling<'_> {
             ));
         }
         if self.present.source == Source::Urdf && !self.findings.is_empty() {
-            warnings.push(format!("the URDF is believed as it is, though {} things in it should not be trusted (`urdf_findings` of the report)", self.findings.len()));
+            warnings.push(format!(
+                "the URDF is believed as it is, though {} things in it should not be \
+                 trusted (`urdf_findings` of the report)",
+                self.findings.len()
+            ));
         }
         warnings
     }

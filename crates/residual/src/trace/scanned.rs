@@ -1,6 +1,6 @@
 //! Constants that were found by scanning, with their deviations.
 
-use phiw_effects::Catalogue;
+use phiw_effects::{Catalogue, Constants};
 use phiw_identification::fitting::{ByConstant, FreeConstant, accumulate, free_constants};
 use phiw_identification::{Data, Design, Effect, EffectCatalogue, IdentificationError, Identified};
 
@@ -47,7 +47,9 @@ pub fn scanned_constants(
             if parameters.iter().any(|parameter| parameter.name == *name) {
                 continue;
             }
-            let ways = near.iter().filter_map(|near| near.get(name)).map(|near| (near - value).abs());
+            // What differs in a second constant, too, is another form and no step of this one.
+            let alone = near.iter().filter(|near| differ_alone(near, &spec.constants, name));
+            let ways = alone.filter_map(|near| near.get(name)).map(|near| (near - value).abs());
             let Some(reach) = ways.filter(|way| *way > 0.0).min_by(f64::total_cmp) else { continue };
             let step = SHARE * reach;
             let beside = |side: f64| catalogue.build(&spec.clone().with(name, value + side * step), tree);
@@ -74,4 +76,14 @@ pub fn scanned_constants(
     let free = free_constants(fit, &folds, &values)?;
     constants.iter_mut().zip(free).for_each(|(constant, free)| constant.free = free);
     Ok(constants)
+}
+
+/// Whether two sets of constants agree in all but `name`.
+fn differ_alone(one: &Constants, other: &Constants, name: &str) -> bool {
+    let without = |constants: &Constants| {
+        let mut constants = constants.clone();
+        constants.remove(name);
+        constants
+    };
+    without(one) == without(other)
 }
