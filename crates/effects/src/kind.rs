@@ -163,6 +163,12 @@ pub trait EffectKind: Send + Sync {
         false
     }
 
+    /// Whether it is what the drive or the logger does to a torque before it is written down, and nothing that
+    /// the robot does: it refines a model, but never has a name.
+    fn is_of_the_log(&self) -> bool {
+        false
+    }
+
     /// Whether it changes with the time since the session began, so that logs whose clocks each begin anew
     /// cannot tell it.
     fn needs_session_time(&self) -> bool {

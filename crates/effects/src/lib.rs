@@ -18,6 +18,7 @@ mod position;
 mod position_map;
 mod sensing;
 mod sign;
+mod smoothing;
 mod trigonometric_spline;
 
 pub use catalogue::{Catalogue, sentence};
@@ -26,3 +27,4 @@ pub use fitted::FittedEffect;
 pub use kind::{Constants, EffectKind, JointRange, Signal, SignalRanges};
 pub use mechanism::{Mechanism, Mechanisms, ServoFriction};
 pub use sign::smooth_sign;
+pub use smoothing::smoothing_corner_hz;

@@ -68,6 +68,7 @@ const SENTENCES: &[(&str, &str)] = &[
         "position_map",
         "The torque of shoulder depends on its position in no simple form (a cable, a hose, cogging): it varies by 0.159 N·m RMS from -1.000 to 1.000 rad.",
     ),
+    ("torque_smoothing", "The torque of shoulder is low-passed before it is logged, at about 0.2 Hz."),
 ];
 
 /// The kind on its first site, with the last of its constants and parameters 0.5, 0.25, 0.125, …

@@ -4,7 +4,7 @@
 
 pub use crate::effect_selector::EffectSelector;
 pub use crate::reference::ReferenceModel;
-pub use crate::sample::{BlockReference, Needs, Sample};
+pub use crate::sample::{BlockReference, Needs, Sample, second_rate};
 
 use phiw_dynamics::Tree;
 use phiw_telemetry::Block;

@@ -134,6 +134,10 @@ impl<'a> Sample<'a> {
     pub fn total_torque_rate(&self) -> &'a [f64] {
         self.row(&self.reference.total_torque_rate)
     }
+    /// Second rate of change of the total torque of a joint, see [`second_rate`].
+    pub fn total_torque_second_rate(&self, joint: usize) -> f64 {
+        second_rate(self.block, &self.reference.total_torque, joint, self.index)
+    }
     /// ∂τ/∂q, row-major, a row for each torque.
     pub fn torque_by_position(&self) -> &'a [f64] {
         self.matrix(&self.reference.by_position, self.block.joints)
@@ -157,5 +161,25 @@ impl<'a> Sample<'a> {
     /// The same at rest under unit gravity along world x, then y, then z.
     pub fn static_regressor_pairs(&self) -> &'a [f64] {
         self.statics
+    }
+}
+
+/// Second differences are taken over this share of the shortest period that the motion has: fine against it,
+/// and coarse against the noise of single samples.
+const STRIDE: f64 = 1.0 / 64.0;
+
+/// Second rate of change of a joint's value at a sample, by the values a sixteenth of the motion's shortest
+/// period before and after it; zero where the block has none. `values` are `[sample × joint]` over the block.
+pub fn second_rate(block: &Block, values: &[f64], joint: usize, sample: usize) -> f64 {
+    let [first, .., last] = block.t.as_slice() else { return 0.0 };
+    let period = (last - first) / (block.t.len() - 1) as f64;
+    let stride = (STRIDE / (block.motion_bandwidth_hz * period)).round().max(1.0) as usize;
+    let at = |sample: usize| values.get(sample * block.joints + joint);
+    let neighbours = (sample.checked_sub(stride).and_then(at), at(sample), at(sample + stride));
+    match neighbours {
+        (Some(before), Some(here), Some(after)) => {
+            (before - 2.0 * here + after) / (stride as f64 * period).powi(2)
+        }
+        _ => 0.0,
     }
 }

@@ -79,7 +79,7 @@ impl Command {
 }
 
 /// Arguments of `phiw explain`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub struct ExplainArguments {
     /// Robot, logs and declared model.
     #[command(flatten)]

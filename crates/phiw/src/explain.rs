@@ -14,7 +14,7 @@ use crate::report_json::{by_joint, report_json};
 use crate::session::{Session, read_robot};
 use crate::{Error, bandwidth, summary};
 use indexmap::IndexMap;
-use phiw_effects::{Catalogue, SignalRanges};
+use phiw_effects::{Catalogue, SignalRanges, smoothing_corner_hz};
 use phiw_identification::fitting::TorqueError;
 use phiw_identification::{Data, EffectSpec, Identified, Model, identify};
 use phiw_report::ReportJson;
@@ -22,6 +22,7 @@ use phiw_report::json::{
     ConstantJson, DrawsJson, EffectJson, EvidenceJson, JointMap, NamedInDrawsJson, ParameterJson,
     ProgramJson, RemainingJson, RivalJson, TorqueErrors, Verdict,
 };
+use phiw_report::number::significant;
 use phiw_residual::trace::{
     self, HeldModel, ScannedConstant, TraceInput, TraceOptions, Tracing, scanned_constants, trace,
 };
@@ -48,19 +49,41 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
 
 /// The same, without writing anything.
 ///
+/// Where the torque was low-passed before it was logged, it is traced again in the band that this has left:
+/// above its corner a filter's form decides, and what is not known of it looks like effects.
+///
 /// # Errors
 /// An input is wrong.
 pub fn results(arguments: &ExplainArguments, console: &Console) -> Result<Results, Error> {
+    results_in_band(arguments, console, None)
+}
+
+fn results_in_band(
+    arguments: &ExplainArguments,
+    console: &Console,
+    warning: Option<String>,
+) -> Result<Results, Error> {
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
     let excluded = excluded(arguments)?;
     let mut session = Session::open(&arguments.session, &progress)?;
-    let bandwidth = match arguments.model {
-        Some(_) => None,
-        None => bandwidth::of_session(&session, &progress)?,
+    // What a filter of the torque makes of the answer is said by the warning.
+    let bandwidth = match (&arguments.model, &warning) {
+        (None, None) => bandwidth::of_session(&session, &progress)?,
+        _ => None,
     };
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
     let Traced { start, floor, mut tracing } = traced(arguments, &excluded, &session, &data)?;
+    if let Some(corner_hz) = low_passed_in_band(arguments, &session, &tracing) {
+        let corner = significant(corner_hz, 3);
+        let warning = format!(
+            "the torque was low-passed before it was logged, at about {corner} Hz: columns and torque are \
+             low-passed there, too (--parallel-cutoff-hz asks for another cut-off)"
+        );
+        let mut lower = arguments.clone();
+        lower.session.parallel_cutoff_hz = Some(corner_hz);
+        return results_in_band(&lower, console, Some(warning));
+    }
     let names = |data: &Data<'_>| {
         let Traced { tracing, .. } = traced(arguments, &excluded, &session, data)?;
         Ok(tracing.effects.into_iter().map(|effect| effect.spec).collect())
@@ -84,6 +107,7 @@ pub fn results(arguments: &ExplainArguments, console: &Console) -> Result<Result
     let mut analysis =
         Analysis::new(&session, Rows::Logs(&data), &tracing.model, None)?.with_bandwidth(bandwidth);
     analysis.noise_floor = floor;
+    analysis.warnings.extend(warning);
     analysis.warnings.extend(tracing.not_judged.iter().map(|(kind, joints)| {
         format!("{kind} of {} could not be judged on these logs (its columns are not finite): not all of it was sought", joints.join(", "))
     }));
@@ -106,6 +130,17 @@ pub fn results(arguments: &ExplainArguments, console: &Console) -> Result<Result
     let mut summary = story(&analysis, &tracing, in_draws);
     summary.push_str(&summary::summary(&analysis, &arguments.session.out, &files));
     Ok(Results { files, summary, warnings: analysis.warnings, report })
+}
+
+/// The corner of the filter that the torque went through before it was logged \[Hz\], if that is below the
+/// cut-off of columns and torque and nobody asked for this one.
+fn low_passed_in_band(arguments: &ExplainArguments, session: &Session, tracing: &Tracing) -> Option<f64> {
+    if arguments.model.is_some() || arguments.session.parallel_cutoff_hz.is_some() {
+        return None;
+    }
+    let corners = tracing.specs.iter().filter_map(smoothing_corner_hz);
+    let lowest_hz = corners.fold(f64::INFINITY, f64::min);
+    (lowest_hz < session.logs.conditioning().parallel_cutoff_hz).then_some(lowest_hz)
 }
 
 /// The command line that gives these arguments to `phiw explain`.

@@ -73,6 +73,7 @@ impl Search<'_> {
             self.refine()?;
         };
         let mut judged = self.judge(&trial)?;
+        self.judge_beside_named_forms(&trial, &mut judged);
         self.judge_small(&trial, &mut judged)?;
         self.name_families(&mut judged);
         self.in_order(&trial, judged)
@@ -164,6 +165,39 @@ impl Search<'_> {
         (0..highest).map(below).collect()
     }
 
+    /// Asks again of what a form of it has a name, now beside that form: a friction that falls with the speed
+    /// hides a viscous friction that rises with it.
+    fn judge_beside_named_forms(&self, trial: &Trial, judged: &mut [Judged]) {
+        let requires = |form: &Judged, place: usize| {
+            let members = (trial.member(form.place), trial.member(place));
+            let (Some(form), Some(simpler)) = members else { return false };
+            trial.problem.hypotheses[form.hypothesis].requires.contains(&simpler.hypothesis)
+        };
+        let hidden: Vec<usize> = judged
+            .iter()
+            .enumerate()
+            .filter(|(_, own)| !own.named)
+            .filter(|(_, own)| judged.iter().any(|form| form.named && requires(form, own.place)))
+            .map(|(index, _)| index)
+            .collect();
+        let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
+        let with = trial.held_out_squares(&trial.fit);
+        for own in hidden {
+            let own = &mut judged[own];
+            let Some(member) = trial.member(own.place) else { continue };
+            let squares = Squares {
+                initial: initial.clone(),
+                without: trial.held_out_squares(&trial.fit_with(|place| place != own.place)),
+                with: with.clone(),
+            };
+            let certainty = certainty(&trial.problem, &trial.fit, member);
+            own.significance = certainty.significance;
+            own.certain = certainty.tail <= self.tail_of_a_name();
+            own.named = own.certain && self.is_material(trial, member, &squares);
+            own.size = trial.size(member, &squares);
+        }
+    }
+
     /// Asks again of small effects on joints where another effect has constants, now that these are refined
     /// without it: a sign that turns over another speed looks like some viscous friction.
     fn judge_small(&self, trial: &Trial, judged: &mut [Judged]) -> Result<(), IdentificationError> {
@@ -212,8 +246,14 @@ impl Search<'_> {
         Ok(())
     }
 
+    /// How improbable an effect must be by chance to have a name: for all hypotheses together it is
+    /// `false_name_probability`.
+    fn tail_of_a_name(&self) -> f64 {
+        self.options.false_name_probability / self.chosen.hypotheses.max(1) as f64
+    }
+
     fn judge(&self, whole: &Trial) -> Result<Vec<Judged>, IdentificationError> {
-        let limit = self.options.false_name_probability / self.chosen.hypotheses.max(1) as f64;
+        let limit = self.tail_of_a_name();
         let levels = self.levels(whole);
         let simpler = self.simpler(&levels)?;
         let all = whole.held_out_squares(&whole.fit);
@@ -250,6 +290,8 @@ impl Search<'_> {
                 None => self.is_material(trial, own_member, &squares),
             };
             let certainty = certainty(&trial.problem, &trial.fit, own_member);
+            let of_the_log = self.fixed.catalogue.kind(&self.specs[place].kind)?.is_of_the_log();
+            let material = material && !of_the_log;
             let without = whole.fit_with(|other| other != place);
             judged.push(Judged {
                 place,

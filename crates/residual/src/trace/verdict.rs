@@ -9,7 +9,7 @@ use phiw_regressor::least_squares::GroupedFactor;
 
 /// Error of all torques together on motion held out, over that of the declared model, up to which a model
 /// that lowers the errors of single torques is as good: the largest torque's noise decides over less.
-const AS_GOOD: f64 = 1.1;
+const AS_GOOD: f64 = 1.0;
 
 impl Search<'_> {
     pub(super) fn finish(self) -> Result<Tracing, IdentificationError> {
