@@ -23,9 +23,7 @@ use phiw_report::json::{
     ProgramJson, RemainingJson, RivalJson, TorqueErrors, Verdict,
 };
 use phiw_report::number::significant;
-use phiw_residual::trace::{
-    self, HeldModel, ScannedConstant, TraceInput, TraceOptions, Tracing, scanned_constants, trace,
-};
+use phiw_residual::trace::{self, HeldModel, ScannedConstant, TraceInput, TraceOptions, Tracing, trace};
 use std::fmt::Write;
 
 /// A model to start from: its effects' specs, its parameters, and what was known if it is held.
@@ -90,11 +88,6 @@ fn results_in_band(
     };
     let draws = Draws::take(arguments.draws, &data, names)?;
     draws.weigh(&mut tracing);
-    // Against a held model its parameters stay as they are.
-    let constants = match arguments.model {
-        Some(_) => Vec::new(),
-        None => scanned_constants(&session.catalogue, &mut tracing.model, &data)?,
-    };
     drop(data);
     drop(sources);
     if arguments.model.is_some() {
@@ -121,7 +114,7 @@ fn results_in_band(
     page.headline.extend(in_draws.clone());
     console.finish();
 
-    let mut report = report(&analysis, &tracing, &constants);
+    let mut report = report(&analysis, &tracing);
     report.phiw.iter_mut().for_each(|program| {
         program.draws = draws.json();
         program.reproduction = reproduction.json();
@@ -266,7 +259,7 @@ fn constant(found: &ScannedConstant) -> (String, ConstantJson) {
     (found.name.clone(), ConstantJson { value: found.value, std, interval_95 })
 }
 
-fn report(analysis: &Analysis<'_>, tracing: &Tracing, constants: &[ScannedConstant]) -> ReportJson {
+fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
     let joints = analysis.joints();
     let error = |error: &TorqueError| phiw_report::json::TorqueErrorJson {
         rmse: by_joint(&joints, &error.rmse),
@@ -289,7 +282,7 @@ fn report(analysis: &Analysis<'_>, tracing: &Tracing, constants: &[ScannedConsta
                 parameters.entry(info.joint).or_default();
             of_joint.insert(named.name.clone(), value);
         }
-        let own = constants.iter().filter(|constant| constant.effect == first + index);
+        let own = tracing.constants.iter().filter(|constant| constant.effect == first + index);
         let own: IndexMap<String, ConstantJson> = own.map(constant).collect();
         let joints = found.spec.joints.join("+");
         EffectJson {

@@ -76,6 +76,30 @@ impl Case {
         }
     }
 
+    /// What has a name has a parameter whose 95 % interval does not hold nothing: springs of 0.06 ± 0.08 and
+    /// drifts of 0.9 ± 0.8 had names. Frictions and rotors are named with their families.
+    fn names_are_certain(&self, out: &str, report: &ReportJson) {
+        let path = self.folder.path().join(out).join("model.json");
+        let model: serde_json::Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+        let textbook = ["viscous_friction", "coulomb_friction", "rotor_inertia"];
+        for named in report.effects.iter().filter(|named| !textbook.contains(&named.kind.as_str())) {
+            let of_it = |effect: &&serde_json::Value| {
+                let joints = effect["joints"].as_array().unwrap();
+                effect["kind"] == named.kind.as_str()
+                    && joints.iter().all(|joint| named.joints.iter().any(|named| joint == named.as_str()))
+            };
+            for effect in model["effects"].as_array().unwrap().iter().filter(of_it) {
+                let certain = effect["parameters"].as_array().unwrap().iter().any(|parameter| {
+                    let constant = effect["constants"][parameter["name"].as_str().unwrap()].as_f64();
+                    let end =
+                        |at: usize| constant.unwrap_or(0.0) + parameter["interval_95"][at].as_f64().unwrap();
+                    end(0) > 0.0 || end(1) < 0.0
+                });
+                assert!(certain, "{effect}");
+            }
+        }
+    }
+
     /// What explain names.
     fn check(&self, declare: &[&str]) -> Vec<String> {
         let identified = phiw::identify::identify(&self.session(declare, "identified"), &Console::silent())
@@ -92,6 +116,7 @@ impl Case {
         assert_eq!(identified.before, explained.before, "{declare:?}");
         self.predicts_what_is_reported("identified", &identified);
         self.predicts_what_is_reported("explained", &explained);
+        self.names_are_certain("explained", &explained);
         explained.effects.into_iter().map(|effect| effect.kind).collect()
     }
 }
@@ -113,4 +138,5 @@ fn a_model_of_a_real_robot_predicts_with_the_error_that_was_reported_of_it() {
     let named = case.check(&[]);
     assert!(named.iter().any(|kind| kind == "load_dependent_friction"), "{named:?}");
     case.check(&["viscous_friction", "coulomb_friction", "load_dependent_friction"]);
+    case.check(&["viscous_friction", "coulomb_friction", "rotor_inertia"]);
 }

@@ -497,3 +497,18 @@ fn friction_of_all_joints_is_found_with_nothing_declared() {
     assert_eq!(named(&tracing), expected, "{:?}", tracing.verdict);
     assert!(tracing.model.held_out.relative < 0.1 * tracing.before.1.relative);
 }
+
+/// A friction that falls with the speed makes up for a viscous friction that rises with it: judged without the
+/// former, the latter was none.
+#[test]
+fn a_viscous_friction_is_named_beside_the_stribeck_friction_that_hides_it() {
+    let secret = |state: &State<'_>, torque: &mut [f64]| {
+        let v = state.qd[1];
+        torque[1] += 3.0 * (-(v / 1.2).powi(2)).exp() * (v / 0.01).tanh();
+    };
+    let tracing = traced_on(folds().0, &[], 11, &secret, false);
+    let named = named(&tracing);
+    for kind in ["viscous_friction", "coulomb_friction", "stribeck_friction"] {
+        assert!(named.contains(&(kind.to_owned(), vec!["elbow".to_owned()])), "{kind}: {named:?}");
+    }
+}

@@ -5,6 +5,7 @@ use super::search::Search;
 use super::tracing::{FoundEffect, RivalEffect};
 use super::trial::{Squares, Trial};
 use crate::selection::{Member, Products, certainty};
+use phiw_effects::EffectKind;
 use phiw_identification::{EffectSpec, IdentificationError};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -73,7 +74,7 @@ impl Search<'_> {
             self.refine()?;
         };
         let mut judged = self.judge(&trial)?;
-        self.judge_beside_named_forms(&trial, &mut judged);
+        self.judge_beside_forms(&trial, &mut judged);
         self.judge_small(&trial, &mut judged)?;
         self.name_families(&mut judged);
         self.in_order(&trial, judged)
@@ -165,25 +166,27 @@ impl Search<'_> {
         (0..highest).map(below).collect()
     }
 
-    /// Asks again of what a form of it has a name, now beside that form: a friction that falls with the speed
-    /// hides a viscous friction that rises with it.
-    fn judge_beside_named_forms(&self, trial: &Trial, judged: &mut [Judged]) {
+    /// Asks again of what others are forms of, now beside these: a friction that falls with the speed hides a
+    /// viscous friction that rises with it. It has a name of its own where a form of it has one; where none
+    /// has, it is certain, and may be named with its family.
+    fn judge_beside_forms(&self, trial: &Trial, judged: &mut [Judged]) {
         let requires = |form: &Judged, place: usize| {
             let members = (trial.member(form.place), trial.member(place));
             let (Some(form), Some(simpler)) = members else { return false };
             trial.problem.hypotheses[form.hypothesis].requires.contains(&simpler.hypothesis)
         };
-        let hidden: Vec<usize> = judged
-            .iter()
-            .enumerate()
-            .filter(|(_, own)| !own.named)
-            .filter(|(_, own)| judged.iter().any(|form| form.named && requires(form, own.place)))
-            .map(|(index, _)| index)
-            .collect();
+        let forms_of = |own: &Judged| -> Option<bool> {
+            let forms: Vec<&Judged> = judged.iter().filter(|form| requires(form, own.place)).collect();
+            (!forms.is_empty()).then(|| forms.iter().any(|form| form.named))
+        };
+        let hidden = judged.iter().enumerate();
+        let hidden = hidden.filter(|(_, own)| !own.named && self.may_have_a_name(own.place));
+        let hidden: Vec<(usize, bool)> =
+            hidden.filter_map(|(index, own)| Some((index, forms_of(own)?))).collect();
         let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
         let with = trial.held_out_squares(&trial.fit);
-        for own in hidden {
-            let own = &mut judged[own];
+        for (index, form_is_named) in hidden {
+            let own = &mut judged[index];
             let Some(member) = trial.member(own.place) else { continue };
             let squares = Squares {
                 initial: initial.clone(),
@@ -193,7 +196,7 @@ impl Search<'_> {
             let certainty = certainty(&trial.problem, &trial.fit, member);
             own.significance = certainty.significance;
             own.certain = certainty.tail <= self.tail_of_a_name();
-            own.named = own.certain && self.is_material(trial, member, &squares);
+            own.named = own.certain && form_is_named && self.is_material(trial, member, &squares);
             own.size = trial.size(member, &squares);
         }
     }
@@ -246,6 +249,13 @@ impl Search<'_> {
         Ok(())
     }
 
+    /// Whether an effect is one of the robot, and not of its log, and was not found to be uncertain.
+    fn may_have_a_name(&self, place: usize) -> bool {
+        let EffectSpec { kind, joints, .. } = &self.specs[place];
+        let of_the_log = self.fixed.catalogue.kind(kind).is_ok_and(EffectKind::is_of_the_log);
+        !of_the_log && !self.uncertain.iter().any(|(other, on)| other == kind && on == joints)
+    }
+
     /// How improbable an effect must be by chance to have a name: for all hypotheses together it is
     /// `false_name_probability`.
     fn tail_of_a_name(&self) -> f64 {
@@ -290,8 +300,7 @@ impl Search<'_> {
                 None => self.is_material(trial, own_member, &squares),
             };
             let certainty = certainty(&trial.problem, &trial.fit, own_member);
-            let of_the_log = self.fixed.catalogue.kind(&self.specs[place].kind)?.is_of_the_log();
-            let material = material && !of_the_log;
+            let material = material && self.may_have_a_name(place);
             let without = whole.fit_with(|other| other != place);
             judged.push(Judged {
                 place,

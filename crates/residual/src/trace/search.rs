@@ -41,6 +41,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         folds: split(&data.train),
         chosen: Chosen::default(),
         refuted: Vec::new(),
+        uncertain: Vec::new(),
         input: &input,
         options,
     };
@@ -90,6 +91,8 @@ pub(super) struct Search<'a> {
     pub chosen: Chosen,
     /// Effects that promised more to first order than they held in force: they are not sought again.
     pub refuted: Vec<EffectSpec>,
+    /// Kinds and joints of which no parameter is certain once their constants are free: they have no name.
+    pub uncertain: Vec<(String, Vec<String>)>,
     pub input: &'a TraceInput<'a>,
     pub options: &'a TraceOptions,
 }

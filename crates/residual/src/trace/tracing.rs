@@ -1,6 +1,7 @@
 //! The result of a trace.
 
 use super::probe::Dependence;
+use super::scanned::ScannedConstant;
 use phiw_identification::fitting::TorqueError;
 use phiw_identification::{EffectSpec, Identified};
 
@@ -98,6 +99,9 @@ pub struct Tracing {
     pub specs: Vec<EffectSpec>,
     /// The final model; with a held model its parameters are those held, changed by what was found.
     pub model: Identified,
+    /// The constants that were found by scanning, with their deviations; none against a held model, whose
+    /// parameters stay as they are.
+    pub constants: Vec<ScannedConstant>,
     /// Error of the declared (or held) model: training, held out.
     pub before: (TorqueError, TorqueError),
     /// The effects that were added and have a name, in order.

@@ -1,10 +1,11 @@
 //! The end of a search: the final fit, what each effect explained, what remains.
 
 use super::naming::Harm;
+use super::scanned::scanned_constants;
 use super::search::Search;
 use super::tracing::{Tracing, Verdict};
 use phiw_identification::fitting::{TorqueError, accumulate, fit, torque_error};
-use phiw_identification::{Design, IdentificationError, Identified};
+use phiw_identification::{Design, EffectSpec, IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
 
 /// Error of all torques together on motion held out, over that of the declared model, up to which a model
@@ -88,7 +89,7 @@ impl Search<'_> {
             (false, true) => Verdict::Explained,
             (false, false) => Verdict::PartlyExplained,
         };
-        let model = Identified {
+        let mut model = Identified {
             design,
             fit: final_fit,
             train: after.0,
@@ -96,9 +97,55 @@ impl Search<'_> {
             train_folds,
             held_out_folds,
         };
+        let mut constants = Vec::new();
+        if self.fixed.prior.is_none() {
+            constants = scanned_constants(self.fixed.catalogue, &mut model, data)?;
+            let uncertain = self.uncertain(&model, effects.len())?;
+            if !uncertain.is_empty() {
+                self.uncertain.extend(uncertain);
+                return self.finish_with(before, harm);
+            }
+        }
         let not_judged = self.fixed.not_judged.lock().map(|hypotheses| hypotheses.iter().cloned().collect());
         let not_judged = not_judged.unwrap_or_default();
-        Ok(Tracing { verdict, specs: self.specs, model, before, effects, refinements, remaining, not_judged })
+        Ok(Tracing {
+            verdict,
+            specs: self.specs,
+            model,
+            constants,
+            before,
+            effects,
+            refinements,
+            remaining,
+            not_judged,
+        })
+    }
+
+    /// Of the `named` effects, the first that were found, those of which no parameter is certain: the 95 %
+    /// interval of each holds nothing. What the textbook has of each joint is one with that of the others,
+    /// and stays.
+    fn uncertain(
+        &self,
+        model: &Identified,
+        named: usize,
+    ) -> Result<Vec<(String, Vec<String>)>, IdentificationError> {
+        let mut uncertain = Vec::new();
+        for (place, effect) in model.design.effects().iter().enumerate().skip(self.declared).take(named) {
+            let EffectSpec { kind, joints, constants } = effect.spec();
+            let own = model.design.effect_parameters(place);
+            let is_certain = own.zip(effect.parameters()).any(|(parameter, info)| {
+                // Of what is linearised the value stands partly in the constant of the same name.
+                let in_force = constants.get(&info.name).copied().unwrap_or_default();
+                let [low, high] = model.fit.intervals_95[parameter];
+                // Logs too short for an interval (NaN) say nothing against it.
+                !(in_force + low <= 0.0 && in_force + high >= 0.0)
+            });
+            let of_the_textbook = self.fixed.catalogue.kind(&kind)?.joint_property().is_some();
+            if !is_certain && !of_the_textbook {
+                uncertain.push((kind, joints));
+            }
+        }
+        Ok(uncertain)
     }
 
     /// Whether other constants of the declared effects make the error on motion held out larger than it was
