@@ -103,3 +103,18 @@ fn noisy_positions_scatter_about_the_motion() {
         assert!((4e-4..7e-3).contains(&std), "{std}");
     });
 }
+
+#[test]
+fn a_smoothed_torque_hardly_bends_from_sample_to_sample() {
+    check(Situation::SmoothedTorque, |case, log| {
+        let smoothing = case.sensors.logging.as_ref().and_then(|logging| logging.smoothing);
+        let corner = smoothing.expect("a smoothed torque").corner();
+        assert!((3.0..12.0).contains(&corner), "{corner}");
+        let torque = column(log, "tau.joint_1");
+        let rms = |values: &mut dyn Iterator<Item = f64>| mean(values.map(|value| value * value)).sqrt();
+        // Of white noise it would be √6 times the noise.
+        let bend = rms(&mut torque.windows(3).map(|three| three[0] - 2.0 * three[1] + three[2]));
+        let noise = case.sensors.torque_noise[0];
+        assert!(bend < 0.5 * noise, "{bend} {noise}");
+    });
+}

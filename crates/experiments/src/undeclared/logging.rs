@@ -5,6 +5,7 @@ use super::plant::Record;
 use super::rng::CaseRng;
 use super::sensors::{Clock, Sensors};
 use super::situation::Situation;
+use super::smoothing::Smoothing;
 use super::trajectory::Trajectory;
 use phiw_dynamics::{JointType, Tree};
 use serde::Serialize;
@@ -59,6 +60,9 @@ pub struct Logging {
     pub tails: Tails,
     /// Low-pass over torque and noise.
     pub filter: Option<DriveFilter>,
+    /// What smooths the torque afterwards, if anything does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smoothing: Option<Smoothing>,
     /// A velocity column; none is written without.
     pub velocity: Option<VelocityColumn>,
     /// Torques below this are written as 0 \[N·m, N\], joint by joint.
@@ -188,7 +192,11 @@ impl Logging {
                 burst: rng.index((0.4 * sensors.rate) as usize),
             }
         });
-        Logging { tails, filter, velocity, dead_band, torque_step, held_samples, rough }
+        let smoothing = (situation == Situation::SmoothedTorque).then(|| {
+            let corner = rng.log_uniform(3.0, 12.0);
+            if rng.chance(0.5) { Smoothing::Means { corner } } else { Smoothing::Butterworth { corner } }
+        });
+        Logging { tails, filter, smoothing, velocity, dead_band, torque_step, held_samples, rough }
     }
 
     /// The log's text: `t`, `q.*`, `qd.*` if there is such a column, `tau.*`.
@@ -249,9 +257,14 @@ impl Logging {
             for (row, noise) in torque.chunks_exact_mut(joints).zip(noise) {
                 row[joint] += sensors.torque_noise[joint] * noise;
             }
-            if let Some(filter) = &self.filter {
+            if self.filter.is_some() || self.smoothing.is_some() {
                 let mut column: Vec<f64> = torque.iter().skip(joint).step_by(joints).copied().collect();
-                filter.apply(&record.times, &mut column);
+                if let Some(filter) = &self.filter {
+                    filter.apply(&record.times, &mut column);
+                }
+                if let Some(smoothing) = &self.smoothing {
+                    smoothing.apply(sensors.rate, &mut column);
+                }
                 for (row, value) in torque.chunks_exact_mut(joints).zip(column) {
                     row[joint] = value;
                 }

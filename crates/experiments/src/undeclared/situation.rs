@@ -55,11 +55,14 @@ pub enum Situation {
     StillJoints,
     /// Positions of a potentiometer: noise of 0.03 to 0.3 degrees.
     NoisyPositions,
+    /// Whoever published the log smoothed the torque, without delay: by means over neighbouring samples, or by
+    /// a Butterworth filter that runs forwards and backwards.
+    SmoothedTorque,
 }
 
 impl Situation {
     /// All situations.
-    pub const ALL: [Situation; 22] = [
+    pub const ALL: [Situation; 23] = [
         Situation::White,
         Situation::ShortColour,
         Situation::Colour,
@@ -82,19 +85,31 @@ impl Situation {
         Situation::RoughClock,
         Situation::StillJoints,
         Situation::NoisyPositions,
+        Situation::SmoothedTorque,
     ];
     /// Those of the first cases of each suite: so many there were when these were drawn first.
-    pub const FIRST: usize = 15;
-    /// Index from which on a suite's cases are in the situations that came later.
-    pub const LATER_CASES: usize = 50_000;
+    pub const FIRST: usize = Situation::BLOCKS[0].1;
+    /// Situations that came together: the index of their first case, and how many they are.
+    const BLOCKS: [(usize, usize); 3] = [(0, 15), (50_000, 7), (60_000, 1)];
 
-    /// The situation of the case of this index: the first ones in turn, or the later ones.
+    /// The situation of the case of this index: those of its block in turn.
     pub fn of_index(index: usize) -> Self {
-        let (first, later) = Self::ALL.split_at(Self::FIRST);
-        match index.checked_sub(Self::LATER_CASES) {
-            Some(index) => later[index % later.len()],
-            None => first[index % first.len()],
+        let mut situations = Self::ALL.as_slice();
+        let mut own = Self::ALL[0];
+        for (first, count) in Self::BLOCKS {
+            let (block, later) = situations.split_at(count);
+            match index.checked_sub(first) {
+                Some(index) => own = block[index % count],
+                None => break,
+            }
+            situations = later;
         }
+        own
+    }
+
+    /// Indices of the cases in situations that came later, so many of each.
+    pub fn later_indices(each: usize) -> impl Iterator<Item = usize> {
+        Self::BLOCKS.into_iter().skip(1).flat_map(move |(first, count)| first..first + each * count)
     }
 
     /// The name in tables.

@@ -16,6 +16,7 @@ use super::robot::Robot;
 use super::secret::{Form, Secret};
 use super::sensors::Sensors;
 use super::situation::Situation;
+use super::smoothing::Smoothing;
 use super::suite::{Spec, Suite};
 use super::trajectory::{Reach, Trajectory};
 use super::visibility::Absorber;
@@ -311,8 +312,10 @@ fn weighed(secrets: &[Secret], case: &Case, full: &Ordinary) -> Vec<Drawn> {
 
 /// Rows of so much training motion \[s\] that tell as much as independent ones would.
 fn effective_rows(sensors: &Sensors, duration: f64) -> f64 {
-    let filter = sensors.logging.as_ref().and_then(|logging| logging.filter);
-    let memory = filter.map_or(0.0, |filter| 1.0 / (std::f64::consts::TAU * filter.corner));
+    let corner = sensors.logging.as_ref().and_then(|logging| {
+        logging.filter.map(|filter| filter.corner).or(logging.smoothing.map(Smoothing::corner))
+    });
+    let memory = corner.map_or(0.0, |corner| 1.0 / (std::f64::consts::TAU * corner));
     let correlation_time = sensors.correlation_time.max(memory);
     let kept = if correlation_time > 0.0 { (-1.0 / (sensors.rate * correlation_time)).exp() } else { 0.0 };
     duration * sensors.rate * (1.0 - kept) / (1.0 + kept)

@@ -24,11 +24,9 @@ fn draw(suite: Suite, index: usize, robots: &[Robot]) -> Case<'_> {
 
 /// The right model of a situation on the smallest robot.
 pub(super) fn small(situation: Situation, number: usize, robots: &[Robot]) -> Case<'_> {
-    let place = Situation::ALL.iter().position(|other| *other == situation).expect("it is one of all");
-    let index = match place.checked_sub(Situation::FIRST) {
-        Some(place) => Situation::LATER_CASES + place + (Situation::ALL.len() - Situation::FIRST) * number,
-        None => place + Situation::FIRST * number,
-    };
+    let all = (0..1000).chain(Situation::later_indices(30));
+    let mut own = all.filter(|index| Situation::of_index(*index) == situation);
+    let index = own.nth(number).expect("each situation has thirty cases and more");
     let spec = Spec::of_seed(Suite::WideRight.seed(Seeds::Dev, index), 5).expect("every index has a case");
     Case::draw(&Spec { robot: 0, ..spec }, &robots[..1]).expect("a right model can always be drawn")
 }
@@ -37,6 +35,7 @@ fn logging() -> Logging {
     Logging {
         tails: Tails::Normal,
         filter: None,
+        smoothing: None,
         velocity: None,
         dead_band: vec![0.0; 2],
         torque_step: vec![0.0; 2],

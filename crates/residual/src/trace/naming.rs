@@ -468,6 +468,8 @@ impl Search<'_> {
             .map(|parameter| self.parameters[parameter])
             .collect();
         self.specs = order.iter().map(|&place| self.specs[place].clone()).collect();
+        let found = order.iter().filter_map(|place| place.checked_sub(self.declared));
+        self.chosen.alternatives = found.map(|found| self.chosen.alternatives[found].clone()).collect();
         Ok(())
     }
 }

@@ -5,7 +5,7 @@ use super::scanned::scanned_constants;
 use super::search::Search;
 use super::tracing::{Tracing, Verdict};
 use phiw_identification::fitting::{TorqueError, accumulate, fit, torque_error};
-use phiw_identification::{Design, EffectSpec, IdentificationError, Identified};
+use phiw_identification::{Design, Effect, EffectSpec, IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
 
 /// Error of all torques together on motion held out, over that of the declared model, up to which a model
@@ -100,8 +100,14 @@ impl Search<'_> {
         let mut constants = Vec::new();
         if self.fixed.prior.is_none() {
             constants = scanned_constants(self.fixed.catalogue, &mut model, data)?;
+            let impossible = self.impossible(&model);
             let uncertain = self.uncertain(&model, effects.len())?;
-            if !uncertain.is_empty() {
+            if !impossible.is_empty() || !uncertain.is_empty() {
+                let changes = !impossible.is_empty();
+                impossible.into_iter().rev().try_for_each(|place| self.remove(place))?;
+                if changes {
+                    self.refine()?;
+                }
                 self.uncertain.extend(uncertain);
                 return self.finish_with(before, harm);
             }
@@ -119,6 +125,21 @@ impl Search<'_> {
             remaining,
             not_judged,
         })
+    }
+
+    /// The places, ascending, of the effects that were found and of which a parameter is certain to be beyond
+    /// its bounds: its 95 % interval is. Constants that were refined since it was chosen may have led there,
+    /// or a point of linearisation that has moved.
+    fn impossible(&self, model: &Identified) -> Vec<usize> {
+        let found = model.design.effects().iter().enumerate().skip(self.declared);
+        let is_beyond = |place: usize, effect: &dyn Effect| {
+            let own = model.design.effect_parameters(place);
+            own.zip(effect.parameters()).any(|(parameter, info)| {
+                let [low, high] = model.fit.intervals_95[parameter];
+                high < info.bounds.0 || low > info.bounds.1
+            })
+        };
+        found.filter(|(place, effect)| is_beyond(*place, effect.as_ref())).map(|(place, _)| place).collect()
     }
 
     /// Of the `named` effects, the first that were found, those of which no parameter is certain: the 95 %
