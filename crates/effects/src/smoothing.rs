@@ -11,9 +11,9 @@ use phiw_telemetry::Block;
 /// The logged torque is low-passed, on one joint or on all alike.
 ///
 /// To second order in the frequency every low-pass is a delay and a factor 1/(1 + T²ω²): this kind is the
-/// factor, `time_delay` the delay. Two equal poles, in whichever direction each of them
-/// runs, have exactly this factor, and T is their time constant. The parameter is T², linear about the value
-/// that has been corrected for already; a fitted one really undoes the filter.
+/// factor, `time_delay` the delay. Two equal poles, in whichever direction each of them runs, have exactly
+/// this factor, and T is their time constant. The parameter is T², linear about the value that has been
+/// corrected for already; a fitted one really undoes the filter.
 pub struct TorqueSmoothing;
 
 const SQUARE: &str = "time_constant_squared";

@@ -164,11 +164,12 @@ impl<'a> Sample<'a> {
     }
 }
 
-/// Second differences are taken over this share of the shortest period that the motion has: fine against it,
-/// and coarse against the noise of single samples.
+/// Second differences are taken over this share of the shortest period that the motion has. Behind filters of
+/// known corners (`cargo xtask undeclared --situation drive_filter`) a sixteenth made time constants a fifth
+/// too long, a sixty-fourth 2 % at most; less makes the noise of single samples larger.
 const STRIDE: f64 = 1.0 / 64.0;
 
-/// Second rate of change of a joint's value at a sample, by the values a sixteenth of the motion's shortest
+/// Second rate of change of a joint's value at a sample, by the values a sixty-fourth of the motion's shortest
 /// period before and after it; zero where the block has none. `values` are `[sample × joint]` over the block.
 pub fn second_rate(block: &Block, values: &[f64], joint: usize, sample: usize) -> f64 {
     let [first, .., last] = block.t.as_slice() else { return 0.0 };

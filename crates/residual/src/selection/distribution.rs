@@ -4,9 +4,11 @@ use statrs::function::beta::beta_reg;
 
 /// P(F > `value`) for Fisher's distribution with `numerator` and `denominator` degrees of freedom.
 ///
-/// From the small side of the incomplete beta function, so that a tail of 1e-40 has its digits, too.
+/// From the small side of the incomplete beta function, so that a tail of 1e-40 has its digits, too. 1 where
+/// there is nothing to tell from: no value, or no degrees.
 pub(super) fn fisher_tail(value: f64, numerator: f64, denominator: f64) -> f64 {
-    if value.is_nan() || value <= 0.0 {
+    let tells = value > 0.0 && numerator > 0.0 && denominator > 0.0;
+    if !tells {
         return 1.0;
     }
     beta_reg(0.5 * denominator, 0.5 * numerator, denominator / (denominator + numerator * value))
@@ -51,6 +53,12 @@ mod tests {
                 assert!((found - exact).abs() < 1e-6 * exact, "{value} {denominator}: {found} {exact}");
             }
         }
+        // One stretch of motion leaves no degree to its spread, a factor without rows none at all.
+        for nothing in [(4.0, 1.0, 0.0), (4.0, 0.0, 9.0), (f64::NAN, 1.0, 9.0), (4.0, 1.0, f64::NAN)] {
+            let (value, numerator, denominator) = nothing;
+            assert_eq!(fisher_tail(value, numerator, denominator), 1.0, "{nothing:?}");
+        }
+        assert_eq!(fisher_tail(f64::INFINITY, 2.0, 9.0), 0.0);
         // Student's with one degree is Cauchy's.
         for value in [-30.0, -1.0, 0.0, 0.3, 1.0, 1e4] {
             let exact = 0.5 - f64::atan(value) / std::f64::consts::PI;

@@ -8,26 +8,25 @@ use phiw_identification::fitting::{TorqueError, accumulate, fit, torque_error};
 use phiw_identification::{Design, Effect, EffectSpec, IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
 
-/// Error of all torques together on motion held out, over that of the declared model, up to which a model
-/// that lowers the errors of single torques is as good: the largest torque's noise decides over less.
-const AS_GOOD: f64 = 1.0;
+/// How far the errors of one model are apart that was fitted twice.
+const ROUNDING: f64 = 1e-9;
 
 impl Search<'_> {
     pub(super) fn finish(self) -> Result<Tracing, IdentificationError> {
         let before = self.declared_error()?;
-        let most = before.1.relative;
+        let most = before.1.relative * (1.0 + ROUNDING);
         // What lowers the error of most torques may raise that of all together. Then it is that which counts:
         // first against the declared model with the weights of the search, then against it as it was fitted.
         for harm in [Harm::EachTorque, Harm::AllTorques { most_relative: 0.0 }] {
             let tracing = self.clone().finish_with(before.clone(), harm)?;
-            if tracing.model.held_out.relative <= AS_GOOD * most {
+            if tracing.model.held_out.relative <= most {
                 return Ok(tracing);
             }
         }
         // What is made of the model's torque was judged with that of an earlier fit.
         if let Some(without) = self.without_what_depends_on_the_model()? {
             let tracing = without.finish_with(before.clone(), Harm::EachTorque)?;
-            if tracing.model.held_out.relative <= AS_GOOD * most {
+            if tracing.model.held_out.relative <= most {
                 return Ok(tracing);
             }
         }
