@@ -3,7 +3,7 @@
 use crate::declaration::{cannot_act, joint_indices, nearest};
 use crate::{EffectKind, FittedEffect, Mechanisms, ServoFriction};
 use crate::{coupling, drift, drive, efficiency, elasticity, external, friction, hysteresis};
-use crate::{position, position_map, sensing, smoothing};
+use crate::{logged_torque, position, position_map, sensing};
 use phiw_codegen::JointTorque;
 use phiw_dynamics::Tree;
 use phiw_identification::effect::{EffectError, EffectParameter, JointProperty};
@@ -33,7 +33,7 @@ impl Default for Catalogue {
                 Box::new(position::TorqueRipple),
                 Box::new(position::EndStop),
                 Box::new(coupling::TransmissionCoupling),
-                Box::new(sensing::TimeDelay),
+                Box::new(logged_torque::TimeDelay),
                 Box::new(sensing::EncoderOffset),
                 Box::new(sensing::ActuatorSaturation),
                 Box::new(hysteresis::Hysteresis),
@@ -44,7 +44,7 @@ impl Default for Catalogue {
                 Box::new(external::ExternalForce),
                 Box::new(efficiency::DriveEfficiency),
                 Box::new(position_map::PositionMap),
-                Box::new(smoothing::TorqueSmoothing),
+                Box::new(logged_torque::TorqueSmoothing),
             ],
         }
     }
