@@ -163,8 +163,8 @@ pub trait EffectKind: Send + Sync {
         false
     }
 
-    /// Whether it is what the drive or the logger does to a torque before it is written down, and nothing that
-    /// the robot does: it refines a model, but never has a name.
+    /// Whether it is what the drive or the logger does to a torque before it is written down, and nothing
+    /// that the robot does: it refines a model, but never has a name.
     fn is_of_the_log(&self) -> bool {
         false
     }

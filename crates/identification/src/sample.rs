@@ -169,8 +169,9 @@ impl<'a> Sample<'a> {
 /// too long, a sixty-fourth 2 % at most; less makes the noise of single samples larger.
 const STRIDE: f64 = 1.0 / 64.0;
 
-/// Second rate of change of a joint's value at a sample, by the values a sixty-fourth of the motion's shortest
-/// period before and after it; zero where the block has none. `values` are `[sample × joint]` over the block.
+/// Second rate of change of a joint's value at a sample, by the values a sixty-fourth of the motion's
+/// shortest period before and after it; zero where the block has none. `values` are `[sample × joint]` over
+/// the block.
 pub fn second_rate(block: &Block, values: &[f64], joint: usize, sample: usize) -> f64 {
     let [first, .., last] = block.t.as_slice() else { return 0.0 };
     let period = (last - first) / (block.t.len() - 1) as f64;

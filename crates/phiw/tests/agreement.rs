@@ -100,8 +100,8 @@ impl Case {
         }
     }
 
-    /// No friction, rotor or compliance of a model is certain to be negative: constants that were refined after
-    /// an effect had been chosen once led to an elasticity of −0.00022 ± 0.00004 rad/(N·m).
+    /// No friction, rotor or compliance of a model is certain to be negative: constants that were refined
+    /// after an effect had been chosen once led to an elasticity of −0.00022 ± 0.00004 rad/(N·m).
     fn nothing_is_impossible(&self, out: &str) {
         let path = self.folder.path().join(out).join("model.json");
         let model: serde_json::Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();

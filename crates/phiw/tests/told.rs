@@ -66,7 +66,7 @@ fn parameters_are_named_by_link_and_the_truth_is_where_the_report_says() {
     assert!(names.len() + untold.len() < 33, "a parameter is in two lists: {information:?}");
     assert!(page.contains("What the logs tell") && page.contains("link_1: mass"), "no section");
     assert!(
-        outcome.summary.contains("told by the logs (10.0 times narrower than believed before)"),
+        outcome.summary.contains("told by the logs (10 times narrower than believed before)"),
         "{}",
         outcome.summary
     );

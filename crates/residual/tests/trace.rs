@@ -498,8 +498,8 @@ fn friction_of_all_joints_is_found_with_nothing_declared() {
     assert!(tracing.model.held_out.relative < 0.1 * tracing.before.1.relative);
 }
 
-/// A friction that falls with the speed makes up for a viscous friction that rises with it: judged without the
-/// former, the latter was none.
+/// A friction that falls with the speed makes up for a viscous friction that rises with it: judged without
+/// the former, the latter was none.
 #[test]
 fn a_viscous_friction_is_named_beside_the_stribeck_friction_that_hides_it() {
     let secret = |state: &State<'_>, torque: &mut [f64]| {

@@ -55,8 +55,8 @@ pub enum Situation {
     StillJoints,
     /// Positions of a potentiometer: noise of 0.03 to 0.3 degrees.
     NoisyPositions,
-    /// Whoever published the log smoothed the torque, without delay: by means over neighbouring samples, or by
-    /// a Butterworth filter that runs forwards and backwards.
+    /// Whoever published the log smoothed the torque, without delay: by means over neighbouring samples, or
+    /// by a Butterworth filter that runs forwards and backwards.
     SmoothedTorque,
 }
 
