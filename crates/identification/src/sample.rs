@@ -164,9 +164,10 @@ impl<'a> Sample<'a> {
     }
 }
 
-/// Second differences are taken over this share of the shortest period that the motion has. Behind filters of
-/// known corners (`cargo xtask undeclared --situation drive_filter`) a sixteenth made time constants a fifth
-/// too long, a sixty-fourth 2 % at most; less makes the noise of single samples larger.
+/// Second differences are taken over this share of the shortest period that the motion has. Behind two
+/// filters of known corners (`cargo xtask undeclared --case 1500006`, and 1500066) a sixteenth made time
+/// constants a fifth too long, a sixty-fourth 1 and 2 %; less makes the noise of single samples larger, and
+/// was not tried.
 const STRIDE: f64 = 1.0 / 64.0;
 
 /// Second rate of change of a joint's value at a sample, by the values a sixty-fourth of the motion's
