@@ -104,6 +104,9 @@ fn results_in_band(
     analysis.warnings.extend(tracing.not_judged.iter().map(|(kind, joints)| {
         format!("{kind} of {} could not be judged on these logs (its columns are not finite): not all of it was sought", joints.join(", "))
     }));
+    if tracing.held_out_had_a_say {
+        analysis.warnings.push(HELD_OUT_HAD_A_SAY.to_owned());
+    }
     let reproduction = HeldOutReproduction::of(&analysis)?;
     analysis.warnings.extend(reproduction.warnings());
     let declared_design = start.design(&session.tree, &session.catalogue)?;
@@ -124,6 +127,11 @@ fn results_in_band(
     summary.push_str(&summary::summary(&analysis, &arguments.session.out, &files));
     Ok(Results { files, summary, warnings: analysis.warnings, report })
 }
+
+/// What is said where motion held out decided what is in the model.
+const HELD_OUT_HAD_A_SAY: &str = "what the training logs alone would have chosen predicts the motion held out \
+     worse than the declared model, so effects were left out until it does not: the error after is not blind, and \
+     training logs with more kinds of motion would help";
 
 /// The corner of the filter that the torque went through before it was logged \[Hz\], if that is below the
 /// cut-off of columns and torque and nobody asked for this one.

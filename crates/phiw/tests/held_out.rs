@@ -83,6 +83,34 @@ fn refused(command: &str, train: &Recording, validate: Option<&Recording>, expec
     assert!(!folder.path().join("out").exists());
 }
 
+/// What had a name, and what stayed in the model, was judged on the very motion whose error was reported: a
+/// log held out in which the friction is half as large, or the torques are noise, told another model.
+#[test]
+fn what_is_found_does_not_depend_on_the_log_that_is_held_out() {
+    let with_friction = |seed: u64, size: f64, noise: f64| {
+        let mut random = RandomNumbers::new(seed);
+        let mut log = synthetic::recording(seed, 30.0);
+        for row in 1..log.t.len() {
+            let speed = (log.q[3 * row + 1] - log.q[3 * row - 2]) * synthetic::RATE;
+            log.tau[3 * row + 1] += size * (speed / 0.005).tanh();
+            (0..3).for_each(|joint| log.tau[3 * row + joint] += noise * random.uniform(-1.0, 1.0));
+        }
+        log
+    };
+    let train = with_friction(1, 2.0, 0.2);
+    let held_out = [with_friction(2, 2.0, 0.2), with_friction(3, 1.0, 0.2), with_friction(4, 2.0, 3.0)];
+    let found = held_out.map(|validate| {
+        let (output, folder) = run("explain", &train, Some(&validate));
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let report = report(&folder);
+        assert!(report.effects.iter().any(|effect| effect.kind == "coulomb_friction"), "{:?}", report.effects);
+        let kinds = report.effects.iter().chain(&report.refinements);
+        let kinds: Vec<String> = kinds.map(|effect| format!("{} {:?}", effect.kind, effect.joints)).collect();
+        (kinds, fs::read_to_string(folder.path().join("out/identified.urdf")).unwrap())
+    });
+    assert!(found.iter().all(|other| *other == found[0]), "{:?}", found.map(|(kinds, _)| kinds));
+}
+
 /// It was called sufficient, with an error of "– %".
 #[test]
 fn a_robot_at_rest_where_held_out_gets_no_verdict() {

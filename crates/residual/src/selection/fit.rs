@@ -2,7 +2,6 @@
 
 use super::cholesky::{factor_rows, substitute};
 use super::problem::{Problem, Torque};
-use std::ops::Range;
 
 /// A column of the model with less than this share of its squared norm left beside those before it is
 /// undetermined.
@@ -113,7 +112,7 @@ impl Fit {
     }
 
     /// The same parameters fitted with the same weights to the rows of all folds but some.
-    pub fn without(&self, problem: &Problem, folds: &Range<usize>) -> Self {
+    pub fn without(&self, problem: &Problem, folds: &[usize]) -> Self {
         let mut fit = self.clone();
         fit.determined.fill(true);
         fit.solve_rows(problem, None, folds);
@@ -194,11 +193,11 @@ impl Fit {
 
     /// Takes the rows of the triangle that are those of `start` from there; the weights must be the same.
     fn solve(&mut self, problem: &Problem, start: Option<&Fit>) {
-        self.solve_rows(problem, start, &(0..0));
+        self.solve_rows(problem, start, &[]);
     }
 
     /// The same with the rows of all folds but `left_out`.
-    fn solve_rows(&mut self, problem: &Problem, start: Option<&Fit>, left_out: &Range<usize>) {
+    fn solve_rows(&mut self, problem: &Problem, start: Option<&Fit>, left_out: &[usize]) {
         let size = self.active.len();
         let same = |start: &Fit| {
             self.active.iter().zip(&start.active).take_while(|(own, other)| own == other).count()
@@ -222,8 +221,8 @@ impl Fit {
                 if !left_out.is_empty() {
                     fewer.clear();
                     fewer.extend_from_slice(products);
-                    for fold in &rows.folds[left_out.clone()] {
-                        fewer.iter_mut().zip(fold.column(column)).for_each(|(sum, own)| *sum -= own);
+                    for &fold in left_out {
+                        fewer.iter_mut().zip(rows.folds[fold].column(column)).for_each(|(sum, own)| *sum -= own);
                     }
                     products = &fewer;
                 }

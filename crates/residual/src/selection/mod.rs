@@ -26,6 +26,7 @@ mod wald;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use cross_validation::{Foretelling, Parts};
 pub(crate) use distribution::students_tail;
 pub(crate) use fit::Fit;
 pub(crate) use problem::{Hypothesis, Member, Prior, Problem, Torque, Variant};

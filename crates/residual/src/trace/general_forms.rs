@@ -49,14 +49,14 @@ impl Search<'_> {
     }
 
     /// Whether the effect at `place` is not worth a name beside what another model, without it, leaves of its
-    /// torques on motion held out.
+    /// torques where they are foretold.
     fn is_done_by(&self, place: usize, other: &Search<'_>) -> Result<bool, IdentificationError> {
         let (own, other) = (self.trial()?, other.trial()?);
         let Some(member) = own.member(place) else { return Ok(false) };
         let squares = Squares {
-            initial: own.held_out_squares(&own.fit_with(|other| other < self.declared)),
-            without: other.held_out_squares(&other.fit),
-            with: own.held_out_squares(&own.fit),
+            initial: own.foretold_squares(&own.fit_with(|other| other < self.declared)),
+            without: other.foretold_squares(&other.fit),
+            with: own.foretold_squares(&own.fit),
         };
         Ok(!self.is_seen_or_absorbed(&own, member, &squares).0)
     }

@@ -18,8 +18,8 @@ pub struct TraceOptions {
     pub false_name_probability: f64,
     /// Probability at which a refinement is in the model, if it were not there.
     pub false_refinement_probability: f64,
-    /// Share of a torque's residual variance on motion held out that an effect on it must take away to have a
-    /// name.
+    /// Share of a torque's residual variance, where training motion is foretold from its other parts, that an
+    /// effect on it must take away to have a name.
     pub least_share: f64,
     /// The same for an effect whose torque follows the same signal of the same joint as a simpler one of the
     /// model.

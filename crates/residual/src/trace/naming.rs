@@ -1,5 +1,7 @@
-//! What of the chosen effects has a name, what only refines the model, and what motion held out speaks
-//! against.
+//! What of the chosen effects has a name, what only refines the model, and what does harm.
+//!
+//! All of it is decided on training motion: parts of it are foretold by fits to the other parts. Motion held
+//! out is for the errors that are reported.
 
 use super::search::Search;
 use super::tracing::{FoundEffect, RivalEffect};
@@ -24,20 +26,22 @@ const AS_IT_WAS: f64 = 1.25;
 /// The model without the forms of something simpler from a level on, constants refined.
 struct Simpler {
     trial: Trial,
-    /// What it leaves of each torque on motion held out.
+    /// What it leaves of each torque where it is foretold.
     squares: Vec<f64>,
     /// The places, among the effects of the whole model, of the forms that are left out, ascending.
     left_out: Vec<usize>,
 }
 
-/// What speaks against an effect on motion held out.
+/// What speaks against an effect.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Harm {
-    /// That the logarithms of the torques' errors grow.
+    /// That the logarithms of the torques' foretold errors grow.
     EachTorque,
-    /// That, or that the error of all torques together is larger than `most_relative` of the torques (RMS);
-    /// zero stands for the declared model with the weights of the search.
-    AllTorques { most_relative: f64 },
+    /// That, or that the foretold error of all torques together is larger than the declared model's.
+    AllTorques,
+    /// That the logarithms of the errors on motion held out grow, or that the error of all torques together
+    /// is there larger than `most_relative` of the torques (RMS).
+    HeldOut { most_relative: f64 },
 }
 
 /// What leaving out an effect does.
@@ -45,7 +49,7 @@ struct Judged {
     /// Place among the model's effects.
     place: usize,
     significance: f64,
-    /// What the logarithms of the errors held out gain with it: Σ rows·log(without/with).
+    /// What the logarithms of the foretold errors gain with it: Σ rows·log(without/with).
     gain: f64,
     /// Share of the stretches of training motion that it makes better.
     folds: f64,
@@ -60,7 +64,7 @@ impl Search<'_> {
     /// The effects that were found, in the order in which they count: those that have a name, then those that
     /// refine. `self.specs` are put in that order.
     ///
-    /// What makes the error on motion held out larger is left out.
+    /// What does harm is left out.
     pub(super) fn name(&mut self, harm: Harm) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
         let trial = loop {
             let trial = self.trial()?;
@@ -80,44 +84,51 @@ impl Search<'_> {
         self.in_order(&trial, judged)
     }
 
-    /// The places of the effects, ascending, that make the error on motion held out larger: the worst, the
-    /// worst of what is left without it, and so on. What others are forms of stays.
+    /// The places of the effects, ascending, that do harm: the worst, the worst of what is left without it,
+    /// and so on. What others are forms of stays.
     ///
     /// Errors count by their logarithms; while that of all torques together is larger than `harm` allows, by
     /// their squares.
     fn harmful(&self, trial: &Trial, harm: Harm) -> Vec<usize> {
         let mut left_out: Vec<usize> = Vec::new();
-        let mut present = trial.held_out_squares(&trial.fit);
         let sum = |squares: &[f64]| squares.iter().sum::<f64>();
-        let torque: f64 = trial.held_out.iter().map(Products::right_hand_side).sum();
         let most = match harm {
             Harm::EachTorque => f64::INFINITY,
-            Harm::AllTorques { most_relative } => {
-                let declared = trial.fit_with(|place| place < self.declared);
-                let least = most_relative * most_relative * torque;
-                if least > 0.0 { least } else { sum(&trial.held_out_squares(&declared)) }
+            Harm::AllTorques => {
+                sum(&trial.foretold_squares(&trial.fit_with(|place| place < self.declared)))
+            }
+            Harm::HeldOut { most_relative } => {
+                let torque: f64 = trial.held_out.iter().map(Products::right_hand_side).sum();
+                most_relative * most_relative * torque
             }
         };
         loop {
+            let fit = trial.fit_with(|other| !left_out.contains(&other));
+            let foretelling = trial.foretelling(&fit);
+            let squares_without = |member: Member| match harm {
+                Harm::HeldOut { .. } => trial.held_out_squares_without(&fit, member),
+                _ => foretelling.squares_without(member),
+            };
+            let present = match harm {
+                Harm::HeldOut { .. } => trial.held_out_squares(&fit),
+                _ => foretelling.squares(),
+            };
             let found = trial.members.par_iter().zip(&trial.places).filter(|(member, place)| {
                 **place >= self.declared && !trial.is_required(member) && !left_out.contains(place)
             });
-            let without = found.map(|(_, &place)| {
-                let fit = trial.fit_with(|other| other != place && !left_out.contains(&other));
-                let squares = trial.held_out_squares(&fit);
-                (trial.gain(&squares, &present), place, squares)
+            let without = found.map(|(&member, &place)| {
+                let squares = squares_without(member);
+                (trial.gain(&squares, &present), place, sum(&squares))
             });
-            let mut without: Vec<(f64, usize, Vec<f64>)> = without.collect();
+            let mut without: Vec<(f64, usize, f64)> = without.collect();
             without.sort_by(|a, b| a.0.total_cmp(&b.0));
             let harms = without.first().is_some_and(|(gain, ..)| *gain <= 0.0);
-            if !harms && sum(&present) > most {
-                without.sort_by(|a, b| sum(&a.2).total_cmp(&sum(&b.2)));
+            let too_much = sum(&present) > most;
+            if !harms && too_much {
+                without.sort_by(|a, b| a.2.total_cmp(&b.2));
             }
-            match without.into_iter().next() {
-                Some((_, place, squares)) if harms || sum(&present) > most => {
-                    left_out.push(place);
-                    present = squares;
-                }
+            match without.first() {
+                Some(&(_, place, _)) if harms || too_much => left_out.push(place),
                 _ => break,
             }
         }
@@ -161,7 +172,7 @@ impl Search<'_> {
             }
             branch.refine()?;
             let trial = branch.trial()?;
-            Ok(Simpler { squares: trial.held_out_squares(&trial.fit), trial, left_out })
+            Ok(Simpler { squares: trial.foretold_squares(&trial.fit), trial, left_out })
         };
         (0..highest).map(below).collect()
     }
@@ -183,14 +194,14 @@ impl Search<'_> {
         let hidden = hidden.filter(|(_, own)| !own.named && self.may_have_a_name(own.place));
         let hidden: Vec<(usize, bool)> =
             hidden.filter_map(|(index, own)| Some((index, forms_of(own)?))).collect();
-        let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
-        let with = trial.held_out_squares(&trial.fit);
+        let initial = trial.foretold_squares(&trial.fit_with(|place| place < self.declared));
+        let with = trial.foretold_squares(&trial.fit);
         for (index, form_is_named) in hidden {
             let own = &mut judged[index];
             let Some(member) = trial.member(own.place) else { continue };
             let squares = Squares {
                 initial: initial.clone(),
-                without: trial.held_out_squares(&trial.fit_with(|place| place != own.place)),
+                without: trial.foretold_squares(&trial.fit_with(|place| place != own.place)),
                 with: with.clone(),
             };
             let certainty = certainty(&trial.problem, &trial.fit, member);
@@ -204,7 +215,7 @@ impl Search<'_> {
     /// Asks again of small effects on joints where another effect has constants, now that these are refined
     /// without it: a sign that turns over another speed looks like some viscous friction.
     fn judge_small(&self, trial: &Trial, judged: &mut [Judged]) -> Result<(), IdentificationError> {
-        let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
+        let initial = trial.foretold_squares(&trial.fit_with(|place| place < self.declared));
         for judged in judged.iter_mut().filter(|judged| judged.named && judged.size < SMALL) {
             let own = &self.specs[judged.place];
             let has_constants = |spec: &EffectSpec| spec.joints == own.joints && !spec.constants.is_empty();
@@ -218,8 +229,8 @@ impl Search<'_> {
             let refined = branch.trial()?;
             let squares = Squares {
                 initial: initial.clone(),
-                without: refined.held_out_squares(&refined.fit),
-                with: trial.held_out_squares(&trial.fit),
+                without: refined.foretold_squares(&refined.fit),
+                with: trial.foretold_squares(&trial.fit),
             };
             let member = trial.member(judged.place);
             judged.named = member.is_some_and(|member| self.is_material(trial, member, &squares));
@@ -266,7 +277,7 @@ impl Search<'_> {
         let limit = self.tail_of_a_name();
         let levels = self.levels(whole);
         let simpler = self.simpler(&levels)?;
-        let all = whole.held_out_squares(&whole.fit);
+        let all = whole.foretold_squares(&whole.fit);
         let mut judged = Vec::new();
         for (&member, &place) in whole.members.iter().zip(&whole.places) {
             if place < self.declared {
@@ -284,13 +295,13 @@ impl Search<'_> {
                 None => (whole, place),
             };
             let Some(own_member) = trial.member(own) else { continue };
-            let with = trial.held_out_squares(&trial.fit);
-            let mut without = trial.held_out_squares(&trial.fit_with(|other| other != own));
+            let with = trial.foretold_squares(&trial.fit);
+            let mut without = trial.foretold_squares(&trial.fit_with(|other| other != own));
             if let Some(simpler) = level.map(|level| &simpler[level - 1]) {
                 // With constants as they are without it, and as they are with it: what is less.
                 without.iter_mut().zip(&simpler.squares).for_each(|(own, other)| *own = own.min(*other));
             }
-            let initial = trial.held_out_squares(&trial.fit_with(|place| place < self.declared));
+            let initial = trial.foretold_squares(&trial.fit_with(|place| place < self.declared));
             let squares = Squares { initial, without, with };
             let material = match level {
                 Some(_) => {
@@ -306,7 +317,7 @@ impl Search<'_> {
                 place,
                 size: trial.size(own_member, &squares),
                 significance: certainty.significance,
-                gain: whole.gain(&whole.held_out_squares(&without), &all),
+                gain: whole.gain(&whole.foretold_squares(&without), &all),
                 folds: whole.better_folds(&without),
                 certain: certainty.tail <= limit,
                 named: certainty.tail <= limit && material,
@@ -321,15 +332,15 @@ impl Search<'_> {
     fn is_form_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
         let hypothesis = &trial.problem.hypotheses[member.hypothesis];
         hypothesis.torques.iter().any(|&torque| {
-            let whole = trial.held_out[torque].right_hand_side().max(f64::MIN_POSITIVE);
+            let whole = trial.torque(torque).right_hand_side().max(f64::MIN_POSITIVE);
             let (without, with) = (squares.without[torque], squares.with[torque]);
             let taken = (without - with).max(0.0);
             let simpler =
                 trial.members.iter().filter(|other| hypothesis.requires.contains(&other.hypothesis));
             let simpler: Vec<(usize, f64)> =
                 simpler.flat_map(|&other| trial.values_of(other, torque)).collect();
-            let of_simpler = trial.held_out[torque].size_of(&simpler);
-            !self.is_as_it_was(torque, (without / trial.held_out[torque].rows().max(1.0)).sqrt())
+            let of_simpler = trial.torque(torque).size_of(&simpler);
+            !self.is_as_it_was(torque, (without / trial.torque(torque).rows().max(1.0)).sqrt())
                 && taken >= self.options.least_share_of_kin * without
                 && taken * without >= self.options.least_of_simpler * of_simpler * with
                 && (taken / whole).sqrt() >= self.options.least_size
@@ -341,8 +352,8 @@ impl Search<'_> {
     fn is_form_material_beside_all(&self, whole: &Trial, member: Member, place: usize) -> bool {
         let squares = Squares {
             initial: Vec::new(),
-            without: whole.held_out_squares(&whole.fit_with(|other| other != place)),
-            with: whole.held_out_squares(&whole.fit),
+            without: whole.foretold_squares(&whole.fit_with(|other| other != place)),
+            with: whole.foretold_squares(&whole.fit),
         };
         self.is_form_material(whole, member, &squares)
     }
@@ -353,7 +364,7 @@ impl Search<'_> {
         self.input.held.as_ref().is_some_and(|held| rmse <= AS_IT_WAS * held.residual_std[torque])
     }
 
-    /// Whether what an effect takes away on motion held out is worth a name.
+    /// Whether what an effect takes away where it is foretold is worth a name.
     ///
     /// It must take away a share of the residual of a torque that it acts on, and be a share of that torque.
     /// Where the other parameters have taken up most of it, it is to be seen on any torque, and must be a
@@ -376,13 +387,14 @@ impl Search<'_> {
         let hypothesis = &trial.problem.hypotheses[member.hypothesis];
         let (mut largest_share, mut size): (f64, f64) = (0.0, 0.0);
         let mut seen = false;
-        for (torque, held_out) in trial.held_out.iter().enumerate() {
+        for torque in 0..trial.problem.torques.len() {
+            let rows = trial.torque(torque);
             let (before, after) = (without[torque], with[torque]);
-            let rmse = (initial[torque] / held_out.rows().max(1.0)).sqrt();
-            if held_out.rows() == 0.0 || self.is_as_it_was(torque, rmse) {
+            let rmse = (initial[torque] / rows.rows().max(1.0)).sqrt();
+            if rows.rows() == 0.0 || self.is_as_it_was(torque, rmse) {
                 continue;
             }
-            let whole = held_out.right_hand_side().max(f64::MIN_POSITIVE);
+            let whole = rows.right_hand_side().max(f64::MIN_POSITIVE);
             let taken = (before - after).max(0.0);
             let share = taken / before;
             largest_share = largest_share.max(share);
@@ -393,7 +405,7 @@ impl Search<'_> {
                 && share >= options.least_share
                 && taken >= options.least_of_others * by_others
                 && (taken / whole).sqrt() >= options.least_size;
-            size = size.max((held_out.size_of(&trial.values_of(member, torque)) / whole).sqrt());
+            size = size.max((rows.size_of(&trial.values_of(member, torque)) / whole).sqrt());
         }
         (seen, largest_share >= options.least_share && size >= ABSORBED_SIZE * options.least_size)
     }

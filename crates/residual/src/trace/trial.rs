@@ -1,13 +1,16 @@
-//! A model on trial: fitted to the training motion, held against motion that it was not fitted to.
+//! A model on trial: what it foretells of training motion that it was not fitted to.
 
 use super::hypotheses::{Candidates, Present};
 use super::search::Search;
 use super::stage::Stage;
-use crate::selection::{Fit, Member, Problem, Products};
+use crate::selection::{Fit, Foretelling, Member, Parts, Problem, Products};
 use phiw_identification::IdentificationError;
 use phiw_regressor::least_squares::GroupedFactor;
 
-/// The chosen model, fitted to the training motion, and motion held out to judge it.
+/// The chosen model, fitted to the training motion.
+///
+/// What has a name is judged on parts of that motion which a fit to the other parts foretells; motion held
+/// out is for the errors that are reported.
 pub(super) struct Trial {
     pub problem: Problem,
     pub members: Vec<Member>,
@@ -18,7 +21,7 @@ pub(super) struct Trial {
     pub places: Vec<usize>,
 }
 
-/// What is left of each torque on motion held out.
+/// What is left of each torque where it is foretold.
 pub(super) struct Squares {
     /// By the declared effects alone.
     pub initial: Vec<f64>,
@@ -62,16 +65,21 @@ impl Trial {
         self.members.iter().any(|other| requires(other).contains(&member.hypothesis))
     }
 
-    /// What the logarithms of the errors held out gain: Σ rows·log(without/with).
+    /// What the logarithms of the foretold errors gain: Σ rows·log(without/with).
     pub fn gain(&self, without: &[f64], with: &[f64]) -> f64 {
-        let of_torque = |torque: usize| self.held_out[torque].rows() * (without[torque] / with[torque]).ln();
-        (0..self.held_out.len()).map(of_torque).sum()
+        let of_torque = |torque: usize| self.torque(torque).rows() * (without[torque] / with[torque]).ln();
+        (0..self.problem.torques.len()).map(of_torque).sum()
+    }
+
+    /// The products of a torque over all training motion.
+    pub fn torque(&self, torque: usize) -> &Products {
+        &self.problem.torques[torque].whole
     }
 
     /// RMS of what a member takes over the RMS of a torque that it acts on, the largest.
     pub fn size(&self, member: Member, squares: &Squares) -> f64 {
         let of_torque = |&torque: &usize| {
-            let whole = self.held_out[torque].right_hand_side().max(f64::MIN_POSITIVE);
+            let whole = self.torque(torque).right_hand_side().max(f64::MIN_POSITIVE);
             ((squares.without[torque] - squares.with[torque]).max(0.0) / whole).sqrt()
         };
         self.problem.hypotheses[member.hypothesis].torques.iter().map(of_torque).fold(0.0, f64::max)
@@ -90,12 +98,33 @@ impl Trial {
         Fit::new(&self.problem, self.problem.active(&members), &self.rows, Some(&self.fit))
     }
 
+    /// Fits to four fifths of the training motion each, which foretell the fifth that is left.
+    pub fn foretelling(&self, fit: &Fit) -> Foretelling<'_> {
+        Foretelling::new(&self.problem, fit, Parts::Spread)
+    }
+
+    /// What is left of each torque of the training motion where each fifth is foretold by a fit to the others.
+    pub fn foretold_squares(&self, fit: &Fit) -> Vec<f64> {
+        self.foretelling(fit).squares()
+    }
+
+    /// What is left of each torque on motion held out, for the errors that are reported.
     pub fn held_out_squares(&self, fit: &Fit) -> Vec<f64> {
         let of_torque = |(torque, held_out): (usize, &Products)| match held_out.rows() > 0.0 {
             true => held_out.residual(&fit.columns(torque)),
             false => 1.0,
         };
         self.held_out.iter().enumerate().map(of_torque).collect()
+    }
+
+    /// The same for a fit without a member; the others are fitted again, with the same weights.
+    pub fn held_out_squares_without(&self, fit: &Fit, member: Member) -> Vec<f64> {
+        let own = &self.problem.variant(member).parameters;
+        let places: Vec<usize> = own.iter().filter_map(|&parameter| fit.place[parameter]).collect();
+        match fit.pinned(&self.problem, &places) {
+            Some(without) => self.held_out_squares(&without),
+            None => self.held_out_squares(fit),
+        }
     }
 
     /// What a member adds to a torque, as (column, value) pairs.

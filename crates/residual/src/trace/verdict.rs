@@ -12,16 +12,30 @@ use phiw_regressor::least_squares::GroupedFactor;
 const ROUNDING: f64 = 1e-9;
 
 impl Search<'_> {
+    /// Training motion alone decides, unless the declared model foretells motion held out better than what is
+    /// chosen: a model that an effect makes worse is of no use to anybody. Then that motion has a say, and the
+    /// result says so.
     pub(super) fn finish(self) -> Result<Tracing, IdentificationError> {
         let before = self.declared_error()?;
         let most = before.1.relative * (1.0 + ROUNDING);
-        // What lowers the error of most torques may raise that of all together. Then it is that which counts:
-        // first against the declared model with the weights of the search, then against it as it was fitted.
-        for harm in [Harm::EachTorque, Harm::AllTorques { most_relative: 0.0 }] {
-            let tracing = self.clone().finish_with(before.clone(), harm)?;
-            if tracing.model.held_out.relative <= most {
-                return Ok(tracing);
-            }
+        let tracing = self.clone().finish_with(before.clone(), Harm::EachTorque)?;
+        if tracing.model.held_out.relative <= most {
+            return Ok(tracing);
+        }
+        let tracing = self.with_a_say_of_what_is_held_out(before, most)?;
+        Ok(Tracing { held_out_had_a_say: true, ..tracing })
+    }
+
+    /// Of the other ways to end the search the first whose error on motion held out is at most this.
+    fn with_a_say_of_what_is_held_out(
+        self,
+        before: (TorqueError, TorqueError),
+        most: f64,
+    ) -> Result<Tracing, IdentificationError> {
+        // What lowers the error of most torques may raise that of all together.
+        let tracing = self.clone().finish_with(before.clone(), Harm::AllTorques)?;
+        if tracing.model.held_out.relative <= most {
+            return Ok(tracing);
         }
         // What is made of the model's torque was judged with that of an earlier fit.
         if let Some(without) = self.without_what_depends_on_the_model()? {
@@ -30,7 +44,7 @@ impl Search<'_> {
                 return Ok(tracing);
             }
         }
-        self.finish_with(before, Harm::AllTorques { most_relative: most })
+        self.finish_with(before, Harm::HeldOut { most_relative: most })
     }
 
     /// The same without the effects that were found and whose columns are made of the model's torque or are
@@ -122,6 +136,7 @@ impl Search<'_> {
             effects,
             refinements,
             remaining,
+            held_out_had_a_say: false,
             not_judged,
         })
     }
