@@ -17,6 +17,7 @@ mod design_effect;
 mod distribution;
 mod fit;
 mod moves;
+mod one_for_several;
 mod problem;
 mod products;
 mod screening;

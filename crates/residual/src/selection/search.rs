@@ -151,6 +151,9 @@ impl<'a> Search<'a> {
             if round == 0 && self.choose_anew() {
                 self.sweep();
             }
+            if self.one_for_several() {
+                self.sweep();
+            }
             while self.prune() {}
             self.renew();
             self.doubt();
@@ -171,7 +174,7 @@ impl<'a> Search<'a> {
         self.problem.hypotheses[member.hypothesis].declared
     }
 
-    fn is_in(&self, hypothesis: usize) -> bool {
+    pub(super) fn is_in(&self, hypothesis: usize) -> bool {
         self.model.members.iter().any(|member| member.hypothesis == hypothesis)
     }
 
@@ -305,7 +308,8 @@ impl<'a> Search<'a> {
         };
         open.retain(|&other| {
             let other = &self.problem.hypotheses[other];
-            !other.made_of_model && other.torques.iter().any(|torque| own.torques.contains(torque))
+            (!other.made_of_model || other.kind == own.kind)
+                && other.torques.iter().any(|torque| own.torques.contains(torque))
         });
         open.push(member.hypothesis);
         let mut screened = screen(self.problem, &without, &self.rows, &open);
@@ -326,7 +330,9 @@ impl<'a> Search<'a> {
             screened.iter().map(|screened| vec![screened.member]).filter(|single| *single != [member]);
         let singles = singles.take(self.policy.finalists / 2);
         let pairs = pairs.iter().map(|(_, pair)| pair.to_vec()).take(self.policy.finalists / 4);
-        let moves: Vec<Vec<Member>> = singles.chain(pairs).collect();
+        let scaled = if own.made_of_model && !own.declared { self.of_kind(own.kind) } else { Vec::new() };
+        let scaled = scaled.into_iter().map(|other| vec![other]);
+        let moves: Vec<Vec<Member>> = singles.chain(pairs).chain(scaled).collect();
         let swapped = |entering: Vec<Member>| {
             let members = others.iter().chain(&entering).copied().collect();
             (members, entering)

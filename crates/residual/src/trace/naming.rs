@@ -297,16 +297,14 @@ impl Search<'_> {
             let Some(own_member) = trial.member(own) else { continue };
             let with = trial.foretold_squares(&trial.fit);
             let mut without = trial.foretold_squares(&trial.fit_with(|other| other != own));
-            if let Some(simpler) = level.map(|level| &simpler[level - 1]) {
-                // With constants as they are without it, and as they are with it: what is less.
-                without.iter_mut().zip(&simpler.squares).for_each(|(own, other)| *own = own.min(*other));
-            }
+            let below = level.map(|level| simpler[level - 1].squares.as_slice()).unwrap_or_default();
+            lower(&mut without, below);
             let initial = trial.foretold_squares(&trial.fit_with(|place| place < self.declared));
             let squares = Squares { initial, without, with };
             let material = match level {
                 Some(_) => {
                     self.is_form_material(trial, own_member, &squares)
-                        || self.is_form_material_beside_all(whole, member, place)
+                        || self.is_form_material_beside_all(whole, member, place, below)
                 }
                 None => self.is_material(trial, own_member, &squares),
             };
@@ -348,11 +346,19 @@ impl Search<'_> {
     }
 
     /// The same beside all other forms: where two of them are there, neither takes most of what the simpler
-    /// ones leave.
-    fn is_form_material_beside_all(&self, whole: &Trial, member: Member, place: usize) -> bool {
+    /// ones leave. `simpler` is what these leave of each torque.
+    fn is_form_material_beside_all(
+        &self,
+        whole: &Trial,
+        member: Member,
+        place: usize,
+        simpler: &[f64],
+    ) -> bool {
+        let mut without = whole.foretold_squares(&whole.fit_with(|other| other != place));
+        lower(&mut without, simpler);
         let squares = Squares {
             initial: Vec::new(),
-            without: whole.foretold_squares(&whole.fit_with(|other| other != place)),
+            without,
             with: whole.foretold_squares(&whole.fit),
         };
         self.is_form_material(whole, member, &squares)
@@ -491,6 +497,12 @@ impl Simpler {
     fn place(&self, place: usize) -> usize {
         place - self.left_out.iter().filter(|left_out| **left_out < place).count()
     }
+}
+
+/// What is less of what two models leave of each torque: constants as they are with a form, and as they are
+/// without.
+fn lower(squares: &mut [f64], others: &[f64]) {
+    squares.iter_mut().zip(others).for_each(|(own, other)| *own = own.min(*other));
 }
 
 /// The probability of the chosen one, and the rivals with theirs: e^(−excess/2), the criterion being twice a
