@@ -185,3 +185,36 @@ fn one_that_does_the_work_of_two_takes_their_place() {
     let two = [0, 2].map(|hypothesis| Member { hypothesis, variant: 0 });
     assert_eq!(chosen(&problem, two.to_vec()), [(0, 2)]);
 }
+
+/// Torques that share a parameter, and gains of each: the gain of one is the opposite gain of all others, and
+/// these stood in its place wherever the search had come to them first.
+#[test]
+fn a_gain_of_one_torque_is_not_named_as_the_opposite_gain_of_all_others() {
+    let mut random = RandomNumbers::new(9);
+    let truth = [(0, 0, 0.0), (1, 0, 0.3), (2, 0, 0.0)];
+    // The only candidate of each torque is the column of the model once more.
+    let mut problem = problem(&mut random, 3, 1, &[], 0.0);
+    for (torque, _, gain) in truth {
+        let mut folds = Vec::new();
+        for _ in 0..10 {
+            let mut rows = Vec::new();
+            for _ in 0..40 {
+                let column = random.uniform(-1.0, 1.0);
+                let error = 0.05 * random.uniform(-1.0, 1.0);
+                rows.extend([column, column, (3.0 + gain) * column + error]);
+            }
+            folds.push(Products::of_factor(&Factor::of_rows(3, &rows).unwrap()));
+        }
+        // One parameter for all, and the candidate's own.
+        problem.torques[torque] = Torque::new(vec![0, 1 + torque], folds, 1e-3);
+        problem.hypotheses[torque].variants[0].parameters = vec![1 + torque];
+        problem.hypotheses[torque].made_of_model = true;
+    }
+    problem.parameters = 4;
+    problem.model = vec![0];
+    problem.absent = vec![0.0; 4];
+    for start in [vec![], vec![0, 2], vec![0], vec![1]] {
+        let start = start.into_iter().map(|hypothesis| Member { hypothesis, variant: 0 }).collect();
+        assert_eq!(chosen(&problem, start), [(1, 0)]);
+    }
+}
