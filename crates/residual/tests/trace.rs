@@ -512,3 +512,18 @@ fn a_viscous_friction_is_named_beside_the_stribeck_friction_that_hides_it() {
         assert!(named.contains(&(kind.to_owned(), vec!["elbow".to_owned()])), "{kind}: {named:?}");
     }
 }
+
+/// The error of all joints together is the shoulder's noise, of which the elbow's ripple is a thousandth: that
+/// it hardly falls, or grows a little, is no reason to leave the ripple out.
+#[test]
+fn an_effect_is_not_hidden_by_the_noise_of_another_joint() {
+    for seed in 1..=6 {
+        let random = std::cell::RefCell::new(RandomNumbers::new(seed));
+        let secret = |state: &State<'_>, torque: &mut [f64]| {
+            torque[0] += random.borrow_mut().uniform(-60.0, 60.0);
+            torque[1] += 0.1 * (12.0 * state.q[1]).sin();
+        };
+        let tracing = traced(seed, &secret);
+        assert_eq!(named(&tracing), [("torque_ripple".to_owned(), vec!["elbow".to_owned()])], "{seed}");
+    }
+}
