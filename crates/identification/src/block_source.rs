@@ -82,7 +82,8 @@ pub fn try_for_each_block<E: From<LogError>>(
 /// Blocks that wait for the processors; more would cost memory only.
 const BLOCKS_PER_THREAD: usize = 2;
 
-/// The same, but so many blocks of a source at a time as the processors can work on.
+/// The same, but so many blocks at a time as the processors can work on, whatever source they come from: a
+/// short log is one block.
 ///
 /// # Errors
 /// A log cannot be read; what `take` returns.
@@ -91,15 +92,12 @@ pub(crate) fn try_for_each_batch<E: From<LogError>>(
     mut take: impl FnMut(Vec<Block>) -> Result<(), E>,
 ) -> Result<(), E> {
     let size = BLOCKS_PER_THREAD * rayon::current_num_threads();
-    for source in sources {
-        let mut batch = Vec::with_capacity(size);
-        try_for_each_block(&[*source], |block| {
-            batch.push(block);
-            if batch.len() == size { take(std::mem::take(&mut batch)) } else { Ok(()) }
-        })?;
-        take(batch)?;
-    }
-    Ok(())
+    let mut batch = Vec::with_capacity(size);
+    try_for_each_block(sources, |block| {
+        batch.push(block);
+        if batch.len() == size { take(std::mem::take(&mut batch)) } else { Ok(()) }
+    })?;
+    take(batch)
 }
 
 #[cfg(test)]

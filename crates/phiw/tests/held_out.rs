@@ -103,7 +103,11 @@ fn what_is_found_does_not_depend_on_the_log_that_is_held_out() {
         let (output, folder) = run("explain", &train, Some(&validate));
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let report = report(&folder);
-        assert!(report.effects.iter().any(|effect| effect.kind == "coulomb_friction"), "{:?}", report.effects);
+        assert!(
+            report.effects.iter().any(|effect| effect.kind == "coulomb_friction"),
+            "{:?}",
+            report.effects
+        );
         let kinds = report.effects.iter().chain(&report.refinements);
         let kinds: Vec<String> = kinds.map(|effect| format!("{} {:?}", effect.kind, effect.joints)).collect();
         (kinds, fs::read_to_string(folder.path().join("out/identified.urdf")).unwrap())

@@ -222,7 +222,10 @@ impl Fit {
                     fewer.clear();
                     fewer.extend_from_slice(products);
                     for &fold in left_out {
-                        fewer.iter_mut().zip(rows.folds[fold].column(column)).for_each(|(sum, own)| *sum -= own);
+                        fewer
+                            .iter_mut()
+                            .zip(rows.folds[fold].column(column))
+                            .for_each(|(sum, own)| *sum -= own);
                     }
                     products = &fewer;
                 }

@@ -24,7 +24,9 @@ impl Search<'_> {
             let active = self.problem.active(&others);
             let without = Fit::beside(self.problem, active, &self.rows, &self.model.fit);
             let with = |member: Member| (others.iter().copied().chain([member]).collect(), ());
-            let best = self.ranked(self.of_kind(kind).into_iter().map(with).collect(), &without, usize::MAX).into_iter();
+            let best = self
+                .ranked(self.of_kind(kind).into_iter().map(with).collect(), &without, usize::MAX)
+                .into_iter();
             if let Some((model, ())) = best.into_iter().find(|(model, ())| model.settled)
                 && model.value < self.model.value - LEAST_STEP
             {

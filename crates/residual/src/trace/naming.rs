@@ -37,8 +37,6 @@ struct Simpler {
 pub(super) enum Harm {
     /// That the logarithms of the torques' foretold errors grow.
     EachTorque,
-    /// That, or that the foretold error of all torques together is larger than the declared model's.
-    AllTorques,
     /// That the logarithms of the errors on motion held out grow, or that the error of all torques together
     /// is there larger than `most_relative` of the torques (RMS).
     HeldOut { most_relative: f64 },
@@ -94,9 +92,6 @@ impl Search<'_> {
         let sum = |squares: &[f64]| squares.iter().sum::<f64>();
         let most = match harm {
             Harm::EachTorque => f64::INFINITY,
-            Harm::AllTorques => {
-                sum(&trial.foretold_squares(&trial.fit_with(|place| place < self.declared)))
-            }
             Harm::HeldOut { most_relative } => {
                 let torque: f64 = trial.held_out.iter().map(Products::right_hand_side).sum();
                 most_relative * most_relative * torque
@@ -356,11 +351,7 @@ impl Search<'_> {
     ) -> bool {
         let mut without = whole.foretold_squares(&whole.fit_with(|other| other != place));
         lower(&mut without, simpler);
-        let squares = Squares {
-            initial: Vec::new(),
-            without,
-            with: whole.foretold_squares(&whole.fit),
-        };
+        let squares = Squares { initial: Vec::new(), without, with: whole.foretold_squares(&whole.fit) };
         self.is_form_material(whole, member, &squares)
     }
 

@@ -10,8 +10,10 @@ use phiw_regressor::least_squares::GroupedFactor;
 
 /// How far the errors of one model are apart that was fitted twice.
 const ROUNDING: f64 = 1e-9;
+/// Error of a model with names over that of the declared one at most, however uncertain its parameters are.
+const MOST_WORSE: f64 = 1.1;
 /// Times that the bound for the error on trial is lowered, before all that was found leaves.
-const TIGHTENINGS: usize = 3;
+const TIGHTENINGS: usize = 2;
 /// How much lower it is than what would just suffice.
 const TIGHTER: f64 = 0.99;
 
@@ -36,8 +38,8 @@ impl Search<'_> {
         before: (TorqueError, TorqueError),
         most: f64,
     ) -> Result<Tracing, IdentificationError> {
-        // What lowers the error of most torques may raise that of all together.
-        let tracing = self.clone().finish_with(before.clone(), Harm::AllTorques)?;
+        let tracing =
+            self.clone().finish_with(before.clone(), Harm::HeldOut { most_relative: f64::INFINITY })?;
         if self.is_no_worse(&tracing, most)? {
             return Ok(tracing);
         }
@@ -48,7 +50,7 @@ impl Search<'_> {
                 return Ok(tracing);
             }
         }
-        // What is left on trial, with the weights of the search, is not quite what the final fit leaves.
+        // What lowers the error of most torques may raise that of all together. And what is left on trial, with the weights of the search, is not quite what the final fit leaves.
         let mut most_relative = most;
         for _ in 0..TIGHTENINGS {
             let tracing = self.clone().finish_with(before.clone(), Harm::HeldOut { most_relative })?;
@@ -62,7 +64,7 @@ impl Search<'_> {
 
     /// Whether a model's error on motion held out is at most `most`. A model with names may have more by what
     /// the uncertainty of its parameters makes of this motion: where the noise of one joint is most of all
-    /// error, a large effect on another hardly shows in their sum.
+    /// error, a large effect on another hardly shows in their sum. It is never more than by `MOST_WORSE`.
     fn is_no_worse(&self, tracing: &Tracing, most: f64) -> Result<bool, IdentificationError> {
         let model = &tracing.model;
         if model.held_out.relative <= most || tracing.effects.is_empty() {
@@ -72,7 +74,8 @@ impl Search<'_> {
         let torque: f64 = expected.iter().map(|expected| expected.torque).sum();
         let of_parameters: f64 = expected.iter().map(|expected| expected.of_parameters).sum();
         let square = |value: f64| value * value;
-        Ok(square(model.held_out.relative) <= square(most) + of_parameters / torque)
+        let allowed = square(most) + of_parameters / torque;
+        Ok(square(model.held_out.relative) <= allowed.min(square(MOST_WORSE * most)))
     }
 
     /// The same without the effects that were found and whose columns are made of the model's torque or are
