@@ -513,8 +513,8 @@ fn a_viscous_friction_is_named_beside_the_stribeck_friction_that_hides_it() {
     }
 }
 
-/// The error of all joints together is the shoulder's noise, of which the elbow's ripple is a thousandth: that
-/// it hardly falls, or grows a little, is no reason to leave the ripple out.
+/// The error of all joints together is the shoulder's noise, of which the elbow's ripple is a thousandth:
+/// that it hardly falls, or grows a little, is no reason to leave the ripple out.
 #[test]
 fn an_effect_is_not_hidden_by_the_noise_of_another_joint() {
     for seed in 1..=6 {

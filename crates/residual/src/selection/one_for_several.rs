@@ -37,8 +37,8 @@ impl Search<'_> {
         better
     }
 
-    /// What of a kind is not in the model, closed or not, where it is written in one way only: what is missing
-    /// may show on torques that none of these acts on, and then a quick look sees nothing.
+    /// What of a kind is not in the model, closed or not, where it is written in one way only: what is
+    /// missing may show on torques that none of these acts on, and then a quick look sees nothing.
     pub(super) fn of_kind(&self, kind: usize) -> Vec<Member> {
         let own = |hypothesis: &usize| {
             let own = &self.problem.hypotheses[*hypothesis];

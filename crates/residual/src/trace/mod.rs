@@ -3,8 +3,8 @@
 //! All candidates' columns stand beside the model's in one pass over the logs; which of them enter is decided
 //! on what is left of the rows (`selection`). Then the constants of what was chosen are refined, columns that
 //! are made of the model's torque are made again, and all is chosen anew, until nothing changes. In the end,
-//! parts of the training motion, foretold from the other parts, say what has a name. Motion held out is for the
-//! errors that are reported.
+//! parts of the training motion, foretold from the other parts, say what has a name. Motion held out is for
+//! the errors that are reported.
 
 mod constants;
 mod floor;

@@ -103,7 +103,8 @@ impl Trial {
         Foretelling::new(&self.problem, fit, Parts::Spread)
     }
 
-    /// What is left of each torque of the training motion where each fifth is foretold by a fit to the others.
+    /// What is left of each torque of the training motion where each fifth is foretold by a fit to the
+    /// others.
     pub fn foretold_squares(&self, fit: &Fit) -> Vec<f64> {
         self.foretelling(fit).squares()
     }

@@ -19,8 +19,8 @@ const TIGHTER: f64 = 0.99;
 
 impl Search<'_> {
     /// Training motion alone decides, unless the declared model foretells motion held out better than what is
-    /// chosen: a model that an effect makes worse is of no use to anybody. Then that motion has a say, and the
-    /// result says so.
+    /// chosen: a model that an effect makes worse is of no use to anybody. Then that motion has a say, and
+    /// the result says so.
     pub(super) fn finish(self) -> Result<Tracing, IdentificationError> {
         let before = self.declared_error()?;
         let most = before.1.relative * (1.0 + ROUNDING);
@@ -50,7 +50,8 @@ impl Search<'_> {
                 return Ok(tracing);
             }
         }
-        // What lowers the error of most torques may raise that of all together. And what is left on trial, with the weights of the search, is not quite what the final fit leaves.
+        // What lowers the error of most torques may raise that of all together. And what is left on trial,
+        // with the weights of the search, is not quite what the final fit leaves.
         let mut most_relative = most;
         for _ in 0..TIGHTENINGS {
             let tracing = self.clone().finish_with(before.clone(), Harm::HeldOut { most_relative })?;
