@@ -125,7 +125,10 @@ pub(super) fn screen(problem: &Problem, fit: &Fit, rows: &[f64], open: &[usize])
         if most <= 0.0 {
             return None;
         }
-        let of_variant = |variant: usize| -> Option<Screened> {
+        // Which variant is the best is asked before what is as good as none is taken off, and where what is left
+        // of its torques would be negative to first order, by the squares: that many are good enough is no
+        // reason to take any of them.
+        let of_variant = |variant: usize| -> Option<([f64; 2], Screened)> {
             let member = Member { hypothesis, variant };
             let beside = Beside::new(problem, fit, &own.variants[variant].parameters, &own.torques);
             let (squares, values) = beside.solve(fit);
@@ -134,12 +137,15 @@ pub(super) fn screen(problem: &Problem, fit: &Fit, rows: &[f64], open: &[usize])
                 .iter()
                 .zip(bounds)
                 .all(|(value, (low, high))| value.is_none_or(|value| *low <= value && value <= *high));
-            let gain =
-                gain_of(fit, squares, effective, &own.torques).min(most) - price(problem, member, None, rows);
-            (within && values.iter().any(Option::is_some) && gain > 0.0).then_some(Screened { member, gain })
+            let whole = gain_of(fit, squares, effective, &own.torques);
+            let price = price(problem, member, None, rows);
+            let gain = whole.min(most) - price;
+            let gains = within && values.iter().any(Option::is_some) && gain > 0.0;
+            gains.then_some(([whole - price, squares], Screened { member, gain }))
         };
         let variants = (0..own.variants.len()).filter_map(of_variant);
-        variants.max_by(|a, b| a.gain.total_cmp(&b.gain))
+        let better = |a: &[f64; 2], b: &[f64; 2]| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]));
+        variants.max_by(|a, b| better(&a.0, &b.0)).map(|(_, screened)| screened)
     };
     let mut screened: Vec<Screened> = open.par_iter().filter_map(of_hypothesis).collect();
     screened.sort_by(|a, b| b.gain.total_cmp(&a.gain));

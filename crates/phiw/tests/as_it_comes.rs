@@ -1,0 +1,237 @@
+//! Robots as they come: everything missing at once, joints of noise, slow noise, slow training. Each test is
+//! a case that was measured from outside, on robots that the tracer had not seen.
+
+mod synthetic;
+
+use phiw::arguments::{ExplainArguments, SessionArguments};
+use phiw::console::Console;
+use phiw::explain::explain;
+use phiw_dynamics::random_tree::RandomNumbers;
+use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+use phiw_dynamics::{Tree, Workspace};
+use phiw_report::ReportJson;
+use phiw_report::json::Verdict;
+use phiw_telemetry::Recording;
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+const RATE: f64 = 200.0;
+/// Viscous and Coulomb friction as shares of a joint's RMS torque, at its RMS speed.
+const FRICTION: [f64; 2] = [0.2, 0.3];
+
+/// What a log is made with.
+struct Motion {
+    seed: u64,
+    seconds: f64,
+    /// Times as fast as a motion of 0.2 to 1 Hz.
+    speed: f64,
+    /// Standard deviation of the torque noise, as a share of the joint's RMS torque.
+    noise: f64,
+    /// Time over which the noise is correlated \[s\].
+    correlation_s: f64,
+}
+
+const USUAL: Motion = Motion { seed: 1, seconds: 20.0, speed: 1.0, noise: 0.02, correlation_s: 0.0 };
+
+/// Frictions of the joints, the same in all logs of a robot: N·m·s/rad and N·m.
+fn frictions(tree: &Tree) -> Vec<[f64; 2]> {
+    let bodies = log(tree, &[], &Motion { seed: 99, noise: 0.0, ..USUAL }, &|_, _, _| ());
+    let joints = tree.joint_count();
+    let rms = |values: &mut dyn Iterator<Item = f64>| {
+        let (mut sum, mut count) = (0.0, 0.0);
+        values.for_each(|value| (sum, count) = (sum + value * value, count + 1.0));
+        (sum / count).sqrt()
+    };
+    (0..joints)
+        .map(|joint| {
+            let torque = rms(&mut bodies.tau.iter().skip(joint).step_by(joints).copied());
+            let q: Vec<f64> = bodies.q.iter().skip(joint).step_by(joints).copied().collect();
+            let speed = rms(&mut q.windows(2).map(|pair| (pair[1] - pair[0]) * RATE));
+            [FRICTION[0] * torque / speed, FRICTION[1] * torque]
+        })
+        .collect()
+}
+
+/// A log of the robot; `secret` adds to the torques, given positions and speeds.
+fn log(
+    tree: &Tree,
+    frictions: &[[f64; 2]],
+    motion: &Motion,
+    secret: &dyn Fn(&[f64], &[f64], &mut [f64]),
+) -> Recording {
+    let mut random = RandomNumbers::new(motion.seed);
+    let joints = tree.joint_count();
+    let sines: Vec<[[f64; 3]; 5]> = (0..joints)
+        .map(|_| {
+            std::array::from_fn(|harmonic| {
+                let omega = motion.speed * TAU * (0.2 * (harmonic + 1) as f64 + random.uniform(0.0, 0.1));
+                [random.uniform(0.1, 0.4), omega, random.uniform(0.0, TAU)]
+            })
+        })
+        .collect();
+    let names = tree.joint_names().map(str::to_owned).collect();
+    let mut log = Recording { joints: names, ..Recording::default() };
+    let mut workspace = Workspace::new(tree);
+    let kept = if motion.correlation_s > 0.0 { (-1.0 / (motion.correlation_s * RATE)).exp() } else { 0.0 };
+    let mut noise = vec![0.0; joints];
+    let mut torque = vec![0.0; joints];
+    for row in 0..(motion.seconds * RATE) as usize {
+        let t = row as f64 / RATE;
+        let sum = |term: &dyn Fn([f64; 3]) -> f64| -> Vec<f64> {
+            sines.iter().map(|sines| sines.iter().map(|sine| term(*sine)).sum()).collect()
+        };
+        let q = sum(&|[a, w, p]| a * (w * t + p).sin());
+        let v = sum(&|[a, w, p]| a * w * (w * t + p).cos());
+        let a = sum(&|[a, w, p]| -a * w * w * (w * t + p).sin());
+        tree.inverse_dynamics(&q, &v, &a, &mut workspace, &mut torque).unwrap();
+        for (joint, [viscous, coulomb]) in frictions.iter().enumerate() {
+            let normal = (0..12).map(|_| random.uniform(0.0, 1.0)).sum::<f64>() - 6.0;
+            noise[joint] = kept * noise[joint] + (1.0 - kept * kept).sqrt() * normal;
+            let size = motion.noise * coulomb / FRICTION[1];
+            torque[joint] += viscous * v[joint] + coulomb * (v[joint] / 0.01).tanh() + size * noise[joint];
+        }
+        secret(&q, &v, &mut torque);
+        log.t.push(t);
+        log.q.extend(q);
+        log.tau.extend(torque.iter().copied());
+    }
+    log
+}
+
+/// What is said of these logs, the last of which is held out.
+fn explained(urdf: &str, logs: &[Recording], declared: &[&str]) -> ReportJson {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("robot.urdf"), urdf).unwrap();
+    let mut files = Vec::new();
+    for (index, log) in logs.iter().enumerate() {
+        files.push(path(&format!("{index}.csv")));
+        fs::write(&files[index], synthetic::csv(log)).unwrap();
+    }
+    let validate = files.split_off(logs.len() - 1);
+    let arguments = ExplainArguments {
+        session: SessionArguments {
+            urdf: path("robot.urdf"),
+            train: files,
+            validate,
+            declare: declared.iter().map(|kind| (*kind).to_owned()).collect(),
+            out: path("out"),
+            ..SessionArguments::default()
+        },
+        model: None,
+        draws: 0,
+        exclude: Vec::new(),
+        false_name_rate: None,
+    };
+    explain(&arguments, &Console::silent()).unwrap().report
+}
+
+/// Joints by the kind that they were named with.
+fn named(report: &ReportJson, kind: &str) -> BTreeSet<String> {
+    let effects = report.effects.iter().filter(|effect| effect.kind == kind);
+    effects.flat_map(|effect| effect.joints.iter().cloned()).collect()
+}
+
+fn read(urdf: &str) -> Tree {
+    read_urdf(urdf, &UrdfOptions::default()).unwrap().tree
+}
+
+/// Effects were added one joint at a time, twelve at most: 84 s, and the error stayed at 20.9 %.
+#[test]
+fn eighteen_joints_that_rub_with_nothing_declared() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/upper_body18.urdf");
+    let urdf = fs::read_to_string(file).unwrap();
+    let tree = read(&urdf);
+    let frictions = frictions(&tree);
+    let all: BTreeSet<String> = tree.joint_names().map(str::to_owned).collect();
+    let joint = |name: &str| tree.joint_index(name).unwrap();
+    let (elbow, wrist) = (joint("left_elbow"), joint("right_wrist_roll"));
+    // Beside the frictions a spring and a ripple.
+    let secret = |q: &[f64], _: &[f64], torque: &mut [f64]| {
+        torque[elbow] += 1.5 * frictions[elbow][1] * (12.0 * q[elbow]).sin();
+        torque[wrist] += 2.0 * frictions[wrist][1] * (q[wrist] - 0.2);
+    };
+    let logs = [1, 2, 3].map(|seed| log(&tree, &frictions, &Motion { seed, ..USUAL }, &secret));
+    let report = explained(&urdf, &logs, &[]);
+    assert_eq!(named(&report, "coulomb_friction"), all);
+    assert_eq!(named(&report, "viscous_friction"), all);
+    assert_eq!(named(&report, "torque_ripple"), BTreeSet::from(["left_elbow".to_owned()]));
+    assert_eq!(named(&report, "joint_spring"), BTreeSet::from(["right_wrist_roll".to_owned()]));
+    assert_eq!(report.effects.len(), 4, "{:?}", report.effects);
+    // Of the noise a part is above the band.
+    assert!(report.after.validate.relative.unwrap() < 1.2 * USUAL.noise);
+}
+
+/// Its column holds the very noise that it explains: `actuator_saturation` was named on joints whose torque is
+/// mostly noise.
+#[test]
+fn a_joint_whose_torque_is_mostly_noise_does_not_saturate() {
+    let tree = read(synthetic::URDF);
+    let frictions = frictions(&tree);
+    let random = std::cell::RefCell::new(RandomNumbers::new(7));
+    let secret = |_: &[f64], _: &[f64], torque: &mut [f64]| {
+        let normal = (0..12).map(|_| random.borrow_mut().uniform(0.0, 1.0)).sum::<f64>() - 6.0;
+        torque[2] += 30.0 * frictions[2][1] * normal;
+    };
+    let logs = [1, 2, 3].map(|seed| log(&tree, &frictions, &Motion { seed, ..USUAL }, &secret));
+    let report = explained(synthetic::URDF, &logs, &["viscous_friction", "coulomb_friction"]);
+    assert!(report.effects.is_empty(), "{:?}", report.effects);
+    assert_eq!(report.verdict, Some(Verdict::Sufficient));
+}
+
+/// Noise with a correlation of 0.25 s made structure of 33 of 36 right models.
+#[test]
+fn noise_that_hangs_together_over_a_quarter_of_a_second_is_no_structure() {
+    let tree = read(synthetic::URDF);
+    let frictions = frictions(&tree);
+    let slow = Motion { noise: 0.1, correlation_s: 0.25, ..USUAL };
+    let logs = [1, 2, 3].map(|seed| log(&tree, &frictions, &Motion { seed, ..slow }, &|_, _, _| ()));
+    let report = explained(synthetic::URDF, &logs, &["viscous_friction", "coulomb_friction"]);
+    assert_eq!((report.effects.len(), report.verdict), (0, Some(Verdict::Sufficient)));
+}
+
+/// 60 of 80 right models that were trained slowly and validated fast were called structured.
+#[test]
+fn a_right_model_trained_slowly_is_sufficient_on_fast_motion() {
+    let tree = read(synthetic::URDF);
+    let frictions = frictions(&tree);
+    let logs = [(1, 0.7), (2, 0.7), (3, 3.0)]
+        .map(|(seed, speed)| Motion { seed, speed, ..USUAL })
+        .map(|motion| log(&tree, &frictions, &motion, &|_, _, _| ()));
+    let report = explained(synthetic::URDF, &logs, &["viscous_friction", "coulomb_friction"]);
+    assert_eq!((report.effects.len(), report.verdict), (0, Some(Verdict::Sufficient)));
+}
+
+/// The path decided, not the data: from nothing a robot ended at 7.7 %, from the best declaration at 5.8 %.
+/// Where the quick look took all widths of a sign for equally good, any of them was taken and stayed.
+#[test]
+fn the_end_is_the_same_whatever_was_declared() {
+    let tree = read(synthetic::URDF);
+    let frictions = frictions(&tree);
+    let secret = |q: &[f64], v: &[f64], torque: &mut [f64]| {
+        torque[0] += 0.5 * frictions[0][1];
+        torque[1] += 2.0 * frictions[1][1] * (q[1] - 0.3);
+        torque[2] += frictions[2][1] * (-(v[2] / 0.3).powi(2)).exp() * (v[2] / 0.01).tanh();
+    };
+    let logs = [1, 2, 3].map(|seed| log(&tree, &frictions, &Motion { seed, ..USUAL }, &secret));
+    let declared: [&[&str]; 3] = [
+        &[],
+        &["viscous_friction", "coulomb_friction"],
+        &["viscous_friction", "coulomb_friction", "torque_offset", "rotor_inertia"],
+    ];
+    let errors = declared.map(|declared| {
+        let report = explained(synthetic::URDF, &logs, declared);
+        assert_eq!(named(&report, "joint_spring"), BTreeSet::from(["joint_2".to_owned()]), "{declared:?}");
+        assert_eq!(
+            named(&report, "stribeck_friction"),
+            BTreeSet::from(["joint_3".to_owned()]),
+            "{declared:?}"
+        );
+        report.after.validate.relative.unwrap()
+    });
+    let best = errors.into_iter().fold(f64::INFINITY, f64::min);
+    assert!(errors.iter().all(|error| *error < 1.05 * best), "{errors:?}");
+}
