@@ -129,9 +129,9 @@ fn results_in_band(
 }
 
 /// What is said where motion held out decided what is in the model.
-const HELD_OUT_HAD_A_SAY: &str = "what the training logs alone would have chosen predicts the motion held out \
-     worse than the declared model, so effects were left out until it does not: the error after is not blind, and \
-     training logs with more kinds of motion would help";
+const HELD_OUT_HAD_A_SAY: &str = "of what the training logs alone would have chosen, something made the error on \
+     the motion held out larger and was left out: the error after is not blind, and training logs with more kinds \
+     of motion would help";
 
 /// The corner of the filter that the torque went through before it was logged \[Hz\], if that is below the
 /// cut-off of columns and torque and nobody asked for this one.

@@ -20,6 +20,8 @@ const ABSORBED_SIZE: f64 = 3.0;
 /// RMS of what an effect takes over the RMS of its torque below which it is asked whether constants of
 /// another could do its work.
 const SMALL: f64 = 0.05;
+/// By how much an effect that was found may make the error on motion held out larger, as a factor.
+const MISLEADING: f64 = 1.05;
 /// Times the residual that a held model left when it was fitted.
 const AS_IT_WAS: f64 = 1.25;
 
@@ -66,7 +68,11 @@ impl Search<'_> {
     pub(super) fn name(&mut self, harm: Harm) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
         let trial = loop {
             let trial = self.trial()?;
-            let harmful = self.harmful(&trial, harm);
+            let mut harmful = self.harmful(&trial, harm);
+            if harmful.is_empty() {
+                harmful = self.misleading(&trial).into_iter().collect();
+                self.held_out_had_a_say |= !harmful.is_empty();
+            }
             if harmful.is_empty() {
                 break trial;
             }
@@ -129,6 +135,26 @@ impl Search<'_> {
         }
         left_out.sort_unstable();
         left_out
+    }
+
+    /// The place of the effect that makes the errors on motion held out larger by most, if that is by more than
+    /// `MISLEADING`: in their geometric mean over the torques, or all together. A drift that one log seems to
+    /// show may be a disaster in the next.
+    fn misleading(&self, trial: &Trial) -> Option<usize> {
+        let present = trial.held_out_squares(&trial.fit);
+        let rows: f64 = trial.held_out.iter().map(Products::rows).sum();
+        let sum = |squares: &[f64]| squares.iter().sum::<f64>();
+        let found = trial.members.par_iter().zip(&trial.places);
+        let found = found.filter(|(member, place)| **place >= self.declared && !trial.is_required(member));
+        let growth = found.map(|(&member, &place)| {
+            let without = trial.held_out_squares_without(&trial.fit, member);
+            let of_torque =
+                |torque: usize| trial.held_out[torque].rows() * (present[torque] / without[torque]).ln();
+            let mean = (0..present.len()).map(of_torque).sum::<f64>() / rows.max(1.0);
+            (mean.max((sum(&present) / sum(&without)).ln()), place)
+        });
+        let worst = growth.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))?;
+        (0.5 * worst.0 > MISLEADING.ln()).then_some(worst.1)
     }
 
     /// For each effect of the model how many simpler ones on the same joints it stands on, by its place: what

@@ -42,6 +42,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         chosen: Chosen::default(),
         refuted: Vec::new(),
         uncertain: Vec::new(),
+        held_out_had_a_say: false,
         input: &input,
         options,
     };
@@ -93,6 +94,8 @@ pub(super) struct Search<'a> {
     pub refuted: Vec<EffectSpec>,
     /// Kinds and joints of which no parameter is certain once their constants are free: they have no name.
     pub uncertain: Vec<(String, Vec<String>)>,
+    /// Whether motion held out had a say.
+    pub held_out_had_a_say: bool,
     pub input: &'a TraceInput<'a>,
     pub options: &'a TraceOptions,
 }

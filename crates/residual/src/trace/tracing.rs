@@ -111,8 +111,8 @@ pub struct Tracing {
     pub refinements: Vec<FoundEffect>,
     /// What is left.
     pub remaining: Remaining,
-    /// Whether motion held out had a say: what training motion alone would have chosen foretells it worse
-    /// than the declared model does.
+    /// Whether motion held out had a say: of what training motion alone would have chosen, something made the
+    /// error there larger.
     pub held_out_had_a_say: bool,
     /// Kinds and joints of which some constants could not be judged, since their columns are not finite on
     /// these logs.

@@ -168,7 +168,7 @@ impl Search<'_> {
             effects,
             refinements,
             remaining,
-            held_out_had_a_say: false,
+            held_out_had_a_say: self.held_out_had_a_say,
             not_judged,
         })
     }
