@@ -165,8 +165,8 @@ fn eighteen_joints_that_rub_with_nothing_declared() {
     assert!(report.after.validate.relative.unwrap() < 1.2 * USUAL.noise);
 }
 
-/// Its column holds the very noise that it explains: `actuator_saturation` was named on joints whose torque is
-/// mostly noise.
+/// Its column holds the very noise that it explains: `actuator_saturation` was named on joints whose torque
+/// is mostly noise.
 #[test]
 fn a_joint_whose_torque_is_mostly_noise_does_not_saturate() {
     let tree = read(synthetic::URDF);

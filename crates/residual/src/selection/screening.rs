@@ -125,9 +125,9 @@ pub(super) fn screen(problem: &Problem, fit: &Fit, rows: &[f64], open: &[usize])
         if most <= 0.0 {
             return None;
         }
-        // Which variant is the best is asked before what is as good as none is taken off, and where what is left
-        // of its torques would be negative to first order, by the squares: that many are good enough is no
-        // reason to take any of them.
+        // Which variant is the best is asked before what is as good as none is taken off, and where what is
+        // left of its torques would be negative to first order, by the squares: that many are good enough is
+        // no reason to take any of them.
         let of_variant = |variant: usize| -> Option<([f64; 2], Screened)> {
             let member = Member { hypothesis, variant };
             let beside = Beside::new(problem, fit, &own.variants[variant].parameters, &own.torques);

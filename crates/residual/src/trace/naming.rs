@@ -137,9 +137,9 @@ impl Search<'_> {
         left_out
     }
 
-    /// The place of the effect that makes the errors on motion held out larger by most, if that is by more than
-    /// `MISLEADING`: in their geometric mean over the torques, or all together. A drift that one log seems to
-    /// show may be a disaster in the next.
+    /// The place of the effect that makes the errors on motion held out larger by most, if that is by more
+    /// than `MISLEADING`: in their geometric mean over the torques, or all together. A drift that one log
+    /// seems to show may be a disaster in the next.
     fn misleading(&self, trial: &Trial) -> Option<usize> {
         let present = trial.held_out_squares(&trial.fit);
         let rows: f64 = trial.held_out.iter().map(Products::rows).sum();
