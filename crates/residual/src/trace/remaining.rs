@@ -85,7 +85,7 @@ impl Search<'_> {
 
     /// Of each torque on motion held out: its mean square, and that of the error that parameters make which
     /// are a few standard deviations off: mean φᵀΣφ.
-    pub(super) fn expected_squares(
+    fn expected_squares(
         &self,
         held_out: &[GroupedFactor],
         fit: &Fit,
@@ -119,7 +119,7 @@ impl Search<'_> {
 
 /// Mean squares on motion held out \[(N·m)², N²\].
 #[derive(Clone, Copy, Default)]
-pub(super) struct Expected {
-    pub torque: f64,
-    pub of_parameters: f64,
+struct Expected {
+    torque: f64,
+    of_parameters: f64,
 }

@@ -10,7 +10,7 @@ use phiw_regressor::least_squares::GroupedFactor;
 
 /// How far the errors of one model are apart that was fitted twice.
 const ROUNDING: f64 = 1e-9;
-/// Error of a model with names over that of the declared one at most, however uncertain its parameters are.
+/// Error of a model with names over that of the declared one, all torques together, at most.
 const MOST_WORSE: f64 = 1.1;
 /// Times that the bound for the error on trial is lowered, before all that was found leaves.
 const TIGHTENINGS: usize = 2;
@@ -25,14 +25,15 @@ impl Search<'_> {
         let before = self.declared_error()?;
         let most = before.1.relative * (1.0 + ROUNDING);
         let tracing = self.clone().finish_with(before.clone(), Harm::EachTorque)?;
-        if self.is_no_worse(&tracing, most)? {
+        if Self::is_no_worse(&tracing) {
             return Ok(tracing);
         }
         let tracing = self.with_a_say_of_what_is_held_out(before, most)?;
         Ok(Tracing { held_out_had_a_say: true, ..tracing })
     }
 
-    /// Of the other ways to end the search the first whose error on motion held out is at most this.
+    /// Of the other ways to end the search the first that is no worse there than the declared model, `before`,
+    /// whose relative error there is `most`.
     fn with_a_say_of_what_is_held_out(
         self,
         before: (TorqueError, TorqueError),
@@ -40,13 +41,13 @@ impl Search<'_> {
     ) -> Result<Tracing, IdentificationError> {
         let tracing =
             self.clone().finish_with(before.clone(), Harm::HeldOut { most_relative: f64::INFINITY })?;
-        if self.is_no_worse(&tracing, most)? {
+        if Self::is_no_worse(&tracing) {
             return Ok(tracing);
         }
         // What is made of the model's torque was judged with that of an earlier fit.
         if let Some(without) = self.without_what_depends_on_the_model()? {
             let tracing = without.finish_with(before.clone(), Harm::EachTorque)?;
-            if self.is_no_worse(&tracing, most)? {
+            if Self::is_no_worse(&tracing) {
                 return Ok(tracing);
             }
         }
@@ -55,7 +56,7 @@ impl Search<'_> {
         let mut most_relative = most;
         for _ in 0..TIGHTENINGS {
             let tracing = self.clone().finish_with(before.clone(), Harm::HeldOut { most_relative })?;
-            if self.is_no_worse(&tracing, most)? {
+            if Self::is_no_worse(&tracing) {
                 return Ok(tracing);
             }
             most_relative *= TIGHTER * most / tracing.model.held_out.relative;
@@ -63,20 +64,18 @@ impl Search<'_> {
         self.finish_with(before, Harm::HeldOut { most_relative: 0.0 })
     }
 
-    /// Whether a model's error on motion held out is at most `most`. A model with names may have more by what
-    /// the uncertainty of its parameters makes of this motion: where the noise of one joint is most of all
-    /// error, a large effect on another hardly shows in their sum. It is never more than by `MOST_WORSE`.
-    fn is_no_worse(&self, tracing: &Tracing, most: f64) -> Result<bool, IdentificationError> {
-        let model = &tracing.model;
-        if model.held_out.relative <= most || tracing.effects.is_empty() {
-            return Ok(model.held_out.relative <= most);
-        }
-        let expected = self.expected_squares(&model.held_out_folds, &model.fit)?;
-        let torque: f64 = expected.iter().map(|expected| expected.torque).sum();
-        let of_parameters: f64 = expected.iter().map(|expected| expected.of_parameters).sum();
-        let square = |value: f64| value * value;
-        let allowed = square(most) + of_parameters / torque;
-        Ok(square(model.held_out.relative) <= allowed.min(square(MOST_WORSE * most)))
+    /// Whether a model's error on motion held out is no worse than the declared one's. That of all torques
+    /// together may be larger by what their geometric mean is smaller, but never by more than `MOST_WORSE`,
+    /// where it has names: if the noise of one joint is most of all error, a large effect on another hardly
+    /// shows in the sum.
+    fn is_no_worse(tracing: &Tracing) -> bool {
+        let (before, after) = (&tracing.before.1, &tracing.model.held_out);
+        let growth = after.relative / before.relative;
+        let ratios = after.rmse.iter().zip(&before.rmse).filter(|(_, before)| **before > 0.0);
+        let logarithms: Vec<f64> = ratios.map(|(after, before)| (after / before).ln()).collect();
+        let mean = logarithms.iter().sum::<f64>() / logarithms.len().max(1) as f64;
+        let may_grow = !tracing.effects.is_empty() && growth <= MOST_WORSE;
+        growth <= 1.0 + ROUNDING || may_grow && growth * mean.exp() <= 1.0
     }
 
     /// The same without the effects that were found and whose columns are made of the model's torque or are
