@@ -32,8 +32,8 @@ impl Search<'_> {
         Ok(Tracing { held_out_had_a_say: true, ..tracing })
     }
 
-    /// Of the other ways to end the search the first that is no worse there than the declared model, `before`,
-    /// whose relative error there is `most`.
+    /// Of the other ways to end the search the first that is no worse there than the declared model, whose
+    /// errors are `before` and whose relative error there is `most`.
     fn with_a_say_of_what_is_held_out(
         self,
         before: (TorqueError, TorqueError),
