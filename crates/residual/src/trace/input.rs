@@ -30,8 +30,7 @@ pub struct TraceOptions {
     /// What a form must take, as a share of the squares of the simpler that it is a form of, times what the
     /// simpler leaves over what is left with it. How exactly a sign turns is no effect of its own, and does
     /// not leave next to nothing. It was set by looking at single development cases, and no command prints
-    /// the shares: right models reached 0.010 there, true forms 0.03 and more. On reporting seeds two forms
-    /// on right models pass it (`cargo xtask undeclared --suite wide_right --seeds report --count 105`).
+    /// the shares: right models reached 0.010 there, true forms 0.03 and more.
     pub least_of_simpler: f64,
     /// RMS of what an effect takes over the RMS of its torque, at least, to have a name.
     pub least_size: f64,

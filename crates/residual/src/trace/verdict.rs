@@ -11,7 +11,7 @@ use phiw_regressor::least_squares::GroupedFactor;
 /// How far the errors of one model are apart that was fitted twice.
 const ROUNDING: f64 = 1e-9;
 /// Error of a model with names over that of the declared one, all torques together, at most.
-const MOST_WORSE: f64 = 1.1;
+const MOST_WORSE: f64 = 1.01;
 /// Times that the bound for the error on trial is lowered, before all that was found leaves.
 const TIGHTENINGS: usize = 2;
 /// How much lower it is than what would just suffice.
