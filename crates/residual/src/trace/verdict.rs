@@ -10,8 +10,8 @@ use phiw_regressor::least_squares::GroupedFactor;
 
 /// How far the errors of one model are apart that was fitted twice.
 const ROUNDING: f64 = 1e-9;
-/// Error of a model with names over that of the declared one, all torques together, at most.
-const MOST_WORSE: f64 = 1.01;
+/// How much the error of all torques together may grow beside what the torques' errors fall in their mean.
+const ALLOWED: f64 = 0.1;
 /// Times that the bound for the error on trial is lowered, before all that was found leaves.
 const TIGHTENINGS: usize = 2;
 /// How much lower it is than what would just suffice.
@@ -64,18 +64,17 @@ impl Search<'_> {
         self.finish_with(before, Harm::HeldOut { most_relative: 0.0 })
     }
 
-    /// Whether a model's error on motion held out is no worse than the declared one's. That of all torques
-    /// together may be larger by what their geometric mean is smaller, but never by more than `MOST_WORSE`,
-    /// where it has names: if the noise of one joint is most of all error, a large effect on another hardly
+    /// Whether a model's error on motion held out is no worse than the declared one's. Where it has names,
+    /// that of all torques together may grow, in logarithms, by `ALLOWED` of what the single torques' errors
+    /// fall in their mean: if the noise of one joint is most of all error, a large effect on another hardly
     /// shows in the sum.
     fn is_no_worse(tracing: &Tracing) -> bool {
         let (before, after) = (&tracing.before.1, &tracing.model.held_out);
-        let growth = after.relative / before.relative;
+        let growth = (after.relative / before.relative).ln();
         let ratios = after.rmse.iter().zip(&before.rmse).filter(|(_, before)| **before > 0.0);
-        let logarithms: Vec<f64> = ratios.map(|(after, before)| (after / before).ln()).collect();
-        let mean = logarithms.iter().sum::<f64>() / logarithms.len().max(1) as f64;
-        let may_grow = !tracing.effects.is_empty() && growth <= MOST_WORSE;
-        growth <= 1.0 + ROUNDING || may_grow && growth * mean.exp() <= 1.0
+        let falls: Vec<f64> = ratios.map(|(after, before)| (before / after).ln()).collect();
+        let fall = falls.iter().sum::<f64>() / falls.len().max(1) as f64;
+        growth <= ROUNDING || !tracing.effects.is_empty() && growth <= ALLOWED * fall
     }
 
     /// The same without the effects that were found and whose columns are made of the model's torque or are
