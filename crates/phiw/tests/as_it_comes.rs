@@ -36,6 +36,9 @@ struct Motion {
 
 const USUAL: Motion = Motion { seed: 1, seconds: 20.0, speed: 1.0, noise: 0.02, correlation_s: 0.0 };
 
+/// Adds to the torques, given positions and speeds.
+type Secret<'a> = dyn Fn(&[f64], &[f64], &mut [f64]) + 'a;
+
 /// Frictions of the joints, the same in all logs of a robot: N·m·s/rad and N·m.
 fn frictions(tree: &Tree) -> Vec<[f64; 2]> {
     let bodies = log(tree, &[], &Motion { seed: 99, noise: 0.0, ..USUAL }, &|_, _, _| ());
@@ -55,13 +58,8 @@ fn frictions(tree: &Tree) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// A log of the robot; `secret` adds to the torques, given positions and speeds.
-fn log(
-    tree: &Tree,
-    frictions: &[[f64; 2]],
-    motion: &Motion,
-    secret: &dyn Fn(&[f64], &[f64], &mut [f64]),
-) -> Recording {
+/// A log of the robot.
+fn log(tree: &Tree, frictions: &[[f64; 2]], motion: &Motion, secret: &Secret<'_>) -> Recording {
     let mut random = RandomNumbers::new(motion.seed);
     let joints = tree.joint_count();
     let sines: Vec<[[f64; 3]; 5]> = (0..joints)
