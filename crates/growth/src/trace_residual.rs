@@ -6,7 +6,7 @@ use phiw_curriculum::growth::{Found, Growth};
 use phiw_effects::{Catalogue, SignalRanges};
 use phiw_estimation::{MotionLog, Robot, RobotModel, torques_along};
 use phiw_identification::{BlockSource, Data, EffectCatalogue, EffectSpec, Fold, identify};
-use phiw_residual::trace::{TraceInput, TraceOptions, trace};
+use phiw_residual::trace::{Thresholds, TraceInput, TraceOptions, trace};
 use phiw_telemetry::{Block, Recording, Survey, arrange_session};
 use std::sync::Arc;
 
@@ -77,8 +77,7 @@ impl Default for TraceResidual {
             catalogue: Arc::default(),
             options: TraceOptions {
                 most_effects: 3,
-                false_name_probability: 0.01,
-                least_share: 0.01,
+                thresholds: Thresholds { least_share: 0.01, ..Thresholds::default() },
                 ..TraceOptions::default()
             },
             least_s: 12.0,

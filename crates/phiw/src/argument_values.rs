@@ -1,5 +1,7 @@
 //! Values of options, from their text.
 
+use phiw_residual::trace::Thresholds;
+
 /// A joint that is held and where \[rad, m\]: `JOINT` or `JOINT=VALUE`.
 ///
 /// # Errors
@@ -56,6 +58,15 @@ pub fn share(text: &str) -> Result<f64, String> {
         Ok(number) if (0.0..=1.0).contains(&number) => Ok(number),
         _ => Err(format!("`{text}` is not a number from 0 to 1")),
     }
+}
+
+/// `NAME=VALUE` of a threshold that there is.
+pub fn threshold(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, for example least_share=0.3")?;
+    let value = value.parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 0.0);
+    let value = value.ok_or_else(|| format!("`{text}` has no number from 0 on"))?;
+    Thresholds::default().set(name, value).map_err(|error| error.to_string())?;
+    Ok((name.to_owned(), value))
 }
 
 /// A number above zero.

@@ -1,7 +1,7 @@
 //! The command line.
 
 pub use crate::argument_values::held_joint;
-use crate::argument_values::{held_in_words, positive, quoted, share};
+use crate::argument_values::{held_in_words, positive, quoted, share, threshold};
 pub use crate::export::ExportArguments;
 pub use crate::identify_arguments::IdentifyArguments;
 pub use crate::in_memory::InMemory;
@@ -99,6 +99,10 @@ pub struct ExplainArguments {
     /// default.
     #[arg(long, value_name = "PROBABILITY", value_parser = share)]
     pub false_name_rate: Option<f64>,
+    /// Other values for the numbers that decide what has a name (`Thresholds` of phiw-residual), to calibrate
+    /// them.
+    #[arg(long, value_name = "NAME=VALUE,…", value_delimiter = ',', value_parser = threshold, hide = true)]
+    pub threshold: Vec<(String, f64)>,
 }
 
 /// Arguments of `phiw predict`.

@@ -8,6 +8,7 @@ use phiw_identification::IdentificationError;
 use phiw_identification::checks::InputError;
 use phiw_identification::effect::EffectError;
 use phiw_identification::shard::ShardError;
+use phiw_residual::trace::UnknownThreshold;
 use phiw_telemetry::LogError;
 use std::io;
 use std::path::PathBuf;
@@ -16,6 +17,9 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
+    /// A threshold that does not exist.
+    #[error("--threshold: {0}")]
+    Threshold(#[from] UnknownThreshold),
     /// A file cannot be read.
     #[error("{}: {}", path.display(), unreadable(source))]
     Unreadable {

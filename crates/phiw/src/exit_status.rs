@@ -11,6 +11,7 @@ impl Error {
     pub fn exit_status(&self) -> u8 {
         match self {
             Error::Unreadable { .. }
+            | Error::Threshold(_)
             | Error::NotAFile { .. }
             | Error::TooLarge { .. }
             | Error::NotText { .. }

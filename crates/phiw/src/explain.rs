@@ -23,7 +23,9 @@ use phiw_report::json::{
     ProgramJson, RemainingJson, RivalJson, TorqueErrors, Verdict,
 };
 use phiw_report::number::significant;
-use phiw_residual::trace::{self, HeldModel, ScannedConstant, TraceInput, TraceOptions, Tracing, trace};
+use phiw_residual::trace::{
+    self, HeldModel, ScannedConstant, Thresholds, TraceInput, TraceOptions, Tracing, trace,
+};
 use std::fmt::Write;
 
 /// A model to start from: its effects' specs, its parameters, and what was known if it is held.
@@ -156,6 +158,9 @@ pub fn command_line(arguments: &ExplainArguments) -> String {
     if let Some(rate) = arguments.false_name_rate {
         line.push_str(&format!(" --false-name-rate {rate}"));
     }
+    for (name, value) in &arguments.threshold {
+        line.push_str(&format!(" --threshold {name}={value}"));
+    }
     if arguments.draws > 0 {
         line.push_str(&format!(" --draws {}", arguments.draws));
     }
@@ -199,9 +204,19 @@ fn traced(
         rows_per_independent: (plan.output_rate_hz() / (2.0 * conditioning.parallel_cutoff_hz)).max(1.0),
     };
     let mut options = TraceOptions { excluded, ..TraceOptions::default() };
-    options.false_name_probability = arguments.false_name_rate.unwrap_or(options.false_name_probability);
+    options.thresholds = thresholds(arguments)?;
     let tracing = trace(input, &options)?;
     Ok(Traced { start: start.model, floor, tracing })
+}
+
+/// The thresholds that are asked for, or else their defaults.
+fn thresholds(arguments: &ExplainArguments) -> Result<Thresholds, Error> {
+    let mut thresholds = Thresholds::default();
+    if let Some(rate) = arguments.false_name_rate {
+        thresholds.false_name_probability = rate;
+    }
+    arguments.threshold.iter().try_for_each(|(name, value)| thresholds.set(name, *value))?;
+    Ok(thresholds)
 }
 
 /// The candidates that are taken out.

@@ -133,6 +133,7 @@ impl Case {
             draws: 0,
             exclude: Vec::new(),
             false_name_rate: None,
+            threshold: Vec::new(),
         };
         let explained = phiw::explain::explain(&arguments, &Console::silent()).unwrap().report;
         let pairs = [

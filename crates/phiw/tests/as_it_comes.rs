@@ -123,6 +123,7 @@ fn explained(urdf: &str, logs: &[Recording], declared: &[&str]) -> ReportJson {
         draws: 0,
         exclude: Vec::new(),
         false_name_rate: None,
+        threshold: Vec::new(),
     };
     explain(&arguments, &Console::silent()).unwrap().report
 }

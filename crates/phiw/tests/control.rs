@@ -59,6 +59,7 @@ impl Scene {
             draws: 0,
             exclude: exclude.iter().map(|&excluded| excluded.to_owned()).collect(),
             false_name_rate,
+            threshold: Vec::new(),
         };
         phiw::explain::explain(&arguments, &Console::silent()).unwrap().report
     }

@@ -81,6 +81,7 @@ fn explained(low_passed: impl Fn(&[f64]) -> Vec<f64>) -> ReportJson {
         draws: 0,
         exclude: Vec::new(),
         false_name_rate: None,
+        threshold: Vec::new(),
     };
     explain(&arguments, &Console::silent()).unwrap().report
 }

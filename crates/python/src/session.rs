@@ -84,7 +84,8 @@ pub fn explain<'py>(
     let ExplainOptions { model, exclude, false_name_rate, draws } = own;
     let named = model.as_ref().map(|_| PathBuf::from("model"));
     session.in_memory.model = model;
-    let arguments = ExplainArguments { session, model: named, draws, exclude, false_name_rate };
+    let arguments =
+        ExplainArguments { session, model: named, draws, exclude, false_name_rate, threshold: Vec::new() };
     let interruption = arguments.session.in_memory.interruption.clone();
     let work = move |console: &_| phiw::explain::results(&arguments, console);
     told(py, run(py, progress, &interruption, work)?)

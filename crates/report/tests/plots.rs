@@ -46,7 +46,10 @@ fn pictures(x: &[f64], y: &[f64]) -> Vec<(&'static str, Svg)> {
         ("signal", signal_panel(&SignalPanel { line, label: name })),
         ("bars", joint_bars(&JointBars { groups: &groups, label: name })),
         ("spectrum", spectrum(&SpectrumPlot { lines: &spectra, y_label: name, cut_off: floor })),
-        ("error growth", error_growth(&ErrorGrowth { lines: &[GrowthLine { name, line }], y_label: name })),
+        (
+            "error growth",
+            error_growth(&ErrorGrowth { lines: &[GrowthLine { name, line }], x_label: name, y_label: name }),
+        ),
     ];
     for after in [line, Line::default()] {
         let input = ResidualAgainstSignal { signal: name, residual: name, before: line, after };

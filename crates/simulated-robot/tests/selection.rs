@@ -6,7 +6,7 @@ use arm::{motions, tree};
 use phiw_curriculum::motion::MotionDataset;
 use phiw_curriculum::selection::{
     AOptimal, DOptimal, MotionCandidates, Question, RandomMotion, Selection, SmallestCondition,
-    TorqueOptimal, Triangle,
+    TorqueOptimal, TorqueOptimalPerSecond, Triangle,
 };
 use phiw_effects::Catalogue;
 use phiw_estimation::Robot;
@@ -18,9 +18,12 @@ fn dataset(count: usize) -> MotionDataset {
 }
 
 fn candidates(count: usize) -> MotionCandidates {
-    let tree = tree();
-    let robot = Robot::with_viscous_friction(tree, [0.0; 10], Catalogue::default()).unwrap();
-    MotionCandidates::new(&robot, robot.declared(), &dataset(count), &[1.0; 7]).unwrap()
+    candidates_of(&dataset(count))
+}
+
+fn candidates_of(dataset: &MotionDataset) -> MotionCandidates {
+    let robot = Robot::with_viscous_friction(tree(), [0.0; 10], Catalogue::default()).unwrap();
+    MotionCandidates::new(&robot, robot.declared(), dataset, &[1.0; 7]).unwrap()
 }
 
 fn random() -> ChaCha8Rng {
@@ -93,6 +96,38 @@ fn optimal_designs_are_best_by_their_own_measure() {
     let best = TorqueOptimal.choose(&question, &mut random());
     let variance = |motion: usize| question.stack(motion).variance_along(candidates.everything());
     assert!(allowed.iter().all(|&motion| variance(motion) >= variance(best.motion)));
+}
+
+/// The variance falls most for each second of motion, and not most for each motion; the first motion is the one
+/// that would leave least if all took the same time.
+#[test]
+fn a_second_of_motion_is_what_is_paid() {
+    let dataset = dataset(6).with_slower(&[3.0]).unwrap();
+    let candidates = candidates_of(&dataset);
+    let allowed: Vec<usize> = (0..dataset.len()).collect();
+    let duration_s = |motion: usize| dataset.motions()[motion].duration_s();
+    for measured in [None, Some(candidates.all()[0].triangle.clone())] {
+        let question = Question {
+            dataset: &dataset,
+            candidates: &candidates,
+            allowed: &allowed,
+            measured: measured.as_ref(),
+            history: &[],
+        };
+        let variance = |motion: usize| question.stack(motion).variance_along(candidates.everything());
+        let worth = |motion: usize| match &measured {
+            None => 1.0 / (variance(motion) * duration_s(motion)),
+            Some(measured) => {
+                (measured.variance_along(candidates.everything()) / variance(motion)).ln()
+                    / duration_s(motion)
+            }
+        };
+        let best = TorqueOptimalPerSecond.choose(&question, &mut random()).motion;
+        assert!(allowed.iter().all(|&motion| worth(motion) <= worth(best)));
+        assert!(worth(best) > 0.0);
+        let most = TorqueOptimal.choose(&question, &mut random()).motion;
+        assert!(duration_s(best) <= duration_s(most));
+    }
 }
 
 /// cond of a motion done twice is that of one; the torques are known better after the second.

@@ -7,7 +7,7 @@ mod smallest_condition;
 mod triangle;
 
 pub use candidates::{MotionCandidate, MotionCandidates};
-pub use optimal::{AOptimal, DOptimal, TorqueOptimal};
+pub use optimal::{AOptimal, DOptimal, TorqueOptimal, TorqueOptimalPerSecond};
 pub use random::RandomMotion;
 pub use smallest_condition::SmallestCondition;
 pub use triangle::Triangle;

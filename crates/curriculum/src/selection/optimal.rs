@@ -55,3 +55,35 @@ impl Selection for TorqueOptimal {
         smallest(question.allowed, |motion| question.stack(motion).variance_along(everything))
     }
 }
+
+/// The largest fall of [`TorqueOptimal`]'s variance for each second of motion, in logarithms: what a second of
+/// the robot's time is worth.
+///
+/// Where nothing has been measured the variance is infinite, and that motion is chosen whose variance is
+/// smallest after as many seconds of it as of any other.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TorqueOptimalPerSecond;
+
+impl Selection for TorqueOptimalPerSecond {
+    fn name(&self) -> &'static str {
+        "torque_optimal_per_second"
+    }
+
+    /// The merit is ln(variance with the motion / variance without it) over its duration \[1/s\]; before
+    /// anything has been measured, ln(variance with the motion · its duration).
+    fn choose(&self, question: &Question<'_>, _: &mut dyn Rng) -> Choice {
+        let everything = question.candidates.everything();
+        let before = question.measured.map_or(f64::INFINITY, |measured| measured.variance_along(everything));
+        smallest(question.allowed, |motion| {
+            let duration_s = question.dataset.motions()[motion].duration_s();
+            per_second(before, question.stack(motion).variance_along(everything), duration_s)
+        })
+    }
+}
+
+fn per_second(before: f64, after: f64, duration_s: f64) -> f64 {
+    match before.is_finite() {
+        true => (after / before).ln() / duration_s,
+        false => (after * duration_s).ln(),
+    }
+}

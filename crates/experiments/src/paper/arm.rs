@@ -1,9 +1,10 @@
 //! What is compared: the arms of the experiment.
 
+use super::fourier::InOrder;
 use phiw_curriculum::constraint::{Constraint, Unconstrained};
 use phiw_curriculum::motion::MotionDataset;
 use phiw_curriculum::selection::{
-    Choice, Question, RandomMotion, Selection, SmallestCondition, TorqueOptimal,
+    Choice, Question, RandomMotion, Selection, SmallestCondition, TorqueOptimal, TorqueOptimalPerSecond,
 };
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
@@ -22,6 +23,12 @@ pub enum Arm {
     Greedy,
     /// The smallest uncertainty of the torques of all motions, under the constraint.
     TorqueOptimal,
+    /// The largest fall of that uncertainty for each second of motion, under the constraint.
+    TorquePerSecond,
+    /// Periodic motions, optimised for a small cond with what the initial model says of the balance.
+    FourierInitial,
+    /// The same with what the true model says, which nobody has.
+    FourierTrue,
     /// Any motion of one task that could be chosen at first: the paper's Open.
     TaskA,
     /// Any motion of another such task: the paper's Scoop.
@@ -47,6 +54,9 @@ impl Arm {
             Arm::Random => "random",
             Arm::Greedy => "greedy",
             Arm::TorqueOptimal => "torque-optimal",
+            Arm::TorquePerSecond => "torque-per-second",
+            Arm::FourierInitial => "fourier-initial",
+            Arm::FourierTrue => "fourier-true",
             Arm::TaskA => "task-a",
             Arm::TaskB => "task-b",
         }
@@ -66,6 +76,8 @@ impl Arm {
             Arm::Curriculum | Arm::Closed | Arm::Greedy => Box::new(SmallestCondition),
             Arm::Random => Box::new(RandomMotion),
             Arm::TorqueOptimal => Box::new(TorqueOptimal),
+            Arm::TorquePerSecond => Box::new(TorqueOptimalPerSecond),
+            Arm::FourierInitial | Arm::FourierTrue => Box::new(InOrder),
             Arm::TaskA => of_task(&tasks[0]),
             Arm::TaskB => of_task(&tasks[1]),
         }
@@ -74,8 +86,9 @@ impl Arm {
     /// What it may choose.
     pub fn constraint(self, zmp: &dyn Constraint) -> &dyn Constraint {
         match self {
-            Arm::Curriculum | Arm::Closed | Arm::Random | Arm::TorqueOptimal => zmp,
-            Arm::Greedy | Arm::TaskA | Arm::TaskB => &Unconstrained,
+            Arm::Curriculum | Arm::Closed | Arm::Random | Arm::TorqueOptimal | Arm::TorquePerSecond => zmp,
+            // What was optimised has been held to the balance of its model already.
+            Arm::FourierInitial | Arm::FourierTrue | Arm::Greedy | Arm::TaskA | Arm::TaskB => &Unconstrained,
         }
     }
 }

@@ -43,6 +43,8 @@ pub fn draw(results: &Results, page: &mut Page) {
     conditions(results, page);
     page.heading("Figure 8: torque error on held-out motions");
     torques(results, page);
+    page.heading("What a second of the robot's time is worth");
+    super::seconds::draw(results, page);
     page.heading("Relaxation");
     relaxation(results, page);
 }

@@ -1,6 +1,6 @@
 //! The runs to be done, and doing them in parallel.
 
-use super::arguments::{Initial, RunArguments};
+use super::arguments::RunArguments;
 use super::arm::{Arm, Footing};
 use super::run_file::RunFile;
 use super::setup::{Setup, Validation};
@@ -122,13 +122,14 @@ impl Job {
         }
         let standing = self.footing == Footing::Standing;
         let experiment = setup.trial_ground(self.backend, standing, setup.settings.noise, secret);
-        let selection = self.arm.selection(&setup.dataset, &setup.settings.tasks);
+        let (dataset, candidates) = setup.motions_of(self.arm);
+        let selection = self.arm.selection(dataset, &setup.settings.tasks);
         let estimator = setup.estimator(&file.run.initial);
         let growth = setup.growth(&file.run.initial);
         let curriculum = Curriculum {
             robot: &setup.robot,
-            dataset: &setup.dataset,
-            candidates: &setup.candidates,
+            dataset,
+            candidates,
             experiment: experiment.as_ref(),
             selection: selection.as_ref(),
             constraint: self.arm.constraint(&setup.constraint),
@@ -174,10 +175,8 @@ impl Job {
     }
 
     fn begin(&self, setup: &Setup, secret: Option<&PlantEffect>) -> anyhow::Result<RunFile> {
-        let initial = match setup.settings.initial {
-            Initial::One => unreliable_model(&setup.truth, 0),
-            Initial::Each => unreliable_model(&setup.truth, self.seed),
-        };
+        let own = || unreliable_model(&setup.truth, self.seed);
+        let initial = setup.initial_of_all_seeds().unwrap_or_else(own);
         let tree = setup.robot.tree();
         let name = |&joint: &usize| tree.joint_names().nth(joint).unwrap_or_default().to_owned();
         let joints = secret.map_or_else(Vec::new, |effect| effect.joints(tree));

@@ -11,7 +11,10 @@ use phiw_curriculum::end::EndReason;
 use phiw_identification::accuracy::{Reliability, ReliabilityCriterion};
 use phiw_report::statistics::median;
 
-use Arm::{Curriculum, Greedy, Random, TaskA, TaskB, TorqueOptimal};
+use Arm::{
+    Curriculum, FourierInitial, FourierTrue, Greedy, Random, TaskA, TaskB, TorqueOptimal, TorquePerSecond,
+};
+
 use Footing::Standing;
 
 /// Share of a log in which a base stands still that does not rock.
@@ -25,9 +28,9 @@ pub fn rows(results: &Results) -> Vec<[String; 4]> {
     table.parameters_of_others();
     table.choices();
     table.torques();
-    table.durations();
+    table.seconds();
     table.kept();
-    for arm in [Curriculum, Random, TorqueOptimal, Greedy] {
+    for arm in [Curriculum, Random, TorqueOptimal, TorquePerSecond, Greedy, FourierInitial, FourierTrue] {
         table.standing(arm);
     }
     for savings in super::ending::savings(results) {
@@ -56,7 +59,10 @@ impl Table<'_> {
 
     /// The arms that the paper does not compare in numbers, as far as there are runs of them.
     fn others(&self) -> Vec<Arm> {
-        [Random, TorqueOptimal, Greedy].into_iter().filter(|&arm| self.results.has(self.home, arm)).collect()
+        [Random, TorqueOptimal, TorquePerSecond, Greedy, FourierInitial, FourierTrue]
+            .into_iter()
+            .filter(|&arm| self.results.has(self.home, arm))
+            .collect()
     }
 
     fn parameters(&mut self) {
@@ -166,19 +172,18 @@ impl Table<'_> {
         }
     }
 
-    fn durations(&mut self) {
-        let measured_s: Vec<String> = [Curriculum, TaskA, TaskB]
-            .into_iter()
-            .filter(|&arm| self.results.has(self.home, arm))
-            .chain(self.others())
-            .map(|arm| format!("{} {:.0}", arm.name(), measured_s(self.results, self.home, arm)))
-            .collect();
-        self.row(
-            "measured in all iterations [s], median",
-            "",
-            measured_s.join(", "),
-            "errors fall with the time that is measured, and tasks differ in how long they take",
-        );
+    /// What a second of the robot's time is worth.
+    fn seconds(&mut self) {
+        for (arm, points) in super::seconds::of_arms(self.results, self.home) {
+            let cells: Vec<String> =
+                points.iter().map(|[seconds, error]| format!("{seconds:.1} s {error:.2}")).collect();
+            self.row(
+                &format!("torque error (19) [N·m] after so many seconds of motion, medians: {}", arm.name()),
+                "",
+                cells.join(", "),
+                "errors fall with the time that is measured, and motions differ in how long they take",
+            );
+        }
     }
 
     /// How often the constraint allowed nothing, and how the balance was kept on a base that is bolted down.
@@ -275,16 +280,6 @@ impl Table<'_> {
             "each motion averages more of the noise away, so fewer of them cannot leave quite the same error",
         );
     }
-}
-
-/// How long all motions of a run were, median over the runs \[s\].
-fn measured_s(results: &Results, footing: Footing, arm: Arm) -> f64 {
-    let duration_s = |name: &str| {
-        let facts = results.settings.dataset.iter().find(|motion| motion.name == name);
-        facts.map_or(f64::NAN, |motion| motion.duration_s)
-    };
-    let of_run = |run: &RunFile| run.run.history.iter().map(|record| duration_s(&record.motion)).sum();
-    median(&results.of(footing, arm).map(of_run).collect::<Vec<f64>>())
 }
 
 /// The rows as text, and what closing the loop is worth.

@@ -3,6 +3,8 @@
 use super::arguments::{
     Detector, EstimatorName, Initial, Method, NoiseIn, PriorName, RelaxationName, RunArguments,
 };
+use super::arm::Arm;
+use super::fourier::FourierMotions;
 use super::method;
 use super::motions::Motions;
 use super::run_file;
@@ -13,23 +15,25 @@ use crate::plant::engine::Engine;
 use crate::plant::secret::SecretKind;
 use anyhow::{Context, ensure};
 use phiw::console::Console;
-use phiw_curriculum::Experiment;
 use phiw_curriculum::constraint::ZmpConstraint;
 use phiw_curriculum::motion::{Motion, MotionDataset};
 use phiw_curriculum::planner::NoneAllowed;
 use phiw_curriculum::relaxation::Relaxation;
 use phiw_curriculum::selection::MotionCandidates;
+use phiw_curriculum::{Experiment, unreliable_model};
 use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
 use phiw_dynamics::{Workspace, World};
 use phiw_estimation::{Evidence, MotionLog, Robot, RobotModel, RowsAt};
 use phiw_identification::model::{parameter_name, standard_unit};
 use phiw_plant::{PlantEffect, Sensors, Timing};
 use phiw_regressor::factor::Factor;
+use phiw_report::statistics::median;
 use phiw_simulated_robot::{FeedForward, KnownOfController, SimulatedRobot};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// What runs share.
@@ -46,6 +50,8 @@ pub struct Setup {
     pub dataset: MotionDataset,
     /// Their factors.
     pub candidates: MotionCandidates,
+    /// The motions of arms that do not choose from the dataset.
+    pub fourier: BTreeMap<Arm, FourierMotions>,
     /// The constraint (12).
     pub constraint: ZmpConstraint,
     /// Equation (20), or what stands for it.
@@ -79,6 +85,9 @@ pub struct Settings {
     pub dataset: Vec<MotionFacts>,
     /// Names of those held out.
     pub held_out: Vec<String>,
+    /// How long Fourier motions are: as the dataset's in the middle \[s\].
+    #[serde(default)]
+    pub fourier_s: f64,
     /// The two tasks of the task-specific models.
     pub tasks: [String; 2],
     /// The whole method, if one was named.
@@ -204,6 +213,7 @@ impl Setup {
                 })
                 .collect(),
             held_out: motions.validation.iter().map(|motion| motion.name.clone()).collect(),
+            fourier_s: median(&dataset.motions().iter().map(Motion::duration_s).collect::<Vec<f64>>()),
             tasks: two_tasks(&robot, &truth, &dataset, &constraint, relaxation_of_alpha.as_ref())?,
             method: arguments.method,
             estimator: arguments.estimator(),
@@ -231,8 +241,22 @@ impl Setup {
             truth,
             dataset,
             candidates,
+            fourier: BTreeMap::new(),
         };
         setup.validation = setup.validation(arguments.backend, None)?;
+        let models = [
+            (Arm::FourierInitial, setup.initial_of_all_seeds()),
+            (Arm::FourierTrue, Some(setup.truth.clone())),
+        ];
+        for (arm, model) in models.into_iter().filter(|(arm, _)| arguments.arm.contains(arm)) {
+            let told = |done: usize| {
+                let what = format!("optimising motions, {}", arm.name());
+                console.progress(&what, done as u64, arguments.iterations as u64);
+            };
+            if let Some(model) = model {
+                setup.fourier.insert(arm, FourierMotions::optimised(&setup, &model, &told)?);
+            }
+        }
         Ok(setup)
     }
 
@@ -244,6 +268,19 @@ impl Setup {
         let logs = self.validation_logs(backend, secret)?;
         let declared = self.validation_of(&self.truth, &logs)?;
         Ok(Validation { logs, declared })
+    }
+
+    /// The initial model that all seeds share, if they do.
+    pub fn initial_of_all_seeds(&self) -> Option<RobotModel> {
+        (self.settings.initial == Initial::One).then(|| unreliable_model(&self.truth, 0))
+    }
+
+    /// What an arm chooses from.
+    pub fn motions_of(&self, arm: Arm) -> (&MotionDataset, &MotionCandidates) {
+        match self.fourier.get(&arm) {
+            Some(own) => (&own.dataset, &own.candidates),
+            None => (&self.dataset, &self.candidates),
+        }
     }
 
     /// What happens where no motion is allowed: where uncertainty counts, nothing.

@@ -121,6 +121,7 @@ fn run(arguments: &SessionArguments) -> anyhow::Result<PathBuf> {
         draws: 0,
         exclude: Vec::new(),
         false_name_rate: None,
+        threshold: Vec::new(),
     };
     println!("{}\n", command_line(&arguments));
     let Outcome { summary, warnings, report_html, .. } = explain(&arguments, &Console::of_terminal(false))?;

@@ -23,8 +23,8 @@
 //!
 //! `cargo xtask undeclared --all` is the full experiment on the old suites, 1000 cases of each family of
 //! seeds, and `--suite wide` that on the wide ones, 1538 cases of the reporting seeds; `--resume` goes on
-//! with one that was stopped. `--suite wide_right --false-name-rates 0.005,0.01,0.05,0.1` calibrates the
-//! guard: it passes `--false-name-rate` to the tracer. `--suite`, `--situation`, `--kind`, `--robot` and
+//! with one that was stopped. `--suite wide_right,wide_effects --threshold NAME=VALUE,VALUE…` calibrates
+//! one of the tracer's thresholds (`Thresholds` of phiw-residual). `--suite`, `--situation`, `--kind`, `--robot` and
 //! `--count` choose among the cases, `--case SEED` traces one and shows its truth, and `--generate DIR` only
 //! writes the files.
 //!
@@ -73,6 +73,7 @@ mod suite;
 mod table;
 #[cfg(test)]
 mod tests;
+mod threshold_table;
 pub(crate) mod tracer;
 mod trajectory;
 mod truth;
@@ -103,10 +104,11 @@ pub struct Arguments {
     /// Only cases in this situation (wide suites).
     #[arg(long)]
     situation: Option<Situation>,
-    /// Ask the tracer for these rates of false names one after the other, and print asked against observed
-    /// (suite wide_right).
-    #[arg(long, value_name = "RATE", value_delimiter = ',')]
-    false_name_rates: Vec<f64>,
+    /// Give one of the tracer's thresholds these values one after the other, and print what each value does to
+    /// right models and to missing effects (wide suites). With `false_name_probability` that is the rate of
+    /// false names, asked and observed.
+    #[arg(long, value_name = "NAME=VALUE,VALUE…", value_parser = values_of_a_threshold)]
+    threshold: Option<ThresholdValues>,
     /// Only cases with this effect among their secrets.
     #[arg(long)]
     kind: Option<Kind>,
@@ -140,6 +142,20 @@ pub struct Arguments {
     /// Where `cases.csv` and `score.md` go, and each case's outcome, in a folder for each family of seeds.
     #[arg(long, value_name = "DIR", default_value = "target/undeclared")]
     out: PathBuf,
+}
+
+/// A threshold by its name, and the values that are tried.
+#[derive(Clone, Debug)]
+struct ThresholdValues {
+    name: String,
+    values: Vec<f64>,
+}
+
+fn values_of_a_threshold(text: &str) -> Result<ThresholdValues, String> {
+    let (name, values) = text.split_once('=').ok_or("write NAME=VALUE,VALUE…")?;
+    let values: Result<Vec<f64>, _> = values.split(',').map(str::parse).collect();
+    let values = values.map_err(|error| format!("{text}: {error}"))?;
+    Ok(ThresholdValues { name: name.to_owned(), values })
 }
 
 /// A choice of suites.
@@ -182,16 +198,16 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from).div_ceil(arguments.jobs.max(1));
     let mut tracer = tracer::Tracer::find(arguments.phiw.as_deref(), threads)?;
     for seeds in seeds {
-        if arguments.false_name_rates.is_empty() {
+        let Some(ThresholdValues { name, values }) = &arguments.threshold else {
             run_and_report(arguments, seeds, &robots, &tracer)?;
             continue;
-        }
+        };
         let mut runs = Vec::new();
-        for &rate in &arguments.false_name_rates {
-            tracer.false_name_rate = Some(rate);
-            runs.push((rate, run_and_report(arguments, seeds, &robots, &tracer)?));
+        for &value in values {
+            tracer.threshold = Some((name.clone(), value));
+            runs.push((value, run_and_report(arguments, seeds, &robots, &tracer)?));
         }
-        println!("{}", wide_table::guard(&runs));
+        println!("{}", threshold_table::by_value(name, &runs));
     }
     Ok(())
 }
@@ -204,8 +220,9 @@ fn run_and_report(
     tracer: &tracer::Tracer,
 ) -> anyhow::Result<Vec<run::Scored>> {
     let specs = specs(arguments, seeds, robots)?;
-    let rate = tracer.false_name_rate.map_or_else(String::new, |rate| format!("-{rate}"));
-    let folder = arguments.out.join(format!("{seeds:?}{rate}").to_lowercase());
+    let threshold = tracer.threshold.as_ref();
+    let threshold = threshold.map_or_else(String::new, |(name, value)| format!("-{name}-{value}"));
+    let folder = arguments.out.join(format!("{seeds:?}{threshold}").to_lowercase());
     let outcomes = folder.join("outcomes");
     std::fs::create_dir_all(&outcomes).with_context(|| outcomes.display().to_string())?;
     let options = run::Options {

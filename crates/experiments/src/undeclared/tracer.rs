@@ -16,8 +16,8 @@ pub struct Tracer {
     pub program: PathBuf,
     /// Threads that it may use.
     pub threads: usize,
-    /// The rate of false names to ask `explain` for; its default where `None`.
-    pub false_name_rate: Option<f64>,
+    /// A threshold of `explain` and its value, in the place of its default.
+    pub threshold: Option<(String, f64)>,
 }
 
 /// What it said, and how long it took.
@@ -42,8 +42,8 @@ impl Tracer {
             run(task("identify", ["clean_a.csv", "clean_b.csv", "clean_c.csv"], "clean"))?;
             explain.args(["--model", "clean/model.json"]);
         }
-        if let Some(rate) = self.false_name_rate {
-            explain.args(["--false-name-rate", &rate.to_string()]);
+        if let Some((name, value)) = &self.threshold {
+            explain.args(["--threshold", &format!("{name}={value}")]);
         }
         let start = Instant::now();
         run(explain)?;
@@ -92,7 +92,7 @@ impl Tracer {
             Some(path) => path.canonicalize().with_context(|| path.display().to_string())?,
             None => environment::release_binary()?,
         };
-        Ok(Tracer { program, threads, false_name_rate: None })
+        Ok(Tracer { program, threads, threshold: None })
     }
 }
 

@@ -1,5 +1,4 @@
-//! The score of the widened suites by situation and by number of effects, what confidence is worth, and the
-//! rate of false names that was asked for.
+//! The score of the widened suites by situation and by number of effects, and what confidence is worth.
 
 use super::kind::Name;
 use super::run::Scored;
@@ -71,10 +70,7 @@ fn right(cases: &[&Scored], text: &mut String) {
         let count = |test: &dyn Fn(&Score) -> bool| scores(&cases).filter(|score| test(score)).count();
         let verdict = |verdict: &str| count(&|score: &Score| score.verdict == verdict);
         let named = count(&|score: &Score| !score.false_names.is_empty());
-        // What a situation makes true may be named.
-        let sufficient = count(&|score: &Score| {
-            score.is_sufficient() || (score.verdict == "explained" && score.false_names.is_empty())
-        });
+        let sufficient = count(&is_left_alone);
         let floor = [0, 1].map(|end| {
             middle(scores(&cases).filter_map(|score| score.floor.map(|floor| floor[end])).collect())
         });
@@ -114,6 +110,24 @@ fn by_verdict(cases: &[&Scored], text: &mut String) {
     }
 }
 
+/// Whether a right model is left as it is; what a situation makes true may be named.
+pub fn is_left_alone(score: &Score) -> bool {
+    score.is_sufficient() || (score.verdict == "explained" && score.false_names.is_empty())
+}
+
+/// What became of the material effects; of none, where the tracer failed.
+pub fn material_outcomes(cases: &[&Scored]) -> BTreeMap<Option<Outcome>, usize> {
+    let mut outcomes = BTreeMap::new();
+    for case in cases {
+        let secrets = case.truth.secrets.iter().enumerate();
+        for (index, _) in secrets.filter(|(_, secret)| secret.is_material()) {
+            let outcome = case.score.as_ref().ok().map(|score| score.outcomes[index]);
+            *outcomes.entry(outcome).or_default() += 1;
+        }
+    }
+    outcomes
+}
+
 fn effects(title: &str, key: &dyn Fn(&Scored) -> String, cases: &[&Scored], text: &mut String) {
     let _ = writeln!(
         text,
@@ -122,19 +136,10 @@ fn effects(title: &str, key: &dyn Fn(&Scored) -> String, cases: &[&Scored], text
     );
     text.push_str("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
     for (name, cases) in grouped(key, cases) {
-        let mut outcomes: BTreeMap<Outcome, usize> = BTreeMap::new();
-        let (mut material, mut failed) = (0, 0);
-        for case in &cases {
-            for (index, _) in case.truth.secrets.iter().enumerate().filter(|(_, secret)| secret.is_material())
-            {
-                material += 1;
-                match &case.score {
-                    Ok(score) => *outcomes.entry(score.outcomes[index]).or_default() += 1,
-                    Err(_) => failed += 1,
-                }
-            }
-        }
-        let of = |outcome: Outcome| outcomes.get(&outcome).copied().unwrap_or(0);
+        let outcomes = material_outcomes(&cases);
+        let material = outcomes.values().sum::<usize>();
+        let of = |outcome: Outcome| outcomes.get(&Some(outcome)).copied().unwrap_or(0);
+        let failed = outcomes.get(&None).copied().unwrap_or(0);
         let named = scores(&cases).filter(|score| !score.false_names.is_empty()).count();
         let _ = writeln!(
             text,
@@ -189,36 +194,6 @@ pub fn reliability(cases: &[Scored], text: &mut String) {
         );
     }
     text.push('\n');
-}
-
-/// The share of right models with a false name, for each rate that was asked for.
-pub fn guard(runs: &[(f64, Vec<Scored>)]) -> String {
-    use Situation::{Colour, HeavyTails, LongColour, ShortColour, White};
-    let groups: [(&str, &[Situation]); 4] = [
-        ("white", &[White]),
-        ("coloured", &[ShortColour, Colour, LongColour]),
-        ("heavy tails", &[HeavyTails]),
-        ("all situations", &Situation::ALL),
-    ];
-    let mut text = String::from("## Rate of false names: asked and observed\n\n| asked |");
-    groups.iter().for_each(|(name, _)| {
-        let _ = write!(text, " {name} |");
-    });
-    text.push_str("\n|--:|--:|--:|--:|--:|\n");
-    for (rate, cases) in runs {
-        let _ = write!(text, "| {:.1} % |", 100.0 * rate);
-        for (_, situations) in &groups {
-            let member = |case: &&Scored| {
-                case.truth.suite == Suite::WideRight
-                    && case.truth.situation.is_some_and(|situation| situations.contains(&situation))
-            };
-            let cases: Vec<&Scored> = cases.iter().filter(member).collect();
-            let named = scores(&cases).filter(|score| !score.false_names.is_empty()).count();
-            let _ = write!(text, " {named} of {} ({}) |", cases.len(), percent(named, cases.len()));
-        }
-        text.push('\n');
-    }
-    text
 }
 
 fn middle(mut values: Vec<f64>) -> String {

@@ -103,7 +103,8 @@ pub(crate) fn picture(reproduction: &Reproduction) -> Svg {
         .zip(&reproduction.cases)
         .map(|((name, shares), case)| GrowthLine { name, line: Line { x: &case.growth.horizons, y: shares } })
         .collect();
-    let growth = plot::ErrorGrowth { lines: &lines, y_label: "position error [% of travel]" };
+    let growth =
+        plot::ErrorGrowth { lines: &lines, x_label: "horizon [s]", y_label: "position error [% of travel]" };
     plot::error_growth(&growth)
 }
 

@@ -1,29 +1,19 @@
-//! What of the chosen effects has a name, what only refines the model, and what does harm.
+//! What of the chosen effects has a name, and what only refines the model.
 //!
 //! All of it is decided on training motion: parts of it are foretold by fits to the other parts. Motion held
 //! out is for the errors that are reported.
 
+use super::harm::Harm;
 use super::search::Search;
 use super::tracing::{FoundEffect, RivalEffect};
 use super::trial::{Squares, Trial};
 use crate::selection::{Member, Products, certainty};
 use phiw_effects::EffectKind;
 use phiw_identification::{EffectSpec, IdentificationError};
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// A rival that is less probable is none.
 pub const LEAST_RIVAL: f64 = 0.05;
-/// Share of its torque that an effect must be where the other parameters have taken up most of it, over the
-/// least size.
-const ABSORBED_SIZE: f64 = 3.0;
-/// RMS of what an effect takes over the RMS of its torque below which it is asked whether constants of
-/// another could do its work.
-const SMALL: f64 = 0.05;
-/// By how much an effect that was found may make the error on motion held out larger, as a factor.
-const MISLEADING: f64 = 1.05;
-/// Times the residual that a held model left when it was fitted.
-const AS_IT_WAS: f64 = 1.25;
 
 /// The model without the forms of something simpler from a level on, constants refined.
 struct Simpler {
@@ -32,16 +22,6 @@ struct Simpler {
     squares: Vec<f64>,
     /// The places, among the effects of the whole model, of the forms that are left out, ascending.
     left_out: Vec<usize>,
-}
-
-/// What speaks against an effect.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Harm {
-    /// That the logarithms of the torques' foretold errors grow.
-    EachTorque,
-    /// That the logarithms of the errors on motion held out grow, or that the error of all torques together
-    /// is there larger than `most_relative` of the torques (RMS).
-    HeldOut { most_relative: f64 },
 }
 
 /// What leaving out an effect does.
@@ -86,75 +66,6 @@ impl Search<'_> {
         self.judge_small(&trial, &mut judged)?;
         self.name_families(&mut judged);
         self.in_order(&trial, judged)
-    }
-
-    /// The places of the effects, ascending, that do harm: the worst, the worst of what is left without it,
-    /// and so on. What others are forms of stays.
-    ///
-    /// Errors count by their logarithms; while that of all torques together is larger than `harm` allows, by
-    /// their squares.
-    fn harmful(&self, trial: &Trial, harm: Harm) -> Vec<usize> {
-        let mut left_out: Vec<usize> = Vec::new();
-        let sum = |squares: &[f64]| squares.iter().sum::<f64>();
-        let most = match harm {
-            Harm::EachTorque => f64::INFINITY,
-            Harm::HeldOut { most_relative } => {
-                let torque: f64 = trial.held_out.iter().map(Products::right_hand_side).sum();
-                most_relative * most_relative * torque
-            }
-        };
-        loop {
-            let fit = trial.fit_with(|other| !left_out.contains(&other));
-            let foretelling = trial.foretelling(&fit);
-            let squares_without = |member: Member| match harm {
-                Harm::HeldOut { .. } => trial.held_out_squares_without(&fit, member),
-                _ => foretelling.squares_without(member),
-            };
-            let present = match harm {
-                Harm::HeldOut { .. } => trial.held_out_squares(&fit),
-                _ => foretelling.squares(),
-            };
-            let found = trial.members.par_iter().zip(&trial.places).filter(|(member, place)| {
-                **place >= self.declared && !trial.is_required(member) && !left_out.contains(place)
-            });
-            let without = found.map(|(&member, &place)| {
-                let squares = squares_without(member);
-                (trial.gain(&squares, &present), place, sum(&squares))
-            });
-            let mut without: Vec<(f64, usize, f64)> = without.collect();
-            without.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let harms = without.first().is_some_and(|(gain, ..)| *gain <= 0.0);
-            let too_much = sum(&present) > most;
-            if !harms && too_much {
-                without.sort_by(|a, b| a.2.total_cmp(&b.2));
-            }
-            match without.first() {
-                Some(&(_, place, _)) if harms || too_much => left_out.push(place),
-                _ => break,
-            }
-        }
-        left_out.sort_unstable();
-        left_out
-    }
-
-    /// The place of the effect that makes the errors on motion held out larger by most, if that is by more
-    /// than `MISLEADING`: in their geometric mean over the torques, or all together. A drift that one log
-    /// seems to show may be a disaster in the next.
-    fn misleading(&self, trial: &Trial) -> Option<usize> {
-        let present = trial.held_out_squares(&trial.fit);
-        let rows: f64 = trial.held_out.iter().map(Products::rows).sum();
-        let sum = |squares: &[f64]| squares.iter().sum::<f64>();
-        let found = trial.members.par_iter().zip(&trial.places);
-        let found = found.filter(|(member, place)| **place >= self.declared && !trial.is_required(member));
-        let growth = found.map(|(&member, &place)| {
-            let without = trial.held_out_squares_without(&trial.fit, member);
-            let of_torque =
-                |torque: usize| trial.held_out[torque].rows() * (present[torque] / without[torque]).ln();
-            let mean = (0..present.len()).map(of_torque).sum::<f64>() / rows.max(1.0);
-            (mean.max((sum(&present) / sum(&without)).ln()), place)
-        });
-        let worst = growth.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))?;
-        (0.5 * worst.0 > MISLEADING.ln()).then_some(worst.1)
     }
 
     /// For each effect of the model how many simpler ones on the same joints it stands on, by its place: what
@@ -237,7 +148,10 @@ impl Search<'_> {
     /// without it: a sign that turns over another speed looks like some viscous friction.
     fn judge_small(&self, trial: &Trial, judged: &mut [Judged]) -> Result<(), IdentificationError> {
         let initial = trial.foretold_squares(&trial.fit_with(|place| place < self.declared));
-        for judged in judged.iter_mut().filter(|judged| judged.named && judged.size < SMALL) {
+        for judged in judged
+            .iter_mut()
+            .filter(|judged| judged.named && judged.size < self.options.thresholds.small_size)
+        {
             let own = &self.specs[judged.place];
             let has_constants = |spec: &EffectSpec| spec.joints == own.joints && !spec.constants.is_empty();
             let mut others = self.specs.iter().enumerate().filter(|(place, _)| *place != judged.place);
@@ -291,7 +205,7 @@ impl Search<'_> {
     /// How improbable an effect must be by chance to have a name: for all hypotheses together it is
     /// `false_name_probability`.
     fn tail_of_a_name(&self) -> f64 {
-        self.options.false_name_probability / self.chosen.hypotheses.max(1) as f64
+        self.options.thresholds.false_name_probability / self.chosen.hypotheses.max(1) as f64
     }
 
     fn judge(&self, whole: &Trial) -> Result<Vec<Judged>, IdentificationError> {
@@ -360,9 +274,9 @@ impl Search<'_> {
                 simpler.flat_map(|&other| trial.values_of(other, torque)).collect();
             let of_simpler = trial.torque(torque).size_of(&simpler);
             !self.is_as_it_was(torque, (without / trial.torque(torque).rows().max(1.0)).sqrt())
-                && taken >= self.options.least_share_of_kin * without
-                && taken * without >= self.options.least_of_simpler * of_simpler * with
-                && (taken / whole).sqrt() >= self.options.least_size
+                && taken >= self.options.thresholds.least_share_of_kin * without
+                && taken * without >= self.options.thresholds.least_of_others * of_simpler * with
+                && (taken / whole).sqrt() >= self.options.thresholds.least_size
         })
     }
 
@@ -384,7 +298,8 @@ impl Search<'_> {
     /// Whether a torque's residual is no larger than it was when the held model was fitted: then nothing has
     /// changed there since.
     pub(super) fn is_as_it_was(&self, torque: usize, rmse: f64) -> bool {
-        self.input.held.as_ref().is_some_and(|held| rmse <= AS_IT_WAS * held.residual_std[torque])
+        let margin = self.options.thresholds.floor_margin;
+        self.input.held.as_ref().is_some_and(|held| rmse <= margin * held.residual_std[torque])
     }
 
     /// Whether what an effect takes away where it is foretold is worth a name.
@@ -405,7 +320,7 @@ impl Search<'_> {
         member: Member,
         squares: &Squares,
     ) -> (bool, bool) {
-        let options = self.options;
+        let thresholds = &self.options.thresholds;
         let Squares { initial, without, with } = squares;
         let hypothesis = &trial.problem.hypotheses[member.hypothesis];
         let (mut largest_share, mut size): (f64, f64) = (0.0, 0.0);
@@ -424,13 +339,13 @@ impl Search<'_> {
             let by_others = (initial[torque] - before).max(0.0);
             let together = ((initial[torque] - with[torque]).max(0.0) / whole).sqrt();
             seen |= hypothesis.torques.contains(&torque)
-                && together >= options.least_size
-                && share >= options.least_share
-                && taken >= options.least_of_others * by_others
-                && (taken / whole).sqrt() >= options.least_size;
+                && together >= thresholds.least_size
+                && share >= thresholds.least_share
+                && taken >= thresholds.least_of_others * by_others
+                && (taken / whole).sqrt() >= thresholds.least_size;
             size = size.max((rows.size_of(&trial.values_of(member, torque)) / whole).sqrt());
         }
-        (seen, largest_share >= options.least_share && size >= ABSORBED_SIZE * options.least_size)
+        (seen, largest_share >= thresholds.least_share && size >= thresholds.least_absorbed_size)
     }
 
     /// Puts the effects into the order in which they count, and says what each has explained.

@@ -44,21 +44,21 @@ impl Search<'_> {
             specs: &self.specs,
             parameters: &self.parameters,
             ranges: &self.input.ranges,
-            false_alarm: self.options.false_structure_probability,
+            false_alarm: self.options.thresholds.false_structure_probability,
         };
         let following = probe::following(fit, &large)?;
         let over = |row: usize| error.rmse[row] / self.input.noise_floor[row];
         let nearest = (0..error.rmse.len()).map(over).fold(f64::INFINITY, f64::min).max(1.0);
         let hangs_together =
-            |row: usize| shape.autocorrelation[row].abs() > self.options.structured_correlation;
+            |row: usize| shape.autocorrelation[row].abs() > self.options.thresholds.structured_correlation;
         // Where most torques hang together, that is the colour of the sensors' noise.
         let coloured = 2 * (0..error.rmse.len()).filter(|&row| hangs_together(row)).count();
         let stands_out = |row: usize| {
-            over(row) > self.options.structured_ratio * nearest
+            over(row) > self.options.thresholds.structured_ratio * nearest
                 && hangs_together(row)
                 && coloured < error.rmse.len()
         };
-        let wanders = |row: usize| shape.wander[row] > self.options.wander;
+        let wanders = |row: usize| shape.wander[row] > self.options.thresholds.wander;
         let is_structured = |row: &usize| following.contains(row) || wanders(*row) || stands_out(*row);
         let (structured, colour): (Vec<usize>, Vec<usize>) = large.into_iter().partition(is_structured);
         let name = |row: usize| self.fixed.tree.joint(row).joint.clone();
@@ -78,8 +78,8 @@ impl Search<'_> {
     /// of this motion.
     fn is_large(&self, row: usize, rmse: f64, expected: Expected) -> bool {
         let left = (rmse * rmse - expected.of_parameters).max(0.0).sqrt();
-        left > self.options.floor_margin * self.input.noise_floor[row]
-            && left > self.options.structured_share * expected.torque.sqrt()
+        left > self.options.thresholds.floor_margin * self.input.noise_floor[row]
+            && left > self.options.thresholds.structured_share * expected.torque.sqrt()
             && !self.is_as_it_was(row, rmse)
     }
 

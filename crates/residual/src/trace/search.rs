@@ -104,7 +104,7 @@ impl Search<'_> {
     pub fn policy(&self) -> Policy {
         Policy {
             finalists: FINALISTS,
-            keep_tail: self.options.false_refinement_probability,
+            keep_tail: self.options.thresholds.false_name_probability,
             most_members: self.options.most_effects + self.declared,
         }
     }

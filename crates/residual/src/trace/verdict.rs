@@ -1,6 +1,6 @@
 //! The end of a search: the final fit, what each effect explained, what remains.
 
-use super::naming::Harm;
+use super::harm::Harm;
 use super::scanned::scanned_constants;
 use super::search::Search;
 use super::tracing::{Tracing, Verdict};
@@ -10,8 +10,6 @@ use phiw_regressor::least_squares::GroupedFactor;
 
 /// How far the errors of one model are apart that was fitted twice.
 const ROUNDING: f64 = 1e-9;
-/// How much the error of all torques together may grow beside what the torques' errors fall in their mean.
-const ALLOWED: f64 = 0.1;
 /// Times that the bound for the error on trial is lowered, before all that was found leaves.
 const TIGHTENINGS: usize = 2;
 /// How much lower it is than what would just suffice.
@@ -25,7 +23,7 @@ impl Search<'_> {
         let before = self.declared_error()?;
         let most = before.1.relative * (1.0 + ROUNDING);
         let tracing = self.clone().finish_with(before.clone(), Harm::EachTorque)?;
-        if Self::is_no_worse(&tracing) {
+        if self.is_no_worse(&tracing) {
             return Ok(tracing);
         }
         let tracing = self.with_a_say_of_what_is_held_out(before, most)?;
@@ -41,13 +39,13 @@ impl Search<'_> {
     ) -> Result<Tracing, IdentificationError> {
         let tracing =
             self.clone().finish_with(before.clone(), Harm::HeldOut { most_relative: f64::INFINITY })?;
-        if Self::is_no_worse(&tracing) {
+        if self.is_no_worse(&tracing) {
             return Ok(tracing);
         }
         // What is made of the model's torque was judged with that of an earlier fit.
         if let Some(without) = self.without_what_depends_on_the_model()? {
             let tracing = without.finish_with(before.clone(), Harm::EachTorque)?;
-            if Self::is_no_worse(&tracing) {
+            if self.is_no_worse(&tracing) {
                 return Ok(tracing);
             }
         }
@@ -56,7 +54,7 @@ impl Search<'_> {
         let mut most_relative = most;
         for _ in 0..TIGHTENINGS {
             let tracing = self.clone().finish_with(before.clone(), Harm::HeldOut { most_relative })?;
-            if Self::is_no_worse(&tracing) {
+            if self.is_no_worse(&tracing) {
                 return Ok(tracing);
             }
             most_relative *= TIGHTER * most / tracing.model.held_out.relative;
@@ -65,16 +63,17 @@ impl Search<'_> {
     }
 
     /// Whether a model's error on motion held out is no worse than the declared one's. Where it has names,
-    /// that of all torques together may grow, in logarithms, by `ALLOWED` of what the single torques' errors
+    /// that of all torques together may grow, in logarithms, by `allowed_growth` of what the single torques' errors
     /// fall in their mean: if the noise of one joint is most of all error, a large effect on another hardly
     /// shows in the sum.
-    fn is_no_worse(tracing: &Tracing) -> bool {
+    fn is_no_worse(&self, tracing: &Tracing) -> bool {
         let (before, after) = (&tracing.before.1, &tracing.model.held_out);
         let growth = (after.relative / before.relative).ln();
         let ratios = after.rmse.iter().zip(&before.rmse).filter(|(_, before)| **before > 0.0);
         let falls: Vec<f64> = ratios.map(|(after, before)| (before / after).ln()).collect();
         let fall = falls.iter().sum::<f64>() / falls.len().max(1) as f64;
-        growth <= ROUNDING || !tracing.effects.is_empty() && growth <= ALLOWED * fall
+        growth <= ROUNDING
+            || !tracing.effects.is_empty() && growth <= self.options.thresholds.allowed_growth * fall
     }
 
     /// The same without the effects that were found and whose columns are made of the model's torque or are

@@ -1,0 +1,87 @@
+//! Which of the chosen effects do harm, and leave the model.
+
+use super::search::Search;
+use super::trial::Trial;
+use crate::selection::{Member, Products};
+use rayon::prelude::*;
+
+/// What speaks against an effect.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Harm {
+    /// That the logarithms of the torques' foretold errors grow.
+    EachTorque,
+    /// That the logarithms of the errors on motion held out grow, or that the error of all torques together
+    /// is there larger than `most_relative` of the torques (RMS).
+    HeldOut { most_relative: f64 },
+}
+
+impl Search<'_> {
+    /// The places of the effects, ascending, that do harm: the worst, the worst of what is left without it,
+    /// and so on. What others are forms of stays.
+    ///
+    /// Errors count by their logarithms; while that of all torques together is larger than `harm` allows, by
+    /// their squares.
+    pub(super) fn harmful(&self, trial: &Trial, harm: Harm) -> Vec<usize> {
+        let mut left_out: Vec<usize> = Vec::new();
+        let sum = |squares: &[f64]| squares.iter().sum::<f64>();
+        let most = match harm {
+            Harm::EachTorque => f64::INFINITY,
+            Harm::HeldOut { most_relative } => {
+                let torque: f64 = trial.held_out.iter().map(Products::right_hand_side).sum();
+                most_relative * most_relative * torque
+            }
+        };
+        loop {
+            let fit = trial.fit_with(|other| !left_out.contains(&other));
+            let foretelling = trial.foretelling(&fit);
+            let squares_without = |member: Member| match harm {
+                Harm::HeldOut { .. } => trial.held_out_squares_without(&fit, member),
+                _ => foretelling.squares_without(member),
+            };
+            let present = match harm {
+                Harm::HeldOut { .. } => trial.held_out_squares(&fit),
+                _ => foretelling.squares(),
+            };
+            let found = trial.members.par_iter().zip(&trial.places).filter(|(member, place)| {
+                **place >= self.declared && !trial.is_required(member) && !left_out.contains(place)
+            });
+            let without = found.map(|(&member, &place)| {
+                let squares = squares_without(member);
+                (trial.gain(&squares, &present), place, sum(&squares))
+            });
+            let mut without: Vec<(f64, usize, f64)> = without.collect();
+            without.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let harms = without.first().is_some_and(|(gain, ..)| *gain <= 0.0);
+            let too_much = sum(&present) > most;
+            if !harms && too_much {
+                without.sort_by(|a, b| a.2.total_cmp(&b.2));
+            }
+            match without.first() {
+                Some(&(_, place, _)) if harms || too_much => left_out.push(place),
+                _ => break,
+            }
+        }
+        left_out.sort_unstable();
+        left_out
+    }
+
+    /// The place of the effect that makes the errors on motion held out larger by most, if that is by more
+    /// than `largest_harm`: in their geometric mean over the torques, or all together. A drift that one log
+    /// seems to show may be a disaster in the next.
+    pub(super) fn misleading(&self, trial: &Trial) -> Option<usize> {
+        let present = trial.held_out_squares(&trial.fit);
+        let rows: f64 = trial.held_out.iter().map(Products::rows).sum();
+        let sum = |squares: &[f64]| squares.iter().sum::<f64>();
+        let found = trial.members.par_iter().zip(&trial.places);
+        let found = found.filter(|(member, place)| **place >= self.declared && !trial.is_required(member));
+        let growth = found.map(|(&member, &place)| {
+            let without = trial.held_out_squares_without(&trial.fit, member);
+            let of_torque =
+                |torque: usize| trial.held_out[torque].rows() * (present[torque] / without[torque]).ln();
+            let mean = (0..present.len()).map(of_torque).sum::<f64>() / rows.max(1.0);
+            (mean.max((sum(&present) / sum(&without)).ln()), place)
+        });
+        let worst = growth.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))?;
+        (0.5 * worst.0 > self.options.thresholds.largest_harm.ln()).then_some(worst.1)
+    }
+}

@@ -1,0 +1,149 @@
+//! Every number that decides what has a name and what is structure.
+
+use thiserror::Error;
+
+/// The numbers that decide what has a name, what does harm, and what is structure.
+///
+/// Shares are of squares unless they say RMS. Each is held against right models and missing effects by
+/// `cargo xtask undeclared --suite wide_right,wide_effects --seeds dev --threshold NAME=VALUE,VALUE…`, which
+/// prints for every value what is named falsely, what is called sufficient, and how many effects are named.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thresholds {
+    /// Probability of naming anything on a right model, for all candidates of a run together; and that at
+    /// which one refinement is in the model, if it were not there.
+    pub false_name_probability: f64,
+    /// Share of a torque's residual, where training motion is foretold from its other parts, that an effect
+    /// on it must take away to have a name.
+    pub least_share: f64,
+    /// The same for an effect whose torque follows the same signal of the same joint as a simpler one of the
+    /// model.
+    pub least_share_of_kin: f64,
+    /// Share of what is already explained of the same torque that an effect must take: of what the other
+    /// effects took; for a form of something simpler, of the simpler's squares, times what the simpler leaves
+    /// over what is left with the form. How exactly a sign turns is no effect of its own.
+    pub least_of_others: f64,
+    /// RMS of what an effect takes over the RMS of its torque, at least, to have a name.
+    pub least_size: f64,
+    /// The same where the other parameters have taken up most of the effect.
+    pub least_absorbed_size: f64,
+    /// The same below which it is asked whether other constants of the other effects could do its work.
+    pub small_size: f64,
+    /// Factor on the RMS error on motion held out by which an effect may make it larger, in the mean of the
+    /// torques or all together.
+    pub largest_harm: f64,
+    /// How much the error of all torques together may grow on motion held out, over what the torques' errors
+    /// fall in their mean, both in logarithms.
+    pub allowed_growth: f64,
+    /// A residual below this share of its torque (RMS) is as good as none: nothing is sought in it.
+    pub negligible_share: f64,
+    /// A residual over the noise floor by less than this factor is noise. One over what it was when a held
+    /// model was fitted by less than twice the excess is as it was.
+    pub floor_margin: f64,
+    /// A residual below this share of its torque (RMS) is no structure: filters and encoders leave as much of
+    /// a right model.
+    pub structured_share: f64,
+    /// Probability that a torque's residual of noise seems to follow any signal.
+    pub false_structure_probability: f64,
+    /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which on
+    /// it is structure if its samples hang together (`structured_correlation`): the noise of a robot's
+    /// sensors is of one colour, and raises all residuals over their floors alike.
+    pub structured_ratio: f64,
+    /// Correlation of a residual's samples a quarter to half a second apart, less what the filter gives to
+    /// noise, from which on they hang together.
+    pub structured_correlation: f64,
+    /// Correlation of a residual's samples 2.5 s apart from which on it wanders, whatever it follows: noise
+    /// of up to 1 s of correlation has less than a tenth.
+    pub wander: f64,
+}
+
+impl Default for Thresholds {
+    fn default() -> Self {
+        Thresholds {
+            false_name_probability: 0.01,
+            least_share: 0.2,
+            least_share_of_kin: 0.75,
+            least_of_others: 0.025,
+            least_size: 0.01,
+            least_absorbed_size: 0.03,
+            small_size: 0.05,
+            largest_harm: 1.05,
+            allowed_growth: 0.1,
+            negligible_share: 0.005,
+            floor_margin: 1.15,
+            structured_share: 0.03,
+            false_structure_probability: 0.05,
+            structured_ratio: 8.0,
+            structured_correlation: 0.3,
+            wander: 0.5,
+        }
+    }
+}
+
+/// A number that the thresholds do not have.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("there is no threshold {name:?}; there are {}", .known.join(", "))]
+pub struct UnknownThreshold {
+    /// What was asked for.
+    pub name: String,
+    /// What there is.
+    pub known: Vec<&'static str>,
+}
+
+impl Thresholds {
+    /// Gives a threshold another value, by its name.
+    ///
+    /// # Errors
+    /// There is none of this name.
+    pub fn set(&mut self, name: &str, value: f64) -> Result<(), UnknownThreshold> {
+        let mut all = self.by_name();
+        if let Some((_, threshold)) = all.iter_mut().find(|(own, _)| *own == name) {
+            **threshold = value;
+            return Ok(());
+        }
+        let known = all.into_iter().map(|(own, _)| own).collect();
+        Err(UnknownThreshold { name: name.to_owned(), known })
+    }
+
+    fn by_name(&mut self) -> [(&'static str, &mut f64); 16] {
+        [
+            ("false_name_probability", &mut self.false_name_probability),
+            ("least_share", &mut self.least_share),
+            ("least_share_of_kin", &mut self.least_share_of_kin),
+            ("least_of_others", &mut self.least_of_others),
+            ("least_size", &mut self.least_size),
+            ("least_absorbed_size", &mut self.least_absorbed_size),
+            ("small_size", &mut self.small_size),
+            ("largest_harm", &mut self.largest_harm),
+            ("allowed_growth", &mut self.allowed_growth),
+            ("negligible_share", &mut self.negligible_share),
+            ("floor_margin", &mut self.floor_margin),
+            ("structured_share", &mut self.structured_share),
+            ("false_structure_probability", &mut self.false_structure_probability),
+            ("structured_ratio", &mut self.structured_ratio),
+            ("structured_correlation", &mut self.structured_correlation),
+            ("wander", &mut self.wander),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Thresholds;
+
+    #[test]
+    fn every_threshold_is_set_by_its_name() {
+        let names: Vec<&str> = Thresholds::default().by_name().map(|(name, _)| name).to_vec();
+        for name in names {
+            let mut changed = Thresholds::default();
+            changed.set(name, -1.0).unwrap();
+            assert_eq!(format!("{changed:?}").matches("-1.0").count(), 1, "{name}");
+            assert!(format!("{changed:?}").contains(&format!(" {name}: -1.0")), "{name}: {changed:?}");
+        }
+    }
+
+    #[test]
+    fn an_unknown_threshold_is_refused_with_those_that_exist() {
+        let message = Thresholds::default().set("least", 1.0).unwrap_err().to_string();
+        assert!(message.contains("\"least\"") && message.contains("least_share_of_kin"), "{message}");
+    }
+}
