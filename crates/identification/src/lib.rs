@@ -20,6 +20,7 @@ pub mod held_joints;
 mod identify;
 mod jackknife;
 mod kept_blocks;
+mod knowledge;
 mod known_payload;
 mod log_file;
 mod log_set;

@@ -49,6 +49,10 @@ pub struct Model {
     /// from a model that an earlier phiw wrote.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub left_out_std: Option<Vec<f64>>,
+    /// RMS of each torque's error on the logs that were held out \[N·m, N\]; absent from a model that an
+    /// earlier phiw wrote.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out_rmse: Option<Vec<f64>>,
     /// What the fit knew, error included: the weighted factor R of \[Φ f\] over the parameters that were
     /// determined.
     pub factor: FactorRows,
@@ -194,6 +198,7 @@ impl Model {
             effects: (0..design.effects().len()).map(effect).collect(),
             residual_std: fit.residual_std.clone(),
             left_out_std: Some(fit.left_out_std.clone()),
+            held_out_rmse: None,
             factor: FactorRows::of(&fit.factor, fit.determined()),
             cutoff_hz,
             rest_speeds: design.rest_speeds().to_vec(),
@@ -209,6 +214,18 @@ impl Model {
     /// itself.
     pub fn with_sources(self, urdf: &str, data: Vec<DataFingerprint>) -> Self {
         Model { urdf: Some(urdf.to_owned()), data, ..self }
+    }
+
+    /// The same with its error on the logs that were held out.
+    pub fn with_held_out_rmse(self, rmse: &[f64]) -> Self {
+        Model { held_out_rmse: Some(rmse.to_vec()), ..self }
+    }
+
+    /// What the model left of each torque when it was identified \[N·m, N\]: on the motion that it was fitted
+    /// to or on that which was held out, whichever is larger.
+    pub fn left(&self) -> Vec<f64> {
+        let held_out = |torque: usize| self.held_out_rmse.as_ref().map_or(0.0, |rmse| rmse[torque]);
+        self.residual_std.iter().enumerate().map(|(torque, std)| std.max(held_out(torque))).collect()
     }
 
     /// The same with the fit over possible bodies beside it.
@@ -291,6 +308,11 @@ impl Model {
             && (stds.len() != self.joints.len() || !stds.iter().all(usable_std))
         {
             return wrong(format!("left_out_std is not a list of {} deviations", self.joints.len()));
+        }
+        if let Some(rmse) = &self.held_out_rmse
+            && (rmse.len() != self.joints.len() || !rmse.iter().all(usable_std))
+        {
+            return wrong(format!("held_out_rmse is not a list of {} errors", self.joints.len()));
         }
         let parameters = self.base_parameters.len()
             + self.effects.iter().map(|effect| effect.parameters.len()).sum::<usize>();

@@ -2,8 +2,11 @@
 
 mod synthetic;
 
+use faer::Mat;
+use faer::linalg::solvers::DenseSolveCore;
 use phiw_dynamics::Tree;
 use phiw_identification::{IdentificationError, Identified, Model, identify};
+use phiw_regressor::factor::Factor;
 
 fn identified(tree: &Tree) -> Identified {
     let blocks = synthetic::blocks(&synthetic::recording(tree, 3, 30.0, 2.0, 0.3, 3), 1000);
@@ -35,6 +38,47 @@ fn a_model_survives_its_file_to_the_last_bit() {
     let again = factor.solve().unwrap().parameters;
     for (again, parameter) in again.iter().zip(&parameters) {
         assert!((again - parameter).abs() < 1e-9 * (1.0 + parameter.abs()));
+    }
+}
+
+/// The variances of the factor and of the folds that were left out add, and the parameters stay what they were.
+#[test]
+fn a_model_knows_no_more_than_its_covariance_says() {
+    let tree = synthetic::robot(4, 5);
+    let model = model(&identified(&tree));
+    let factor = model.factor.factor().unwrap();
+    let size = factor.parameters();
+    let information = |factor: &Factor| -> Mat<f64> {
+        let triangle = factor.triangle();
+        let mut entries = triangle.iter();
+        let mut r = Mat::<f64>::zeros(size + 1, size + 1);
+        for row in 0..=size {
+            (row..=size).for_each(|column| r[(row, column)] = *entries.next().unwrap());
+        }
+        let r = r.submatrix(0, 0, size, size).to_owned();
+        r.transpose() * &r
+    };
+    let covariance = model.covariance.as_ref().unwrap();
+    let deviations = covariance.deviations(model.factor.parameters.len()).unwrap();
+    let spread = Mat::from_fn(size, size, |row, column| {
+        let of = |deviation: &Vec<f64>| {
+            deviation[model.factor.parameters[row]] * deviation[model.factor.parameters[column]]
+        };
+        deviations.iter().map(of).sum::<f64>()
+    });
+    let alone = information(&factor).partial_piv_lu().inverse();
+    let knowledge = model.knowledge().unwrap();
+    let product = information(&knowledge) * (&alone + &spread);
+    for (row, column) in (0..size).flat_map(|row| (0..size).map(move |column| (row, column))) {
+        let expected = f64::from(u8::from(row == column));
+        let scale = ((alone[(column, column)] + spread[(column, column)])
+            / (alone[(row, row)] + spread[(row, row)]))
+            .sqrt();
+        assert!((product[(row, column)] - expected).abs() < 1e-6 * scale.max(1.0), "{row} {column}");
+    }
+    let [before, after] = [&factor, &knowledge].map(|factor| factor.solve().unwrap().parameters);
+    for (before, after) in before.iter().zip(&after) {
+        assert!((before - after).abs() < 1e-8 * (1.0 + before.abs()), "{before} {after}");
     }
 }
 

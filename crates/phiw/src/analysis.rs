@@ -61,7 +61,8 @@ impl<'a> Analysis<'a> {
             Rows::Reduced { fingerprints, .. } => fingerprints.to_vec(),
         };
         let model = Model::of_fit(design, fit, &session.declared, &session.held, cutoffs)?
-            .with_sources(&session.xml, fingerprints);
+            .with_sources(&session.xml, fingerprints)
+            .with_held_out_rmse(&identified.held_out.rmse);
         let (known, unknown_extents) = known(session)?;
         let settings = ConsistentSettings { known, ..ConsistentSettings::default() };
         let consistent =

@@ -257,12 +257,13 @@ fn start(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Re
     };
     let file = ModelFile::given(session.arguments.in_memory.model.as_ref(), path)?;
     let (design, parameters) = file.design(&session.arguments.urdf, &session.tree, &session.catalogue)?;
-    let factor = file.factor()?;
+    let factor = file.knowledge()?;
     let model = file.model;
     let held = HeldModel {
         factor,
         determined: model.factor.parameters.clone(),
         residual_std: model.residual_std.clone(),
+        left: model.left(),
     };
     let specs = design.effects().iter().map(|effect| effect.spec()).collect();
     Ok(Start { model, specs, parameters, held: Some(held) })

@@ -82,6 +82,14 @@ impl ModelFile {
         self.model.factor.factor().map_err(|source| self.wrong(source))
     }
 
+    /// What the model knows of its parameters, no more surely than its covariance says.
+    ///
+    /// # Errors
+    /// The file's factor or covariance has not its own size.
+    pub fn knowledge(&self) -> Result<Factor, Error> {
+        self.model.knowledge().map_err(|source| self.wrong(source))
+    }
+
     fn wrong(&self, source: IdentificationError) -> Error {
         Error::Model { path: self.path.clone(), source: Box::new(source) }
     }

@@ -120,8 +120,9 @@ fn traced_robot(
     let held = clean.as_ref().map(|clean| {
         let model = Model::of_fit(&clean.design, &clean.fit, &[], &[], (0.0, 0.0)).unwrap();
         HeldModel {
-            factor: model.factor.factor().unwrap(),
+            factor: model.knowledge().unwrap(),
             determined: model.factor.parameters.clone(),
+            left: model.left(),
             residual_std: model.residual_std,
         }
     });

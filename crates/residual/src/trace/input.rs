@@ -37,8 +37,11 @@ pub struct HeldModel {
     pub factor: Factor,
     /// The parameters that the factor's columns stand for.
     pub determined: Vec<usize>,
-    /// Standard deviation of each torque's residual when it was fitted.
+    /// Standard deviation of each torque's residual when it was fitted \[N·m, N\].
     pub residual_std: Vec<f64>,
+    /// What it left of each torque when it was identified, on motion held out, too \[N·m, N\]: an error that is
+    /// no larger is no change.
+    pub left: Vec<f64>,
 }
 
 /// What a trace starts from.

@@ -295,11 +295,11 @@ impl Search<'_> {
         self.is_form_material(whole, member, &squares)
     }
 
-    /// Whether a torque's residual is no larger than it was when the held model was fitted: then nothing has
-    /// changed there since.
+    /// Whether a torque's residual is no larger than it was when the held model was identified: then nothing
+    /// has changed there since.
     pub(super) fn is_as_it_was(&self, torque: usize, rmse: f64) -> bool {
         let margin = self.options.thresholds.floor_margin;
-        self.input.held.as_ref().is_some_and(|held| rmse <= margin * held.residual_std[torque])
+        self.input.held.as_ref().is_some_and(|held| rmse <= margin * held.left[torque])
     }
 
     /// Whether what an effect takes away where it is foretold is worth a name.

@@ -36,8 +36,8 @@ pub struct Thresholds {
     pub allowed_growth: f64,
     /// A residual below this share of its torque (RMS) is as good as none: nothing is sought in it.
     pub negligible_share: f64,
-    /// A residual over the noise floor by less than this factor is noise. One over what it was when a held
-    /// model was fitted by less than twice the excess is as it was.
+    /// A residual over the noise floor by less than this factor is noise; one over what a held model left when
+    /// it was identified is as it was.
     pub floor_margin: f64,
     /// A residual below this share of its torque (RMS) is no structure: filters and encoders leave as much of
     /// a right model.
@@ -62,7 +62,7 @@ impl Default for Thresholds {
             false_name_probability: 0.01,
             least_share: 0.2,
             least_share_of_kin: 0.75,
-            least_of_others: 0.025,
+            least_of_others: 0.02,
             least_size: 0.01,
             least_absorbed_size: 0.03,
             small_size: 0.05,
