@@ -41,7 +41,8 @@ fn a_model_survives_its_file_to_the_last_bit() {
     }
 }
 
-/// The variances of the factor and of the folds that were left out add, and the parameters stay what they were.
+/// The variances of the factor and of the folds that were left out add, and the parameters stay what they
+/// were.
 #[test]
 fn a_model_knows_no_more_than_its_covariance_says() {
     let tree = synthetic::robot(4, 5);

@@ -255,8 +255,8 @@ fn the_end_is_the_same_whatever_was_declared() {
     assert!(errors.iter().all(|error| *error < 1.05 * best), "{errors:?}");
 }
 
-/// Logs of slow motion tell little of the bodies and do not tell viscous from Coulomb friction. Their model is
-/// wrong by orders of magnitude on faster motion, and knows that it is unsure: the robot has not changed.
+/// Logs of slow motion tell little of the bodies and do not tell viscous from Coulomb friction. Their model
+/// is wrong by orders of magnitude on faster motion, and knows that it is unsure: the robot has not changed.
 /// Frictions, payloads, a drift and a gain were named.
 #[test]
 fn an_unsure_model_is_not_taken_for_a_robot_that_has_changed() {

@@ -98,8 +98,8 @@ fn optimal_designs_are_best_by_their_own_measure() {
     assert!(allowed.iter().all(|&motion| variance(motion) >= variance(best.motion)));
 }
 
-/// The variance falls most for each second of motion, and not most for each motion; the first motion is the one
-/// that would leave least if all took the same time.
+/// The variance falls most for each second of motion, and not most for each motion; the first motion is the
+/// one that would leave least if all took the same time.
 #[test]
 fn a_second_of_motion_is_what_is_paid() {
     let dataset = dataset(6).with_slower(&[3.0]).unwrap();

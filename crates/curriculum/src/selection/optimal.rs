@@ -56,8 +56,8 @@ impl Selection for TorqueOptimal {
     }
 }
 
-/// The largest fall of [`TorqueOptimal`]'s variance for each second of motion, in logarithms: what a second of
-/// the robot's time is worth.
+/// The largest fall of [`TorqueOptimal`]'s variance for each second of motion, in logarithms: what a second
+/// of the robot's time is worth.
 ///
 /// Where nothing has been measured the variance is infinite, and that motion is chosen whose variance is
 /// smallest after as many seconds of it as of any other.

@@ -1,8 +1,8 @@
 //! What people do today: periodic motions whose Fourier coefficients are optimised for a small cond(Φ) under
 //! the limits of the joints and the balance of a model (Swevers et al. 1997, Park 2006).
 //!
-//! cond(Φ) does not depend on the model; whether the robot may be asked for a motion does. So the model is the
-//! initial one, which is what somebody has who identifies a robot, or the true one, which nobody has.
+//! cond(Φ) does not depend on the model; whether the robot may be asked for a motion does. So the model is
+//! the initial one, which is what somebody has who identifies a robot, or the true one, which nobody has.
 
 use super::setup::Setup;
 use super::swing::{FREE, Swing};
@@ -18,8 +18,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-/// Time between the samples that are looked at while coefficients are sought \[s\]: ten for each period of the
-/// highest harmonic and more.
+/// Time between the samples that are looked at while coefficients are sought \[s\]: ten for each period of
+/// the highest harmonic and more.
 const COARSE_S: f64 = 0.05;
 /// Share of the limit of torque that is used: the rest is the feedback's.
 const USED_TORQUE: f64 = 0.5;
@@ -55,8 +55,8 @@ struct Search<'a> {
 }
 
 impl FourierMotions {
-    /// As many motions as an experiment has iterations, each as long as the dataset's in the middle, optimised
-    /// with what `model` says of the balance. `progress` is told how many are done.
+    /// As many motions as an experiment has iterations, each as long as the dataset's in the middle,
+    /// optimised with what `model` says of the balance. `progress` is told how many are done.
     ///
     /// # Errors
     /// The model is not of this robot, or no motion of any size is allowed.
@@ -99,8 +99,8 @@ impl FourierMotions {
 }
 
 impl Search<'_> {
-    /// An evolution with one parent: of some trials about it the best takes its place if it is better, and the
-    /// steps grow or shrink with the success (Rechenberg's rule). Deterministic for a seed.
+    /// An evolution with one parent: of some trials about it the best takes its place if it is better, and
+    /// the steps grow or shrink with the success (Rechenberg's rule). Deterministic for a seed.
     fn best(&self, measured: Option<&Triangle>, rng: &mut dyn Rng) -> anyhow::Result<Vec<f64>> {
         let count = FREE * self.robot.tree().joint_count();
         let normal =
@@ -132,8 +132,8 @@ impl Search<'_> {
         Ok(parent)
     }
 
-    /// ln cond(Φ) of all that was measured and the motion at the largest size that is allowed; infinite if none
-    /// is.
+    /// ln cond(Φ) of all that was measured and the motion at the largest size that is allowed; infinite if
+    /// none is.
     fn cost(&self, coefficients: &[f64], measured: Option<&Triangle>) -> anyhow::Result<f64> {
         let (motion, is_allowed) = self.allowed("trial", coefficients, COARSE_S)?;
         if !is_allowed {
@@ -201,8 +201,8 @@ impl Search<'_> {
         Ok(true)
     }
 
-    /// Each joint swings about its middle within its limits of position and speed; middle and swing are `size`
-    /// of what the coefficients ask for, from the neutral configuration.
+    /// Each joint swings about its middle within its limits of position and speed; middle and swing are
+    /// `size` of what the coefficients ask for, from the neutral configuration.
     fn motion(
         &self,
         name: &str,

@@ -1,4 +1,5 @@
-//! A joint that swings about its middle: a few harmonics that set in and end at rest, within the joint's limits.
+//! A joint that swings about its middle: a few harmonics that set in and end at rest, within the joint's
+//! limits.
 
 use phiw_dynamics::Tree;
 use std::f64::consts::TAU;
@@ -9,8 +10,8 @@ const HARMONICS: usize = 5;
 const RAMP_S: f64 = 0.5;
 /// Joints without limits are taken to turn so far to either side \[rad\], and to be so fast \[rad/s\].
 const UNLIMITED: [f64; 2] = [2.0, 4.0];
-/// Shares of the limits of position and speed that are used: the rest is for a motion that is not the one that
-/// was asked for.
+/// Shares of the limits of position and speed that are used: the rest is for a motion that is not the one
+/// that was asked for.
 const USED: [f64; 2] = [0.7, 0.7];
 /// Time between the samples at which the largest swing of a shape is looked for \[s\].
 const SHAPE_S: f64 = 0.05;

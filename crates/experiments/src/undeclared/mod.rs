@@ -23,10 +23,10 @@
 //!
 //! `cargo xtask undeclared --all` is the full experiment on the old suites, 1000 cases of each family of
 //! seeds, and `--suite wide` that on the wide ones, 1538 cases of the reporting seeds; `--resume` goes on
-//! with one that was stopped. `--suite wide_right,wide_effects --threshold NAME=VALUE,VALUE…` calibrates
-//! one of the tracer's thresholds (`Thresholds` of phiw-residual). `--suite`, `--situation`, `--kind`, `--robot` and
-//! `--count` choose among the cases, `--case SEED` traces one and shows its truth, and `--generate DIR` only
-//! writes the files.
+//! with one that was stopped. `--suite wide_right,wide_effects --threshold NAME=VALUE,VALUE…` calibrates one
+//! of the tracer's thresholds (`Thresholds` of phiw-residual). `--suite`, `--situation`, `--kind`, `--robot`
+//! and `--count` choose among the cases, `--case SEED` traces one and shows its truth, and `--generate DIR`
+//! only writes the files.
 //!
 //! # What it prints
 //!
@@ -104,9 +104,9 @@ pub struct Arguments {
     /// Only cases in this situation (wide suites).
     #[arg(long)]
     situation: Option<Situation>,
-    /// Give one of the tracer's thresholds these values one after the other, and print what each value does to
-    /// right models and to missing effects (wide suites). With `false_name_probability` that is the rate of
-    /// false names, asked and observed.
+    /// Give one of the tracer's thresholds these values one after the other, and print what each value does
+    /// to right models and to missing effects (wide suites). With `false_name_probability` that is the rate
+    /// of false names, asked and observed.
     #[arg(long, value_name = "NAME=VALUE,VALUE…", value_parser = values_of_a_threshold)]
     threshold: Option<ThresholdValues>,
     /// Only cases with this effect among their secrets.

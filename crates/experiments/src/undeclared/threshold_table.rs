@@ -8,8 +8,8 @@ use super::table::{percent, scores};
 use super::wide_table::{is_left_alone, material_outcomes};
 use std::fmt::Write;
 
-/// Right models with a false name, by the colour of the noise, and those that are left alone; material effects
-/// with exactly their joints, and cases of these with a false name: one row for each value.
+/// Right models with a false name, by the colour of the noise, and those that are left alone; material
+/// effects with exactly their joints, and cases of these with a false name: one row for each value.
 pub fn by_value(name: &str, runs: &[(f64, Vec<Scored>)]) -> String {
     use Situation::{Colour, HeavyTails, LongColour, ShortColour, White};
     let groups: [(&str, &[Situation]); 4] = [

@@ -39,8 +39,8 @@ pub struct HeldModel {
     pub determined: Vec<usize>,
     /// Standard deviation of each torque's residual when it was fitted \[N·m, N\].
     pub residual_std: Vec<f64>,
-    /// What it left of each torque when it was identified, on motion held out, too \[N·m, N\]: an error that is
-    /// no larger is no change.
+    /// What it left of each torque when it was identified, on motion held out, too \[N·m, N\]: an error that
+    /// is no larger is no change.
     pub left: Vec<f64>,
 }
 

@@ -36,8 +36,8 @@ pub struct Thresholds {
     pub allowed_growth: f64,
     /// A residual below this share of its torque (RMS) is as good as none: nothing is sought in it.
     pub negligible_share: f64,
-    /// A residual over the noise floor by less than this factor is noise; one over what a held model left when
-    /// it was identified is as it was.
+    /// A residual over the noise floor by less than this factor is noise; one over what a held model left
+    /// when it was identified is as it was.
     pub floor_margin: f64,
     /// A residual below this share of its torque (RMS) is no structure: filters and encoders leave as much of
     /// a right model.

@@ -63,9 +63,9 @@ impl Search<'_> {
     }
 
     /// Whether a model's error on motion held out is no worse than the declared one's. Where it has names,
-    /// that of all torques together may grow, in logarithms, by `allowed_growth` of what the single torques' errors
-    /// fall in their mean: if the noise of one joint is most of all error, a large effect on another hardly
-    /// shows in the sum.
+    /// that of all torques together may grow, in logarithms, by `allowed_growth` of what the single torques'
+    /// errors fall in their mean: if the noise of one joint is most of all error, a large effect on another
+    /// hardly shows in the sum.
     fn is_no_worse(&self, tracing: &Tracing) -> bool {
         let (before, after) = (&tracing.before.1, &tracing.model.held_out);
         let growth = (after.relative / before.relative).ln();
