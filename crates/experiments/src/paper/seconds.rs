@@ -45,7 +45,8 @@ fn duration_s(results: &Results, run: &RunFile, iterations: usize) -> f64 {
         let facts = results.settings.dataset.iter().find(|motion| motion.name == name);
         facts.map_or(results.settings.fourier_s, |motion| motion.duration_s)
     };
-    run.run.history.iter().take(iterations).map(|record| of_motion(&record.motion)).sum()
+    // The sum of nothing would be −0.
+    run.run.history.iter().take(iterations).fold(0.0, |sum, record| sum + of_motion(&record.motion))
 }
 
 /// The picture, of as many arms as have colours of their own.
