@@ -1,10 +1,17 @@
-//! What a model that is held knows of its parameters.
+//! What a model that is held knows of its parameters, and what it left unexplained.
 
 use crate::factor_rows::FactorRows;
 use crate::{IdentificationError, Model};
 use phiw_regressor::factor::Factor;
 
 impl Model {
+    /// What the model left of each torque when it was identified \[N·m, N\]: on the motion that it was fitted
+    /// to or on that which was held out, whichever is larger.
+    pub fn left(&self) -> Vec<f64> {
+        let held_out = |torque: usize| self.held_out_rmse.as_ref().map_or(0.0, |rmse| rmse[torque]);
+        self.residual_std.iter().enumerate().map(|(torque, std)| std.max(held_out(torque))).collect()
+    }
+
     /// What the model's logs know of its parameters: its factor, loosened by its covariance.
     ///
     /// The factor takes every row for independent and every constant of an effect for known. The covariance

@@ -221,13 +221,6 @@ impl Model {
         Model { held_out_rmse: Some(rmse.to_vec()), ..self }
     }
 
-    /// What the model left of each torque when it was identified \[N·m, N\]: on the motion that it was fitted
-    /// to or on that which was held out, whichever is larger.
-    pub fn left(&self) -> Vec<f64> {
-        let held_out = |torque: usize| self.held_out_rmse.as_ref().map_or(0.0, |rmse| rmse[torque]);
-        self.residual_std.iter().enumerate().map(|(torque, std)| std.max(held_out(torque))).collect()
-    }
-
     /// The same with the fit over possible bodies beside it.
     ///
     /// # Errors

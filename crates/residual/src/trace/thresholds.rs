@@ -1,12 +1,16 @@
-//! Every number that decides what has a name and what is structure.
+//! The numbers that decide what has a name, what does harm, and when a residual is looked at as structure.
 
 use thiserror::Error;
 
-/// The numbers that decide what has a name, what does harm, and what is structure.
+/// The numbers that decide what has a name, what does harm, and when a residual is looked at as structure.
 ///
-/// Shares are of squares unless they say RMS. Each is held against right models and missing effects by
+/// Shares are of squares unless they say RMS. Each can be held against right models and missing effects by
 /// `cargo xtask undeclared --suite wide_right,wide_effects --seeds dev --threshold NAME=VALUE,VALUE…`, which
 /// prints for every value what is named falsely, what is called sufficient, and how many effects are named.
+///
+/// What a probe must foretell (`probe.rs`), how much error parameters may make (`remaining.rs`), when a value
+/// is beyond its bounds by chance (`admissible.rs`) and when an effect is a rival (`naming.rs`) stand as
+/// constants where they are used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {
     /// Probability of naming anything on a right model, for all candidates of a run together; and that at
