@@ -2,6 +2,7 @@
 
 use crate::accumulate::{FoldFactors, Rests, accumulate_folds};
 use crate::fit::{Fit, TorqueError, fit, merge, torque_error};
+use crate::own_torque::{OwnTorqueFit, fit_with_own_torque};
 use crate::reference::ReferenceModel;
 use crate::variants::{Choice, Rivals, choose, undetermined_with};
 use crate::{BlockSource, Design, Effect, Fold, IdentificationError};
@@ -96,12 +97,9 @@ fn identify_rows(
             folds = accumulate_folds(&declared.design, &all_folds, sources, rests)?;
         }
     }
-    let (fitted, mut folds) = declared.fitted(folds, train.len())?;
-    if needs_reference {
-        // The error is that of the model as it is used: with its own torque in the columns that need one.
-        folds = accumulate_folds(&fitted.design, &all_folds, sources, rests)?;
-    }
-    Ok((fitted, folds))
+    let (fitted, folds) = declared.fitted(folds, train.len())?;
+    // The error is that of the model as it is used: with its own torque in the columns that need one.
+    fitted.with_own_torque(folds, |design| accumulate_folds(design, &all_folds, sources, rests))
 }
 
 /// A rigid body with all variants of its declared effects: the columns of the first pass.
@@ -173,13 +171,23 @@ impl Declared {
         let kept: Vec<usize> = (0..design.base().count()).chain(effects).collect();
         let folds = folds.select(&kept)?;
         let design = design.keep(&chosen);
-        let mut fit = fit(&design, &folds.moving[..train])?;
-        if let Some(Rivals { folds, stands_for }) = &with_rivals {
-            crate::rivals::widen(&mut fit, folds, stands_for)?;
-        }
+        let fit = fit_beside(&design, &folds.moving[..train], with_rivals.as_ref())?;
         let design = design.with_own_reference(&fit.parameters)?;
-        Ok((Fitted { design, fit, train }, folds))
+        Ok((Fitted { design, fit, train, rivals: with_rivals }, folds))
     }
+}
+
+/// A fit whose deviations count what the choice among `rivals` leaves open.
+fn fit_beside(
+    design: &Design,
+    folds: &[GroupedFactor],
+    rivals: Option<&Rivals>,
+) -> Result<Fit, IdentificationError> {
+    let mut fit = fit(design, folds)?;
+    if let Some(Rivals { folds, stands_for }) = rivals {
+        crate::rivals::widen(&mut fit, folds, stands_for)?;
+    }
+    Ok(fit)
 }
 
 /// A model before its error is known.
@@ -188,9 +196,23 @@ struct Fitted {
     fit: Fit,
     /// Number of folds that it was fitted to.
     train: usize,
+    rivals: Option<Rivals>,
 }
 
 impl Fitted {
+    /// Fitted to its own torque, where columns are made of it.
+    fn with_own_torque(
+        self,
+        folds: FoldFactors,
+        read: impl Fn(&Design) -> Result<FoldFactors, IdentificationError>,
+    ) -> Result<(Self, FoldFactors), IdentificationError> {
+        let Fitted { design, fit, train, rivals } = self;
+        let again = |design: &Design, folds: &[GroupedFactor]| fit_beside(design, folds, rivals.as_ref());
+        let OwnTorqueFit { design, fit, folds } =
+            fit_with_own_torque(design, fit, folds, train, read, again)?;
+        Ok((Fitted { design, fit, train, rivals }, folds))
+    }
+
     /// With its error on the folds, of which those that it was fitted to come first.
     fn identified(self, mut train_folds: Vec<GroupedFactor>) -> Result<Identified, IdentificationError> {
         let held_out_folds = train_folds.split_off(self.train);

@@ -26,6 +26,7 @@ mod log_file;
 mod log_set;
 mod mirrored;
 mod model_sources;
+mod own_torque;
 mod pairs;
 mod predict;
 mod prediction_errors;
@@ -59,6 +60,7 @@ pub mod fitting {
     pub use crate::fit::{Fit, TorqueError, fit, merge, torque_error, torques_with_enough_rows};
     pub use crate::free_constants::{ByConstant, FreeConstant, free_constants};
     pub use crate::identify::Declared;
+    pub use crate::own_torque::{OwnTorqueFit, fit_with_own_torque};
 }
 
 /// What a model's torques are worth: the parameters' covariance, each effect's share, bands, and the errors

@@ -307,6 +307,9 @@ pub struct NextArguments {
     /// (`tau_cmd.<joint>`) or was asked for (`qref.<joint>`); where one does not, the second is taken.
     #[arg(long, default_value = "unknown-noise")]
     pub estimator: NextEstimator,
+    /// What makes a motion the best of those that are allowed.
+    #[arg(long, default_value = "torque-per-second")]
+    pub selection: NextSelection,
     /// Commands a second of the robot's controller (Hz); by default seen in the logs.
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub command_hz: Option<f64>,
@@ -371,6 +374,17 @@ pub enum NextEstimator {
     UnknownNoise,
     /// Equation (4) of the filtered logs, with the URDF as prior: the noise is taken to be in the log alone.
     LeastSquares,
+}
+
+/// What makes a motion the best of those that are allowed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NextSelection {
+    /// In each second of it, it takes most of the uncertainty of the torques of all motions.
+    #[default]
+    TorquePerSecond,
+    /// It makes cond(Φ) smallest: the paper's equation (11).
+    Condition,
 }
 
 /// How velocities and accelerations come about.

@@ -7,7 +7,7 @@ mod plan_file;
 mod standing;
 mod telling;
 
-use crate::arguments::NextArguments;
+use crate::arguments::{NextArguments, NextSelection};
 use crate::console::Console;
 use crate::output::check_file;
 use crate::{Error, robot_file, session};
@@ -15,7 +15,7 @@ use estimate::Present;
 use phiw_curriculum::constraint::{Constraint, FalseFalls, MotionMargin, Unconstrained, ZmpConstraint};
 use phiw_curriculum::planner::{Belief, MeasuredSoFar, Plan, Policy, plan};
 use phiw_curriculum::relaxation::{ConditionRelaxation, ConstantReduction, Relaxation};
-use phiw_curriculum::selection::SmallestCondition;
+use phiw_curriculum::selection::{Selection, SmallestCondition, TorqueOptimalPerSecond};
 use phiw_curriculum::{CurriculumError, CurriculumSettings};
 use phiw_result_folder::{Disk, Lock, ResultFile, check_inputs, replace_files};
 use standing::Standing;
@@ -148,6 +148,10 @@ fn planned(
         Some(alpha) => Box::new(ConstantReduction(alpha)),
         None => Box::new(ConditionRelaxation::default()),
     };
+    let selection: &dyn Selection = match arguments.selection {
+        NextSelection::TorquePerSecond => &TorqueOptimalPerSecond,
+        NextSelection::Condition => &SmallestCondition,
+    };
     let CurriculumSettings { none_allowed, rivalry_period_s, .. } = CurriculumSettings::default();
     let belief = Belief {
         robot: &present.robot,
@@ -164,7 +168,7 @@ fn planned(
         ..MeasuredSoFar::default()
     };
     let policy = Policy {
-        selection: &SmallestCondition,
+        selection,
         constraint: constraint.as_ref(),
         relaxation: relaxation.as_ref(),
         none_allowed,

@@ -98,7 +98,7 @@ fn before_any_log_the_urdf_is_believed_and_few_motions_are_allowed() {
 #[test]
 fn logs_correct_the_estimate_and_open_the_way_to_livelier_motions() {
     let scene = Scene::new(&wrong_urdf());
-    let support = "--support DIR/support.toml --declare viscous_friction";
+    let support = "--support DIR/support.toml --declare viscous_friction --selection condition";
     let (_, _, first) = scene.next(support);
     let believed = torque_error(&scene.planned(), &urdf(), synthetic::VISCOUS);
     let (summary, _, one) = scene.next(&format!("{support} --measured DIR/log_1.csv"));

@@ -9,7 +9,7 @@ use phiw_curriculum::constraint::{FalseFalls, ZmpConstraint};
 use phiw_curriculum::end::FixedCount;
 use phiw_curriculum::motion::{Motion, MotionDataset};
 use phiw_curriculum::relaxation::ConditionRelaxation;
-use phiw_curriculum::selection::{MotionCandidates, SmallestCondition};
+use phiw_curriculum::selection::{MotionCandidates, TorqueOptimalPerSecond};
 use phiw_curriculum::{Curriculum, CurriculumError, CurriculumRun, CurriculumSettings, Experiment, Trial};
 use phiw_dynamics::{AnalyticBackend, DimensionError, Tree, World};
 use phiw_effects::Catalogue;
@@ -167,7 +167,7 @@ fn in_process(scene: &Scene, known: KnownOfController) -> Figures {
         dataset: &dataset,
         candidates: &candidates,
         experiment: &experiment,
-        selection: &SmallestCondition,
+        selection: &TorqueOptimalPerSecond,
         constraint: &constraint,
         relaxation: &ConditionRelaxation::default(),
         estimator: &estimator,

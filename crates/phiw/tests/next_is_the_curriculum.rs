@@ -10,7 +10,9 @@ use phiw_curriculum::end::FixedCount;
 use phiw_curriculum::motion::{Motion, MotionDataset};
 use phiw_curriculum::planner::Plan;
 use phiw_curriculum::relaxation::ConditionRelaxation;
-use phiw_curriculum::selection::{Choice, MotionCandidates, SmallestCondition};
+use phiw_curriculum::selection::{
+    Choice, MotionCandidates, Selection, SmallestCondition, TorqueOptimalPerSecond,
+};
 use phiw_curriculum::{
     Curriculum, CurriculumError, CurriculumRun, CurriculumSettings, Experiment, IterationRecord, Trial,
 };
@@ -48,7 +50,12 @@ const URDF_ERROR: f64 = 0.3;
 const BASE_ERROR: f64 = 0.02;
 
 /// The plan of a curriculum that has these logs of the scene, standing on a sole of `size` times the scene's.
-fn curriculum_plan(scene: &Scene, logs: &[&str], size: f64) -> Result<Plan, CurriculumError> {
+fn curriculum_plan(
+    scene: &Scene,
+    logs: &[&str],
+    size: f64,
+    selection: &dyn Selection,
+) -> Result<Plan, CurriculumError> {
     let fixed = tree(&urdf(), false);
     let base_link = tree(&urdf(), true).bodies()[0].inertial;
     let robot = Robot::with_viscous_friction(fixed.clone(), base_link, Catalogue::default())?;
@@ -84,7 +91,7 @@ fn curriculum_plan(scene: &Scene, logs: &[&str], size: f64) -> Result<Plan, Curr
         dataset: &dataset,
         candidates: &candidates,
         experiment: &Nobody,
-        selection: &SmallestCondition,
+        selection,
         constraint: &ZmpConstraint::new(stance).counting(FalseFalls {
             belief_share: URDF_ERROR,
             base_link_share: BASE_ERROR,
@@ -162,12 +169,17 @@ fn record(condition_number: f64, model: &RobotModel) -> IterationRecord {
 #[test]
 fn the_choice_alpha_and_margin_are_the_same() {
     let scene = Scene::new(&urdf());
-    for logs in [&[][..], &["log_1.csv"], &["log_1.csv", "log_2.csv"]] {
-        let plan = curriculum_plan(&scene, logs, 1.0).unwrap();
+    let all_logs = [&[][..], &["log_1.csv"], &["log_1.csv", "log_2.csv"]];
+    let selections: [(&dyn Selection, &str); 2] =
+        [(&TorqueOptimalPerSecond, ""), (&SmallestCondition, " --selection condition")];
+    for (logs, (selection, option)) in
+        all_logs.into_iter().flat_map(|logs| selections.map(|selection| (logs, selection)))
+    {
+        let plan = curriculum_plan(&scene, logs, 1.0, selection).unwrap();
         let measured: String = logs.iter().map(|log| format!(" DIR/{log}")).collect();
         let measured = if logs.is_empty() { measured } else { format!("--measured{measured}") };
         let more = format!(
-            "--support DIR/support.toml --false-fall-rate 0.001 --base-error {BASE_ERROR} --declare viscous_friction {measured}"
+            "--support DIR/support.toml --false-fall-rate 0.001 --base-error {BASE_ERROR} --declare viscous_friction{option} {measured}"
         );
         let (_, _, report) = scene.next(&more);
         let next = &report["next"];
@@ -191,7 +203,7 @@ fn the_choice_alpha_and_margin_are_the_same() {
             ("/balance/margin_m", plan.safety.margin_m),
             ("/balance/sure_margin_m", plan.safety.sure_margin_m),
             ("/balance/largest_alpha", plan.safety.largest_reduction),
-            ("/condition_number/after", merit),
+            ("/merit", merit),
         ] {
             let found = number(path);
             assert!((found - expected).abs() <= 1e-9 * expected.abs(), "{path}: {found}, {expected}");
@@ -209,7 +221,7 @@ fn both_refuse_where_no_motion_keeps_the_balance() {
          DIR/support.toml --false-fall-rate 0.001 --base-error 0.02";
     let (status, _, message) = scene.run(line);
     assert_eq!(status, 2);
-    let refusal = curriculum_plan(&scene, &[], 0.02).unwrap_err();
+    let refusal = curriculum_plan(&scene, &[], 0.02, &TorqueOptimalPerSecond).unwrap_err();
     assert!(matches!(refusal, CurriculumError::NothingSafe { motions: 20, .. }), "{refusal}");
     let same = refusal.to_string();
     assert!(message.contains(same.split(';').next().unwrap()), "{message}, {same}");

@@ -5,7 +5,7 @@ use crate::robot::Robot;
 use crate::work::{InputError, raised, run};
 use phiw::arguments::{
     CheckArguments, Derivatives, ExplainArguments, InMemory, MotionFormat, NextArguments, NextEstimator,
-    PredictArguments, RetargetArguments, SessionArguments,
+    NextSelection, PredictArguments, RetargetArguments, SessionArguments,
 };
 use phiw::identify::Results;
 use phiw_identification::Interruption;
@@ -161,6 +161,7 @@ pub struct NextOptions<'py> {
     declare: Vec<String>,
     urdf_error: f64,
     estimator: String,
+    selection: String,
     command_hz: Option<f64>,
     alpha: Option<f64>,
     cutoff_hz: Option<f64>,
@@ -184,6 +185,15 @@ pub fn next_motion<'py>(
             return Err(InputError::new_err(what));
         }
     };
+    let selection = match options.selection.as_str() {
+        "torque-per-second" => NextSelection::TorquePerSecond,
+        "condition" => NextSelection::Condition,
+        other => {
+            let what =
+                format!("selection=\"{other}\" is not known; write \"torque-per-second\" or \"condition\"");
+            return Err(InputError::new_err(what));
+        }
+    };
     let (urdf, mut in_memory) = of_robot(robot.get())?;
     let measured = taken(options.measured, &mut in_memory)?;
     in_memory.model = options.model;
@@ -198,6 +208,7 @@ pub fn next_motion<'py>(
         hold: robot.get().hold.clone(),
         urdf_error: options.urdf_error,
         estimator,
+        selection,
         command_hz: options.command_hz,
         slower: Vec::new(),
         false_fall_rate: None,

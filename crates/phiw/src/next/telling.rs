@@ -2,11 +2,12 @@
 
 use super::estimate::{Present, Source};
 use super::motions::Motions;
-use crate::arguments::{NextArguments, NextEstimator};
+use crate::arguments::{NextArguments, NextEstimator, NextSelection};
 use crate::warnings::file_name;
 use phiw_curriculum::constraint::MotionMargin;
 use phiw_curriculum::motion::{Excess, Motion, MotionLimits, Unrest};
 use phiw_curriculum::planner::Plan;
+use phiw_curriculum::selection::Choice;
 use phiw_dynamics::urdf::Finding;
 use phiw_estimation::TorqueMisfit;
 use phiw_identification::model::parameter_name;
@@ -50,7 +51,17 @@ impl Telling<'_> {
 
     /// cond(Φ) once the motion has been measured as it is planned.
     fn after(&self) -> f64 {
-        self.plan.choice.merit.unwrap_or(f64::NAN)
+        self.condition_with(self.plan.choice.motion)
+    }
+
+    /// cond(Φ) once a motion has been measured as it is planned.
+    fn condition_with(&self, motion: usize) -> f64 {
+        let Present { candidates, triangle, .. } = self.present;
+        let mut stack = candidates.all()[motion].triangle.clone();
+        if let Some(measured) = triangle {
+            stack.absorb(&mut measured.clone());
+        }
+        stack.condition_number()
     }
 
     /// Why this motion, in one sentence.
@@ -61,15 +72,47 @@ impl Telling<'_> {
             (Some(_), true) => format!("of none: no motion of {count} is allowed, and it is the safest"),
             (Some(_), false) => format!("of the {} of {count} motions that keep the balance", self.allowed()),
         };
-        let before = match self.before() {
+        let condition_numbers = match self.before() {
             Some(before) => format!("{} → {}", condition(before), condition(self.after())),
             None => format!("{}, nothing has been measured yet", condition(self.after())),
         };
-        let next = match self.plan.choice.runner_up {
-            Some((motion, cond)) => format!("; {} would give {}", self.name(motion), condition(cond)),
-            None => String::new(),
-        };
-        format!("it makes cond(Φ) smallest {among}: {before}{next}")
+        match self.arguments.selection {
+            NextSelection::Condition => {
+                let next = match self.plan.choice.runner_up {
+                    Some((motion, cond)) => {
+                        format!("; {} would give {}", self.name(motion), condition(cond))
+                    }
+                    None => String::new(),
+                };
+                format!("it makes cond(Φ) smallest {among}: {condition_numbers}{next}")
+            }
+            NextSelection::TorquePerSecond => {
+                let taken = |(motion, merit): (usize, f64)| {
+                    let seconds = self.motions.dataset.motions()[motion].duration_s();
+                    let share = taken_share(merit, seconds)?;
+                    Some(format!("{} % in {} s", percent(share), significant(seconds, 3)))
+                };
+                let Choice { motion, merit, runner_up } = self.plan.choice;
+                let own = self.is_determined().then_some(merit).flatten();
+                let own = own.and_then(|merit| taken((motion, merit)));
+                let next = runner_up.and_then(|next| Some((self.name(next.0), taken(next)?)));
+                let taken = match (own, next) {
+                    (Some(own), Some((name, next))) => format!(": {own}, {name} would take {next}"),
+                    (Some(own), None) => format!(": {own}"),
+                    (None, _) => String::new(),
+                };
+                format!(
+                    "it takes most of the torques' uncertainty in each second {among}{taken}; cond(Φ) \
+                     {condition_numbers}"
+                )
+            }
+        }
+    }
+
+    /// Whether what has been measured determines all parameters, so that the torques' uncertainty has a share
+    /// to take.
+    fn is_determined(&self) -> bool {
+        self.before().is_some_and(f64::is_finite)
     }
 
     /// For a terminal.
@@ -159,7 +202,8 @@ impl Telling<'_> {
                 );
             }
         }
-        if self.before().is_some_and(|before| self.after() >= before) {
+        let by_condition = self.arguments.selection == NextSelection::Condition;
+        if by_condition && self.before().is_some_and(|before| self.after() >= before) {
             warnings.push(
                 "no motion that is allowed makes cond(Φ) smaller: by this measure enough has been measured"
                     .to_owned(),
@@ -186,8 +230,8 @@ impl Telling<'_> {
         }
         if !self.after().is_finite() {
             warnings.push(
-                "even with this motion some parameters stay undetermined, and cond(Φ) says \
-                 little: add motions of more variety"
+                "even with this motion some parameters stay undetermined, and neither cond(Φ) nor \
+                 the torques' uncertainty says much: add motions of more variety"
                     .to_owned(),
             );
         }
@@ -277,10 +321,12 @@ impl Telling<'_> {
                 "candidates": self.motions.dataset.len(),
                 "allowed": self.allowed(),
                 "forced": plan.forced,
+                "selection": self.arguments.selection,
+                "merit": plan.choice.merit,
                 "condition_number": {
                     "before": self.before(),
                     "after": self.after(),
-                    "runner_up": plan.choice.runner_up.map(|(motion, cond)| json!({"motion": self.name(motion), "after": cond})),
+                    "runner_up": plan.choice.runner_up.map(|(motion, _)| json!({"motion": self.name(motion), "after": self.condition_with(motion)})),
                 },
                 "balance": balance,
                 "estimate": {
@@ -304,6 +350,14 @@ impl Telling<'_> {
 
 /// Tests of all torques of which at most one is a false alarm.
 const ONCE_IN: f64 = 100.0;
+
+/// The share of the torques' standard deviation that a motion of so many seconds takes, by the merit of
+/// [`TorqueOptimalPerSecond`](phiw_curriculum::selection::TorqueOptimalPerSecond); none where it is not a
+/// number.
+fn taken_share(merit: f64, seconds: f64) -> Option<f64> {
+    let share = 1.0 - (0.5 * merit * seconds).exp();
+    share.is_finite().then_some(share)
+}
 
 /// A condition number in words.
 fn condition(value: f64) -> String {

@@ -207,6 +207,7 @@ def next_motion(
     declare: Names = (),
     urdf_error: float = 0.3,
     estimator: str = "unknown-noise",
+    selection: str = "torque-per-second",
     command_hz: Optional[float] = None,
     alpha: Optional[float] = None,
     cutoff_hz: Optional[float] = None,
@@ -233,6 +234,9 @@ def next_motion(
     estimator : "unknown-noise" or "least-squares"
         How the logs are estimated from. The first needs logs that say what the controller commanded
         (``tau_cmd.<joint>``) or was asked for (``qref.<joint>``); where one does not, the second is taken.
+    selection : "torque-per-second" or "condition"
+        What makes a motion the best of those that are allowed: in each second it takes most of the
+        uncertainty of the torques of all motions, or it makes cond(Φ) smallest.
     command_hz : float, optional
         Commands a second of the robot's controller (Hz); by default seen in the logs.
     alpha : float, optional
@@ -248,6 +252,7 @@ def next_motion(
         "declare": _names(declare),
         "urdf_error": urdf_error,
         "estimator": estimator,
+        "selection": selection,
         "command_hz": command_hz,
         "alpha": alpha,
         "cutoff_hz": cutoff_hz,

@@ -4,7 +4,9 @@ use super::harm::Harm;
 use super::scanned::scanned_constants;
 use super::search::Search;
 use super::tracing::{Tracing, Verdict};
-use phiw_identification::fitting::{TorqueError, accumulate, fit, torque_error};
+use phiw_identification::fitting::{
+    OwnTorqueFit, Rests, TorqueError, accumulate, accumulate_folds, fit, fit_with_own_torque, torque_error,
+};
 use phiw_identification::{Design, Effect, EffectSpec, IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
 
@@ -104,24 +106,11 @@ impl Search<'_> {
             self.specs.clone_from(&self.input.declared);
             self.parameters.clone_from(&self.input.parameters);
         }
-        let design = self.design()?;
         let data = self.whole;
-        let folds = [data.train.as_slice(), &data.held_out].concat();
-        let mut train_folds = accumulate(&design, &folds, &data.sources)?;
-        let mut held_out_folds = train_folds.split_off(data.train.len());
-        let mut final_fit = fit(&design, &train_folds)?;
-        if self.fixed.prior.is_some() {
-            final_fit.parameters = match effects.is_empty() && refinements.is_empty() {
-                true => self.input.parameters.clone(),
-                false => self.parameters.clone(),
-            };
-        }
-        // Where columns are made of the model's torque, it is that of the fit: the model as it is used.
-        let design = design.with_own_reference(&final_fit.parameters)?;
-        if design.needs().of_reference() {
-            train_folds = accumulate(&design, &folds, &data.sources)?;
-            held_out_folds = train_folds.split_off(data.train.len());
-        }
+        let OwnTorqueFit { design, fit: final_fit, folds } =
+            self.final_fit(effects.is_empty() && refinements.is_empty())?;
+        let mut train_folds = folds.moving;
+        let held_out_folds = train_folds.split_off(data.train.len());
         let after = errors(&train_folds, &held_out_folds, &final_fit.parameters)?;
         self.parameters.clone_from(&final_fit.parameters);
         let remaining = self.remaining(&held_out_folds, &after.1, &final_fit)?;
@@ -168,6 +157,29 @@ impl Search<'_> {
             held_out_had_a_say: self.held_out_had_a_say,
             not_judged,
         })
+    }
+
+    /// The model fitted to all training motion; a held one as it is held, if `nothing_was_found`, or as the
+    /// search left it.
+    ///
+    /// Where columns are made of the model's torque, it is that of the fit: the model as it is used.
+    fn final_fit(&self, nothing_was_found: bool) -> Result<OwnTorqueFit, IdentificationError> {
+        let (design, data) = (self.design()?, self.whole);
+        let folds = [data.train.as_slice(), &data.held_out].concat();
+        let train = data.train.len();
+        let read = |design: &Design| accumulate_folds(design, &folds, &data.sources, Rests::Dropped);
+        let folds = read(&design)?;
+        let mut first = fit(&design, &folds.moving[..train])?;
+        if self.fixed.prior.is_none() {
+            return fit_with_own_torque(design, first, folds, train, read, fit);
+        }
+        first.parameters = match nothing_was_found {
+            true => self.input.parameters.clone(),
+            false => self.parameters.clone(),
+        };
+        let design = design.with_own_reference(&first.parameters)?;
+        let folds = if design.needs().of_reference() { read(&design)? } else { folds };
+        Ok(OwnTorqueFit { design, fit: first, folds })
     }
 
     /// The places, ascending, of the effects that were found and of which a parameter is certain to be beyond
