@@ -10,6 +10,7 @@ pub mod effect;
 pub mod model;
 
 mod accumulate;
+mod conventions;
 mod covariance;
 mod effect_selector;
 mod error;

@@ -2,7 +2,7 @@
 
 use crate::session::Session;
 use crate::traces::Traces;
-use crate::{Error, extents, fingerprint, possible_bodies, told, warnings};
+use crate::{Error, conventions, extents, fingerprint, possible_bodies, told, warnings};
 use phiw_identification::bandwidth::Bandwidth;
 use phiw_identification::consistent::{Consistent, ConsistentSettings, Ellipsoid, Known, consistent};
 use phiw_identification::effect::JointProperty;
@@ -80,6 +80,9 @@ impl<'a> Analysis<'a> {
         let of_traces = || traces.as_ref().map(|traces| traces.with_rests(session.tree.joint_count()));
         let with_rests = with_rests.or_else(of_traces).unwrap_or_default();
         let mut warnings = warnings::all(session, identified);
+        if let Rows::Logs(data) = rows {
+            warnings.extend(conventions::warnings(session, data)?);
+        }
         warnings.extend(unknown_extents);
         warnings.extend(possible_bodies::warning(&model, &consistent, fit));
         warnings.extend(warnings::at_rest_where_held_out(session, &at_rest));

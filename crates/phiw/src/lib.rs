@@ -8,6 +8,7 @@ pub mod bandwidth;
 pub mod check;
 pub mod command;
 pub mod console;
+mod conventions;
 mod date;
 mod draws;
 mod error;

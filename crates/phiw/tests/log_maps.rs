@@ -279,3 +279,40 @@ fn entries_that_count_from_zero_were_taken_for_joints_that_count_from_one() {
         assert!(map.contains(&table), "no `{table}` in {map}");
     }
 }
+
+/// What a log counts otherwise than the URDF was taken for effects: the torque's other sign for the efficiency
+/// of a gear, an axis that points the other way for an encoder's offset and a force.
+#[test]
+fn a_joint_that_turns_the_other_way_in_the_log_is_said_with_the_map_that_mends_it() {
+    let folder = folder();
+    for (name, seed) in [("train.csv", 1), ("validate.csv", 2)] {
+        let mut log = synthetic::recording(seed, 30.0);
+        for signal in [&mut log.q, &mut log.tau] {
+            signal.iter_mut().skip(1).step_by(3).for_each(|value| *value *= -1.0);
+        }
+        std::fs::write(folder.path().join(name), synthetic::csv(&log)).unwrap();
+    }
+    std::fs::write(
+        folder.path().join("map.toml"),
+        "[joint.joint_2]\nq = { column = \"q.joint_2\", sign = -1 }\ntau = { column = \"tau.joint_2\", sign = -1 }\n",
+    )
+    .unwrap();
+    let line =
+        "identify --urdf robot.urdf --train train.csv --validate validate.csv --declare viscous_friction";
+    let said = |report: &Value| -> Vec<String> {
+        let warnings = report["phiw"]["warnings"].as_array().unwrap().iter();
+        warnings
+            .map(|warning| warning.as_str().unwrap().to_owned())
+            .filter(|text| text.contains("looks as if"))
+            .collect()
+    };
+    let wrong = report(&format!("{line} --out wrong"), folder.path());
+    let right = report(&format!("{line} --map map.toml --out right"), folder.path());
+    let told = said(&wrong);
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].contains("joint_2 turns the other way in the logs than in the URDF"), "{told:?}");
+    assert!(told[0].contains("q, qd and tau of [joint.joint_2] `sign = -1`"), "{told:?}");
+    assert_eq!(said(&right), Vec::<String>::new());
+    let error = |report: &Value| report["before"]["validate"]["relative"].as_f64().unwrap();
+    assert!(error(&right) < 0.2 * error(&wrong), "{} {}", error(&right), error(&wrong));
+}
