@@ -169,9 +169,8 @@ impl<'a> Curriculum<'a> {
             torque_uncertainty: match &estimate {
                 Some(estimate) => {
                     let candidates = self.candidates_of(&next.model)?;
-                    let everything = candidates.everything();
                     let covariance = estimate.covariance.as_ref();
-                    covariance.and_then(|known| everything.uncertainty_of(known, self.dataset.rows()))
+                    covariance.and_then(|known| candidates.whole().uncertainty_of(known, self.dataset.rows()))
                 }
                 None => run.history.last().and_then(|record| record.torque_uncertainty),
             },

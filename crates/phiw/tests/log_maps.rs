@@ -280,8 +280,8 @@ fn entries_that_count_from_zero_were_taken_for_joints_that_count_from_one() {
     }
 }
 
-/// What a log counts otherwise than the URDF was taken for effects: the torque's other sign for the efficiency
-/// of a gear, an axis that points the other way for an encoder's offset and a force.
+/// What a log counts otherwise than the URDF was taken for effects: the torque's other sign for the
+/// efficiency of a gear, an axis that points the other way for an encoder's offset and a force.
 #[test]
 fn a_joint_that_turns_the_other_way_in_the_log_is_said_with_the_map_that_mends_it() {
     let folder = folder();

@@ -283,3 +283,23 @@ fn an_mjcf_file_is_read_with_a_warning_of_what_is_left_out() {
     let (_, warnings, _) = scene.next("");
     assert!(warnings.contains("without what a URDF cannot express: armature of joint_2"), "{warnings}");
 }
+
+/// The first joint's rotor inertia depends on the inertia of its link: cond(Φ) was infinite for every motion,
+/// no motion was better than another, and the first was taken.
+#[test]
+fn parameters_that_no_motion_tells_apart_do_not_decide() {
+    let scene = Scene::new(&urdf());
+    for selection in ["torque-per-second", "condition"] {
+        let measured = "--measured DIR/log_1.csv DIR/log_2.csv";
+        let of = |effects: &str| {
+            let (_, _, report) =
+                scene.next(&format!("{measured} --selection {selection} --declare {effects}"));
+            let number = |path: &str| report.pointer(path).and_then(Value::as_f64);
+            let runner_up = report.pointer("/next/condition_number/runner_up/motion").cloned();
+            (number("/next/merit"), number("/next/condition_number/after"), runner_up)
+        };
+        let (merit, after, runner_up) = of("viscous_friction,rotor_inertia");
+        assert!(merit.is_some() && after.is_some(), "{selection}: {merit:?} {after:?} {runner_up:?}");
+        assert!(after >= of("viscous_friction").1, "{selection}");
+    }
+}

@@ -30,6 +30,8 @@ pub struct MotionCandidates {
     rate_hz: f64,
     candidates: Vec<MotionCandidate>,
     everything: Triangle,
+    /// The same with all columns, those that depend on others, too.
+    whole: Triangle,
 }
 
 impl MotionCandidates {
@@ -57,7 +59,27 @@ impl MotionCandidates {
         dataset: &MotionDataset,
         weights: &[f64],
     ) -> Result<Self, CurriculumError> {
-        Self::of_designs(&|| robot.design_of(model), dataset, weights)
+        Ok(Self::of_designs(&|| robot.design_of(model), dataset, weights)?.determined())
+    }
+
+    /// The same in the columns that all motions together tell apart. Of columns that depend on others, such
+    /// as the first joint's rotor inertia on the inertia of its link, the last is left out: with all of them
+    /// cond(Φ) is infinite for every motion, and no motion is better than another.
+    pub fn determined(self) -> Self {
+        let kept = self.everything.independent_columns();
+        if kept.len() == self.everything.size() {
+            return self;
+        }
+        let select = |candidate: &MotionCandidate| {
+            let triangle = candidate.triangle.select(&kept);
+            MotionCandidate { condition_number: triangle.condition_number(), triangle }
+        };
+        MotionCandidates {
+            parameters: kept.iter().map(|&column| self.parameters[column]).collect(),
+            candidates: self.candidates.par_iter().map(select).collect(),
+            everything: self.everything.select(&kept),
+            ..self
+        }
     }
 
     /// The columns that are known before a motion has been run, for beliefs with the columns of `design`:
@@ -91,7 +113,7 @@ impl MotionCandidates {
                 parameters.extend(design.effect_parameters(effect));
             }
             if excited.len() == effects.len() {
-                return Ok(MotionCandidates { parameters, ..candidates });
+                return Ok(MotionCandidates { parameters, ..candidates }.determined());
             }
             effects = excited;
         }
@@ -118,12 +140,18 @@ impl MotionCandidates {
         rates.sort_by(f64::total_cmp);
         let rate_hz = rates.get(rates.len() / 2).copied().unwrap_or(1.0);
         let parameters = (0..count).collect();
-        Ok(MotionCandidates { weights: weights.to_vec(), parameters, rate_hz, candidates, everything })
+        let whole = everything.clone();
+        Ok(MotionCandidates { weights: weights.to_vec(), parameters, rate_hz, candidates, everything, whole })
     }
 
     /// R of all motions together.
     pub fn everything(&self) -> &Triangle {
         &self.everything
+    }
+
+    /// R of all motions together with the columns of all parameters, those that depend on others, too.
+    pub(crate) fn whole(&self) -> &Triangle {
+        &self.whole
     }
 
     /// What the rows of each torque are multiplied with.

@@ -74,6 +74,40 @@ impl Triangle {
         }
     }
 
+    /// R of some of the columns, which are ascending.
+    ///
+    /// # Panics
+    /// For a column that there is not.
+    pub fn select(&self, columns: &[usize]) -> Self {
+        let mut selected = Triangle::empty(columns.len());
+        // Row k has nothing before column k. Rows whose first column is the same go into triangles of their
+        // own.
+        let first = |row: usize| columns.partition_point(|&column| column < row);
+        let mut layers: Vec<Triangle> = Vec::new();
+        let mut layer = 0;
+        for row in 0..columns.last().map_or(0, |last| last + 1) {
+            layer = if row > 0 && first(row) == first(row - 1) { layer + 1 } else { 0 };
+            if layer == layers.len() {
+                layers.push(Triangle::empty(columns.len()));
+            }
+            for place in first(row)..columns.len() {
+                layers[layer].entries[place * columns.len() + first(row)] =
+                    self.entries[columns[place] * self.size + row];
+            }
+        }
+        layers.iter_mut().for_each(|layer| selected.absorb(layer));
+        selected
+    }
+
+    /// The columns that do not depend on those before them, ascending.
+    pub fn independent_columns(&self) -> Vec<usize> {
+        let is_independent = |&column: &usize| {
+            let own = self.column(column);
+            own[column].abs() > INDEPENDENT * dot(own, own).sqrt()
+        };
+        (0..self.size).filter(is_independent).collect()
+    }
+
     /// ‖R·x‖².
     pub fn product_squared(&self, x: &[f64]) -> f64 {
         let mut product = vec![0.0; self.size];
@@ -186,6 +220,9 @@ impl Triangle {
     }
 }
 
+/// Part of a column's length that must be new for it not to depend on those before it.
+const INDEPENDENT: f64 = 1e-8;
+
 /// Change of the eigenvalue over one step, as a share, at which it counts as found.
 const SETTLED: f64 = 1e-14;
 
@@ -263,4 +300,53 @@ fn largest_of_tridiagonal(diagonal: &[f64], off: &[f64]) -> f64 {
         if above(middle) { high = middle } else { low = middle }
     }
     0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Triangle;
+
+    /// Columns 2 and 4 depend on those before them.
+    fn dependent() -> Triangle {
+        let rows = [
+            [1.0, 0.5, 2.0, -1.0, 0.3, 0.7],
+            [0.0, 2.0, -1.0, 0.4, 1.0, 0.2],
+            [0.0, 0.0, 0.0, 0.6, 0.9, -0.5],
+            [0.0, 0.0, 0.0, 0.8, 1.2, 0.1],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 0.3],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 0.9],
+        ];
+        let mut triangle = Triangle::empty(6);
+        for (row, values) in rows.iter().enumerate() {
+            // Each row by itself: what is absorbed is triangular.
+            let mut one = Triangle::empty(6);
+            values.iter().enumerate().skip(row).for_each(|(column, value)| {
+                one.entries[column * 6 + row] = *value;
+            });
+            triangle.absorb(&mut one);
+        }
+        triangle
+    }
+
+    #[test]
+    fn columns_that_depend_on_those_before_them_are_told() {
+        assert_eq!(dependent().independent_columns(), [0, 1, 3, 5]);
+        assert_eq!(dependent().condition_number(), f64::INFINITY);
+        let kept = dependent().select(&[0, 1, 3, 5]);
+        assert_eq!(kept.independent_columns(), [0, 1, 2, 3]);
+        assert!(kept.condition_number() < 10.0, "{}", kept.condition_number());
+    }
+
+    #[test]
+    fn a_selection_has_the_same_products() {
+        let (whole, columns) = (dependent(), [1, 2, 4, 5]);
+        let selected = whole.select(&columns);
+        for trial in 0..5 {
+            let x: Vec<f64> = (0..4).map(|k| (1.3 * f64::from(trial) + 0.9 * k as f64).sin()).collect();
+            let mut all = vec![0.0; 6];
+            columns.iter().zip(&x).for_each(|(&column, value)| all[column] = *value);
+            let (own, expected) = (selected.product_squared(&x), whole.product_squared(&all));
+            assert!((own - expected).abs() < 1e-12 * (1.0 + expected), "{own}, {expected}");
+        }
+    }
 }

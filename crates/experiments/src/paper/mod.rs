@@ -37,6 +37,7 @@ mod ending;
 mod estimators;
 mod figures;
 mod fourier;
+mod infinite;
 mod jobs;
 mod method;
 mod motions;

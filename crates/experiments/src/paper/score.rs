@@ -35,6 +35,7 @@ pub struct Detail {
     /// Those that could be chosen.
     pub allowed: Vec<usize>,
     /// cond of the stack with each motion.
+    #[serde(deserialize_with = "super::infinite::numbers")]
     pub condition_numbers: Vec<f64>,
     /// α.
     pub alpha: f64,

@@ -138,6 +138,7 @@ pub struct MotionFacts {
     /// How long it takes \[s\].
     pub duration_s: f64,
     /// cond(Φ) of it alone.
+    #[serde(deserialize_with = "super::infinite::number")]
     pub condition_number: f64,
 }
 
@@ -191,7 +192,7 @@ impl Setup {
         let dataset = MotionDataset::new(subject.tree.joint_count(), motions.identification)?;
         let dataset = dataset.with_slower(&slower)?;
         let weights = subject.row_weights(if arguments.noise > 0.0 { arguments.noise } else { NOISELESS });
-        let candidates = MotionCandidates::new(&robot, robot.declared(), &dataset, &weights)?;
+        let candidates = MotionCandidates::new(&robot, robot.declared(), &dataset, &weights)?.determined();
         let (prior, relaxation) = method::method(arguments, &subject);
         let relaxation_of_alpha = method::relaxation(relaxation, arguments.method);
         let false_fall_rate = method::false_fall_rate(arguments, &subject);

@@ -60,7 +60,8 @@ pub(super) fn left(
     let free: Vec<Products> = products.iter().map(|own| own.without(&[0, 1, VISCOUS, COULOMB])).collect();
     let frictionless: Vec<Products> = products.iter().map(|own| own.without(&[0, 1])).collect();
     let mut drives = vec![false; products.len()];
-    let mut weights: Vec<f64> = torque.iter().map(|torque| 1.0 / torque).collect();
+    let first_weights: Vec<f64> = torque.iter().map(|torque| 1.0 / torque).collect();
+    let mut weights = first_weights.clone();
     let mut parameters = vec![0.0; count];
     let of = |joint: usize, drives: &[bool]| match drives[joint] {
         true => &frictionless[joint],
@@ -78,7 +79,8 @@ pub(super) fn left(
     }
     let all: Vec<&Products> = (0..products.len()).map(|joint| of(joint, &drives)).collect();
     let relative = (0..all.len()).map(|joint| (all[joint].squares(&parameters) / torque[joint]).sqrt());
-    let scales = (0..all.len()).map(|joint| scale(&all, &weights, count, joint));
+    // A torque of another scale may have turned the weights against those that it disturbs.
+    let scales = (0..all.len()).map(|joint| scale(&all, &first_weights, count, joint));
     Ok(Left { relative: relative.collect(), scales: scales.collect() })
 }
 

@@ -2,8 +2,8 @@
 //! acts, which column is whose, whether torques carry the robot's weight.
 //!
 //! A joint that turns the other way in a log than in the URDF is no missing effect, and no effect describes
-//! it: it has to be said before anything is looked for. Bodies that hang on several joints tell: read as it is
-//! meant, a rigid body with friction leaves far less of all torques.
+//! it: it has to be said before anything is looked for. Bodies that hang on several joints tell: read as it
+//! is meant, a rigid body with friction leaves far less of all torques.
 
 mod error;
 mod reading;

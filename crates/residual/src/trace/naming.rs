@@ -33,8 +33,6 @@ struct Judged {
     gain: f64,
     /// Share of the stretches of training motion that it makes better.
     folds: f64,
-    /// RMS of what it takes over the RMS of a torque that it acts on, the largest.
-    size: f64,
     /// Whether its certainty is that of a name.
     certain: bool,
     named: bool,
@@ -63,7 +61,7 @@ impl Search<'_> {
         };
         let mut judged = self.judge(&trial)?;
         self.judge_beside_forms(&trial, &mut judged);
-        self.judge_small(&trial, &mut judged)?;
+        self.judge_beside_constants(&trial, &mut judged)?;
         self.name_families(&mut judged);
         self.in_order(&trial, judged)
     }
@@ -140,18 +138,18 @@ impl Search<'_> {
             own.significance = certainty.significance;
             own.certain = certainty.tail <= self.tail_of_a_name();
             own.named = own.certain && form_is_named && self.is_material(trial, member, &squares);
-            own.size = trial.size(member, &squares);
         }
     }
 
-    /// Asks again of small effects on joints where another effect has constants, now that these are refined
-    /// without it: a sign that turns over another speed looks like some viscous friction.
-    fn judge_small(&self, trial: &Trial, judged: &mut [Judged]) -> Result<(), IdentificationError> {
+    /// Asks again of effects on joints where another effect has constants, now that these are refined without
+    /// it: a sign that turns over another speed looks like some viscous friction.
+    fn judge_beside_constants(
+        &self,
+        trial: &Trial,
+        judged: &mut [Judged],
+    ) -> Result<(), IdentificationError> {
         let initial = trial.foretold_squares(&trial.fit_with(|place| place < self.declared));
-        for judged in judged
-            .iter_mut()
-            .filter(|judged| judged.named && judged.size < self.options.thresholds.small_size)
-        {
+        for judged in judged.iter_mut().filter(|judged| judged.named) {
             let own = &self.specs[judged.place];
             let has_constants = |spec: &EffectSpec| spec.joints == own.joints && !spec.constants.is_empty();
             let mut others = self.specs.iter().enumerate().filter(|(place, _)| *place != judged.place);
@@ -248,7 +246,6 @@ impl Search<'_> {
             let without = whole.fit_with(|other| other != place);
             judged.push(Judged {
                 place,
-                size: trial.size(own_member, &squares),
                 significance: certainty.significance,
                 gain: whole.gain(&whole.foretold_squares(&without), &all),
                 folds: whole.better_folds(&without),
@@ -298,7 +295,7 @@ impl Search<'_> {
     /// Whether a torque's residual is no larger than it was when the held model was identified: then nothing
     /// has changed there since.
     pub(super) fn is_as_it_was(&self, torque: usize, rmse: f64) -> bool {
-        let margin = self.options.thresholds.floor_margin;
+        let margin = self.options.thresholds.same_error;
         self.input.held.as_ref().is_some_and(|held| rmse <= margin * held.left[torque])
     }
 
@@ -345,7 +342,7 @@ impl Search<'_> {
                 && (taken / whole).sqrt() >= thresholds.least_size;
             size = size.max((rows.size_of(&trial.values_of(member, torque)) / whole).sqrt());
         }
-        (seen, largest_share >= thresholds.least_share && size >= thresholds.least_absorbed_size)
+        (seen, largest_share >= thresholds.least_share && size >= thresholds.least_visible)
     }
 
     /// Puts the effects into the order in which they count, and says what each has explained.

@@ -44,7 +44,7 @@ impl Search<'_> {
             specs: &self.specs,
             parameters: &self.parameters,
             ranges: &self.input.ranges,
-            false_alarm: self.options.thresholds.false_structure_probability,
+            false_alarm: self.options.thresholds.false_name_probability,
         };
         let following = probe::following(fit, &large)?;
         let over = |row: usize| error.rmse[row] / self.input.noise_floor[row];
@@ -78,8 +78,8 @@ impl Search<'_> {
     /// of this motion.
     fn is_large(&self, row: usize, rmse: f64, expected: Expected) -> bool {
         let left = (rmse * rmse - expected.of_parameters).max(0.0).sqrt();
-        left > self.options.thresholds.floor_margin * self.input.noise_floor[row]
-            && left > self.options.thresholds.structured_share * expected.torque.sqrt()
+        left > self.options.thresholds.same_error * self.input.noise_floor[row]
+            && left > self.options.thresholds.least_visible * expected.torque.sqrt()
             && !self.is_as_it_was(row, rmse)
     }
 

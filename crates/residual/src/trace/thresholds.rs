@@ -13,8 +13,9 @@ use thiserror::Error;
 /// constants where they are used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {
-    /// Probability of naming anything on a right model, for all candidates of a run together; and that at
-    /// which one refinement is in the model, if it were not there.
+    /// Probability of naming anything on a right model, for all candidates of a run together; that at which
+    /// one refinement is in the model, if it were not there; and that with which a torque's residual of noise
+    /// seems to follow any signal.
     pub false_name_probability: f64,
     /// Share of a torque's residual, where training motion is foretold from its other parts, that an effect
     /// on it must take away to have a name.
@@ -28,26 +29,18 @@ pub struct Thresholds {
     pub least_of_others: f64,
     /// RMS of what an effect takes over the RMS of its torque, at least, to have a name.
     pub least_size: f64,
-    /// The same where the other parameters have taken up most of the effect.
-    pub least_absorbed_size: f64,
-    /// The same below which it is asked whether other constants of the other effects could do its work.
-    pub small_size: f64,
+    /// Share of a torque (RMS) that is seen by itself: what an effect is where the other parameters have
+    /// taken up most of it, to have a name, and what is left of a right model by filters and encoders at
+    /// most.
+    pub least_visible: f64,
+    /// A residual below this share of its torque (RMS) is as good as none: nothing is sought in it.
+    pub negligible_share: f64,
     /// Factor on the RMS error on motion held out by which an effect may make it larger, in the mean of the
     /// torques or all together.
     pub largest_harm: f64,
-    /// How much the error of all torques together may grow on motion held out, over what the torques' errors
-    /// fall in their mean, both in logarithms.
-    pub allowed_growth: f64,
-    /// A residual below this share of its torque (RMS) is as good as none: nothing is sought in it.
-    pub negligible_share: f64,
-    /// A residual over the noise floor by less than this factor is noise; one over what a held model left
-    /// when it was identified is as it was.
-    pub floor_margin: f64,
-    /// A residual below this share of its torque (RMS) is no structure: filters and encoders leave as much of
-    /// a right model.
-    pub structured_share: f64,
-    /// Probability that a torque's residual of noise seems to follow any signal.
-    pub false_structure_probability: f64,
+    /// Factor between two residuals (RMS) up to which they are the same: between one and the noise floor, and
+    /// between one and what a held model left when it was identified.
+    pub same_error: f64,
     /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which on
     /// it is structure if its samples hang together (`structured_correlation`): the noise of a robot's
     /// sensors is of one colour, and raises all residuals over their floors alike.
@@ -68,14 +61,10 @@ impl Default for Thresholds {
             least_share_of_kin: 0.75,
             least_of_others: 0.02,
             least_size: 0.01,
-            least_absorbed_size: 0.03,
-            small_size: 0.05,
-            largest_harm: 1.05,
-            allowed_growth: 0.1,
+            least_visible: 0.03,
             negligible_share: 0.005,
-            floor_margin: 1.15,
-            structured_share: 0.03,
-            false_structure_probability: 0.05,
+            largest_harm: 1.05,
+            same_error: 1.15,
             structured_ratio: 8.0,
             structured_correlation: 0.3,
             wander: 0.5,
@@ -108,21 +97,17 @@ impl Thresholds {
         Err(UnknownThreshold { name: name.to_owned(), known })
     }
 
-    fn by_name(&mut self) -> [(&'static str, &mut f64); 16] {
+    fn by_name(&mut self) -> [(&'static str, &mut f64); 12] {
         [
             ("false_name_probability", &mut self.false_name_probability),
             ("least_share", &mut self.least_share),
             ("least_share_of_kin", &mut self.least_share_of_kin),
             ("least_of_others", &mut self.least_of_others),
             ("least_size", &mut self.least_size),
-            ("least_absorbed_size", &mut self.least_absorbed_size),
-            ("small_size", &mut self.small_size),
-            ("largest_harm", &mut self.largest_harm),
-            ("allowed_growth", &mut self.allowed_growth),
+            ("least_visible", &mut self.least_visible),
             ("negligible_share", &mut self.negligible_share),
-            ("floor_margin", &mut self.floor_margin),
-            ("structured_share", &mut self.structured_share),
-            ("false_structure_probability", &mut self.false_structure_probability),
+            ("largest_harm", &mut self.largest_harm),
+            ("same_error", &mut self.same_error),
             ("structured_ratio", &mut self.structured_ratio),
             ("structured_correlation", &mut self.structured_correlation),
             ("wander", &mut self.wander),

@@ -64,18 +64,10 @@ impl Search<'_> {
         self.finish_with(before, Harm::HeldOut { most_relative: 0.0 })
     }
 
-    /// Whether a model's error on motion held out is no worse than the declared one's. Where it has names,
-    /// that of all torques together may grow, in logarithms, by `allowed_growth` of what the single torques'
-    /// errors fall in their mean: if the noise of one joint is most of all error, a large effect on another
-    /// hardly shows in the sum.
+    /// Whether a model's error on motion held out is no worse than the declared one's, of all torques
+    /// together.
     fn is_no_worse(&self, tracing: &Tracing) -> bool {
-        let (before, after) = (&tracing.before.1, &tracing.model.held_out);
-        let growth = (after.relative / before.relative).ln();
-        let ratios = after.rmse.iter().zip(&before.rmse).filter(|(_, before)| **before > 0.0);
-        let falls: Vec<f64> = ratios.map(|(after, before)| (before / after).ln()).collect();
-        let fall = falls.iter().sum::<f64>() / falls.len().max(1) as f64;
-        growth <= ROUNDING
-            || !tracing.effects.is_empty() && growth <= self.options.thresholds.allowed_growth * fall
+        tracing.model.held_out.relative <= (1.0 + ROUNDING) * tracing.before.1.relative
     }
 
     /// The same without the effects that were found and whose columns are made of the model's torque or are
