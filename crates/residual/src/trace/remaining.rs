@@ -44,7 +44,7 @@ impl Search<'_> {
             specs: &self.specs,
             parameters: &self.parameters,
             ranges: &self.input.ranges,
-            false_alarm: self.options.thresholds.false_name_probability,
+            false_alarm: self.options.thresholds.false_structure_probability,
         };
         let following = probe::following(fit, &large)?;
         let over = |row: usize| error.rmse[row] / self.input.noise_floor[row];

@@ -13,10 +13,12 @@ use thiserror::Error;
 /// constants where they are used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {
-    /// Probability of naming anything on a right model, for all candidates of a run together; that at which
-    /// one refinement is in the model, if it were not there; and that with which a torque's residual of noise
-    /// seems to follow any signal.
+    /// Probability of naming anything on a right model, for all candidates of a run together; and that at
+    /// which one refinement is in the model, if it were not there.
     pub false_name_probability: f64,
+    /// Probability that a torque's residual of noise seems to follow any signal. At that of a name, a spring
+    /// that is smaller than coloured noise is not seen.
+    pub false_structure_probability: f64,
     /// Share of a torque's residual, where training motion is foretold from its other parts, that an effect
     /// on it must take away to have a name.
     pub least_share: f64,
@@ -57,6 +59,7 @@ impl Default for Thresholds {
     fn default() -> Self {
         Thresholds {
             false_name_probability: 0.01,
+            false_structure_probability: 0.05,
             least_share: 0.2,
             least_share_of_kin: 0.75,
             least_of_others: 0.02,
@@ -97,9 +100,10 @@ impl Thresholds {
         Err(UnknownThreshold { name: name.to_owned(), known })
     }
 
-    fn by_name(&mut self) -> [(&'static str, &mut f64); 12] {
+    fn by_name(&mut self) -> [(&'static str, &mut f64); 13] {
         [
             ("false_name_probability", &mut self.false_name_probability),
+            ("false_structure_probability", &mut self.false_structure_probability),
             ("least_share", &mut self.least_share),
             ("least_share_of_kin", &mut self.least_share_of_kin),
             ("least_of_others", &mut self.least_of_others),
