@@ -33,6 +33,8 @@ struct Judged {
     gain: f64,
     /// Share of the stretches of training motion that it makes better.
     folds: f64,
+    /// RMS of what it takes over the RMS of a torque that it acts on, the largest.
+    size: f64,
     /// Whether its certainty is that of a name.
     certain: bool,
     named: bool,
@@ -61,7 +63,7 @@ impl Search<'_> {
         };
         let mut judged = self.judge(&trial)?;
         self.judge_beside_forms(&trial, &mut judged);
-        self.judge_beside_constants(&trial, &mut judged)?;
+        self.judge_small(&trial, &mut judged)?;
         self.name_families(&mut judged);
         self.in_order(&trial, judged)
     }
@@ -138,18 +140,18 @@ impl Search<'_> {
             own.significance = certainty.significance;
             own.certain = certainty.tail <= self.tail_of_a_name();
             own.named = own.certain && form_is_named && self.is_material(trial, member, &squares);
+            own.size = trial.size(member, &squares);
         }
     }
 
-    /// Asks again of effects on joints where another effect has constants, now that these are refined without
-    /// it: a sign that turns over another speed looks like some viscous friction.
-    fn judge_beside_constants(
-        &self,
-        trial: &Trial,
-        judged: &mut [Judged],
-    ) -> Result<(), IdentificationError> {
+    /// Asks again of small effects on joints where another effect has constants, now that these are refined
+    /// without it: a sign that turns over another speed looks like some viscous friction.
+    fn judge_small(&self, trial: &Trial, judged: &mut [Judged]) -> Result<(), IdentificationError> {
         let initial = trial.foretold_squares(&trial.fit_with(|place| place < self.declared));
-        for judged in judged.iter_mut().filter(|judged| judged.named) {
+        for judged in judged
+            .iter_mut()
+            .filter(|judged| judged.named && judged.size < self.options.thresholds.small_size)
+        {
             let own = &self.specs[judged.place];
             let has_constants = |spec: &EffectSpec| spec.joints == own.joints && !spec.constants.is_empty();
             let mut others = self.specs.iter().enumerate().filter(|(place, _)| *place != judged.place);
@@ -246,6 +248,7 @@ impl Search<'_> {
             let without = whole.fit_with(|other| other != place);
             judged.push(Judged {
                 place,
+                size: trial.size(own_member, &squares),
                 significance: certainty.significance,
                 gain: whole.gain(&whole.foretold_squares(&without), &all),
                 folds: whole.better_folds(&without),

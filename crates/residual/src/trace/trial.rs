@@ -76,6 +76,15 @@ impl Trial {
         &self.problem.torques[torque].whole
     }
 
+    /// RMS of what a member takes over the RMS of a torque that it acts on, the largest.
+    pub fn size(&self, member: Member, squares: &Squares) -> f64 {
+        let of_torque = |&torque: &usize| {
+            let whole = self.torque(torque).right_hand_side().max(f64::MIN_POSITIVE);
+            ((squares.without[torque] - squares.with[torque]).max(0.0) / whole).sqrt()
+        };
+        self.problem.hypotheses[member.hypothesis].torques.iter().map(of_torque).fold(0.0, f64::max)
+    }
+
     /// The fit with the declared members and those found that `stays` keeps, by their place among the model's
     /// effects.
     pub fn fit_with(&self, stays: impl Fn(usize) -> bool) -> Fit {
