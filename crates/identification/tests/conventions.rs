@@ -50,6 +50,7 @@ fn each_difference_is_told_by_its_kind_and_joints() {
             times(&mut log.tau, joint, -1.0);
             turn_position(log, joint);
         });
+        only(ConventionKind::PositionSign, &[joint], &|log| turn_position(log, joint));
         only(ConventionKind::AllTorqueSigns, &[], &|log| log.tau.iter_mut().for_each(|tau| *tau *= -1.0));
         // A slider's column is not taken for a hinge's.
         let tree = synthetic::robot(seed, JOINTS);

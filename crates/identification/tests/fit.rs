@@ -76,10 +76,6 @@ fn a_fit_is_one_to_the_models_own_torque() {
     let effects = (0..3).flat_map(|joint| [vec![synthetic::Viscous::on(&tree, joint)], vec![load(joint)]]);
     let data = synthetic::data(&blocks, synthetic::folds(60.0, FOLDS), Vec::new());
     let identified = identify(&urdf, effects.collect(), &data).unwrap();
-    println!(
-        "{:?} {:?} {:?}",
-        identified.train.rmse, identified.train.rms_torque, identified.fit.residual_std
-    );
     for (rmse, left) in identified.train.rmse.iter().zip(&identified.fit.residual_std) {
         assert!(*rmse <= 1.05 * left, "{rmse} with its own torque, {left} left by the fit");
     }
