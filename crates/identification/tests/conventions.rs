@@ -42,7 +42,7 @@ fn each_difference_is_told_by_its_kind_and_joints() {
         let only = |kind: ConventionKind, joints: &[usize], change: &dyn Fn(&mut Recording)| {
             let found = found(seed, change);
             assert_eq!(found.len(), 1, "{kind:?} of {joints:?}: {found:?}");
-            assert_eq!((found[0].kind, found[0].joints.as_slice()), (kind, joints), "{found:?}");
+            assert_eq!((&found[0].kind, found[0].joints.as_slice()), (&kind, joints), "{found:?}");
             assert!(found[0].left < found[0].left_as_named);
         };
         only(ConventionKind::TorqueSign, &[joint], &|log| times(&mut log.tau, joint, -1.0));
@@ -100,7 +100,7 @@ fn torques_without_the_robots_weight_are_told() {
             }
             left_out = (0..JOINTS).map(|joint| weights[joint] / torques[joint]).fold(0.0, f64::max);
         });
-        let kinds: Vec<_> = found.iter().map(|found| found.kind).collect();
+        let kinds: Vec<_> = found.iter().map(|found| found.kind.clone()).collect();
         // A weight that hardly shows is not missed, and other bodies may do for one.
         let is_heavy = left_out > 1.0 && kinds == [ConventionKind::NoGravity];
         assert!(is_heavy || kinds.is_empty(), "robot {seed}: {kinds:?}");
@@ -117,7 +117,71 @@ fn two_joints_that_turn_the_other_way_are_both_told() {
             turn_position(log, joint);
         }
     });
-    let mut axes: Vec<_> = found.iter().map(|found| (found.kind, found.joints[0])).collect();
+    let mut axes: Vec<_> = found.iter().map(|found| (found.kind.clone(), found.joints[0])).collect();
     axes.sort_by_key(|(_, joint)| *joint);
     assert_eq!(axes, [(ConventionKind::Axis, 1), (ConventionKind::Axis, 3)], "{found:?}");
+}
+
+#[test]
+fn a_robot_that_hangs_is_told_with_the_direction_of_gravity() {
+    let angle =
+        |a: [f64; 3], b: [f64; 3]| (0..3).map(|at| a[at] * b[at]).sum::<f64>().clamp(-1.0, 1.0).acos();
+    let slanting = 0.5_f64.sqrt();
+    let mut told = 0;
+    for downward in [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -slanting, -slanting]] {
+        for seed in 0..6 {
+            let mut hung = synthetic::robot(seed, JOINTS);
+            let standing = hung.gravity;
+            hung.gravity = downward.map(|along| 9.81 * along);
+            let log = synthetic::recording(&hung, seed, 60.0, VISCOUS, NOISE, seed);
+            let blocks = synthetic::blocks(&log, 4096);
+            let data = synthetic::data(&blocks, synthetic::folds(60.0, 6), Vec::new());
+            hung.gravity = standing;
+            let found = conventions(&hung, &data, &ConventionSettings::default()).unwrap();
+            // Where gravity turns about the first joint's axis, or joints hardly feel it, it is not seen.
+            let Some(first) = found.first() else { continue };
+            let seen = match first.kind {
+                ConventionKind::Mounting(seen) => seen,
+                // From below: the same as a first joint that lies and turns the other way.
+                ConventionKind::Axis if first.joints == [0] && downward[2] > 0.0 => continue,
+                _ => panic!("robot {seed}, {downward:?}: {found:?}"),
+            };
+            assert_eq!(found.len(), 1, "robot {seed}, {downward:?}: {found:?}");
+            assert!(angle(seen, downward) < 0.1, "robot {seed}, {downward:?}: {seen:?}");
+            told += 1;
+        }
+    }
+    assert!(told >= 12, "told in {told} of 18 cases");
+}
+
+#[test]
+fn torques_in_a_unit_of_each_are_told_with_their_factors() {
+    let factors = [0.04, 3.0, 0.3, 0.9];
+    let mut told = 0;
+    for seed in 0..6 {
+        let found =
+            found(seed, |log| (0..JOINTS).for_each(|joint| times(&mut log.tau, joint, factors[joint])));
+        let Some(Convention { kind: ConventionKind::EachTorqueScale(scales), joints, .. }) = found.first()
+        else {
+            continue;
+        };
+        assert_eq!(found.len(), 1, "robot {seed}: {found:?}");
+        for (scale, &joint) in scales.iter().zip(joints) {
+            let over = scale / factors[joint];
+            assert!((0.6..1.6).contains(&over), "robot {seed}, joint {joint}: {scale}, {found:?}");
+        }
+        told += usize::from(joints.len() >= 3);
+    }
+    assert!(told >= 4, "told on {told} robots");
+}
+
+#[test]
+fn all_torques_in_another_unit_are_told_with_their_factor() {
+    for seed in 0..6 {
+        let found = found(seed, |log| log.tau.iter_mut().for_each(|tau| *tau *= 1000.0));
+        let [Convention { kind: ConventionKind::AllTorqueScales(scale), .. }] = found.as_slice() else {
+            panic!("robot {seed}: {found:?}")
+        };
+        assert!((900.0..1100.0).contains(scale), "robot {seed}: {scale}");
+    }
 }

@@ -1,13 +1,15 @@
 //! Whether a log counts a robot's joints as its URDF does: which way a joint turns, which way its torque
-//! acts, which column is whose, whether torques carry the robot's weight.
+//! acts, which column is whose, in which unit torques are, and which way gravity points.
 //!
 //! A joint that turns the other way in a log than in the URDF is no missing effect, and no effect describes
 //! it: it has to be said before anything is looked for. Bodies that hang on several joints tell: read as it
 //! is meant, a rigid body with friction leaves far less of all torques.
 
+mod mounting;
 mod reading;
 mod rough_fit;
 mod samples;
+mod scales;
 
 pub use reading::ConventionKind;
 
@@ -22,16 +24,17 @@ use samples::Samples;
 
 /// How a log is read otherwise.
 ///
-/// At the default gain nothing is said of 45 right models, 62 with missing effects and six real robots (`cargo
-/// xtask undeclared --suite SUITE --seeds dev --generate DIR`, each through `phiw identify`). They reached 0.51
-/// while it was chosen; what the tests change in a log gave 2 and more.
+/// At the default gain nothing is said of 45 right models, 62 with missing effects and six real robots
+/// (`cargo xtask undeclared --suite SUITE --seeds dev --generate DIR`, each through `phiw identify`). They
+/// reached 0.51 while it was chosen; what the tests change in a log gave 2 and more.
 #[derive(Clone, Copy, Debug)]
 pub struct ConventionSettings {
     /// Rows for each unknown number.
     pub rows_per_unknown: usize,
     /// What must be left of some torque (RMS, a share of it) for the log to be read otherwise.
     pub least_left: f64,
-    /// By how much the sum of the logarithms of what is left of the torques (RMS) must fall.
+    /// By how much the sum of the logarithms of what is left of the torques (RMS) must fall for each
+    /// difference. A direction of gravity counts for two, units of all torques for as many as joints but one.
     pub least_gain: f64,
 }
 
@@ -54,6 +57,42 @@ pub struct Convention {
     pub left: f64,
 }
 
+/// A log's samples, to be read in one way or another.
+struct Log<'a> {
+    tree: &'a Tree,
+    base: BaseParameters,
+    samples: Samples,
+}
+
+impl Log<'_> {
+    fn left_if(&self, reading: &Reading) -> Result<Left, IdentificationError> {
+        left(self.tree, &self.base, &self.samples, reading)
+    }
+
+    fn joints(&self) -> usize {
+        self.samples.joints
+    }
+}
+
+/// A difference that is tried.
+struct Candidate {
+    kind: ConventionKind,
+    joints: Vec<usize>,
+    left: Left,
+}
+
+impl Candidate {
+    /// For how many differences it counts: one, or the numbers that were free.
+    fn differences(&self) -> usize {
+        match &self.kind {
+            // A factor common to all changes nothing.
+            ConventionKind::EachTorqueScale(scales) => scales.len().saturating_sub(1),
+            ConventionKind::Mounting(_) => 2,
+            _ => 1,
+        }
+    }
+}
+
 /// The differences between the training logs and the URDF, the greatest first; none in most cases, and none
 /// for a robot with a floating base.
 ///
@@ -68,74 +107,54 @@ pub fn conventions(
     if tree.is_floating() || joints == 0 {
         return Ok(Vec::new());
     }
-    let base = BaseParameters::of_tree(tree, BaseParametersOptions::default())?;
+    let base = BaseParameters::of_tree(&mounting::askew(tree), BaseParametersOptions::default())?;
     let unknowns = base.count() + 5 * joints;
     let samples = Samples::of(data, joints, settings.rows_per_unknown * unknowns / joints)?;
     if samples.len() * joints < 3 * unknowns {
         return Ok(Vec::new());
     }
-    let mut reading = Reading::as_named(joints);
-    let mut present = left(tree, &base, &samples, &reading)?;
+    let log = Log { tree, base, samples };
+    let mut reading = Reading::as_named(tree);
+    let mut present = log.left_if(&reading)?;
     let mean = |left: &Left| (left.total() / joints as f64).exp();
     let left_as_named = mean(&present);
     let mut found: Vec<Convention> = Vec::new();
     while found.len() < 2 * joints {
         let is_good = present.relative.iter().all(|relative| *relative <= settings.least_left);
+        let is_new = |kind: &ConventionKind, joints: &[usize]| {
+            found.iter().all(|old| old.kind != *kind || old.joints != joints)
+        };
         let mut others = alternatives(tree);
+        others.retain(|(kind, joints)| is_new(kind, joints));
         others.retain(|(kind, _)| !is_good || *kind == ConventionKind::AllTorqueSigns);
-        others.retain(|(kind, joints)| found.iter().all(|old| (old.kind, &old.joints) != (*kind, joints)));
-        if !is_good {
-            others.extend(present.scales.iter().enumerate().filter_map(|(joint, scale)| {
-                let scale = (*scale)?.recip();
-                let is_other = scale > 0.0 && scale.ln().abs() > LEAST_SCALE.ln();
-                is_other.then_some((ConventionKind::TorqueScale(scale), vec![joint]))
-            }));
-        }
-        let left_if = |reading: &Reading| left(tree, &base, &samples, reading);
-        let tried: Vec<(ConventionKind, Left)> = others
-            .par_iter()
-            .map(|(kind, joints)| match *kind {
-                ConventionKind::TorqueScale(scale) => scaled(&reading, joints[0], scale, left_if),
-                kind => Ok((kind, left_if(&reading.with(kind, joints))?)),
+        let mut tried: Vec<Candidate> = others
+            .into_par_iter()
+            .map(|(kind, joints)| {
+                let left = log.left_if(&reading.with(&kind, &joints))?;
+                Ok(Candidate { kind, joints, left })
             })
             .collect::<Result<_, IdentificationError>>()?;
-        let best =
-            tried.into_iter().zip(others).min_by(|((_, a), _), ((_, b), _)| a.total().total_cmp(&b.total()));
-        let Some(((kind, left), (_, on))) = best else { break };
-        if present.total() - left.total() < settings.least_gain {
+        if !is_good {
+            tried.extend(scales::of_one(&log, &reading, &present)?);
+            tried.extend(scales::of_each(&log, &reading)?);
+            tried.extend(mounting::mounted(&log, &reading)?);
+        }
+        let gain = |candidate: &Candidate| {
+            present.total() - candidate.left.total() - settings.least_gain * candidate.differences() as f64
+        };
+        let Some(best) = tried.into_iter().max_by(|a, b| gain(a).total_cmp(&gain(b))) else { break };
+        if gain(&best) < 0.0 {
             break;
         }
-        reading = reading.with(kind, &on);
-        found.push(Convention { kind, joints: on, left_as_named, left: mean(&left) });
+        reading = reading.with(&best.kind, &best.joints);
+        let Candidate { kind, joints, left } = best;
+        found.push(Convention { kind, joints, left_as_named, left: mean(&left) });
         present = left;
+    }
+    let has_units = found.iter().any(|found| matches!(found.kind, ConventionKind::EachTorqueScale(_)));
+    if !has_units && let Some(scale) = scales::of_all(&log, &reading, &present)? {
+        let kind = ConventionKind::AllTorqueScales(scale);
+        found.push(Convention { kind, joints: Vec::new(), left_as_named, left: mean(&present) });
     }
     Ok(found)
 }
-
-/// The scale of a torque, found in a few steps from a first one: as long as it is wrong it disturbs what the
-/// others tell of it.
-fn scaled(
-    reading: &Reading,
-    joint: usize,
-    first: f64,
-    left_if: impl Fn(&Reading) -> Result<Left, IdentificationError>,
-) -> Result<(ConventionKind, Left), IdentificationError> {
-    let mut kind = ConventionKind::TorqueScale(first);
-    let mut left = left_if(&reading.with(kind, &[joint]))?;
-    let mut scale = first;
-    for _ in 1..SCALE_STEPS {
-        let Some(factor) = left.scales[joint].filter(|factor| *factor > 0.0) else { break };
-        scale /= factor;
-        let next = left_if(&reading.with(ConventionKind::TorqueScale(scale), &[joint]))?;
-        if next.total() >= left.total() {
-            break;
-        }
-        (kind, left) = (ConventionKind::TorqueScale(scale), next);
-    }
-    Ok((kind, left))
-}
-
-/// Steps to find a scale.
-const SCALE_STEPS: usize = 4;
-/// A torque is in another unit from this factor on; below it is a gain.
-const LEAST_SCALE: f64 = 2.0;

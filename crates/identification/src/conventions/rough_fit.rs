@@ -20,15 +20,17 @@ const DETERMINED: f64 = 1e-9;
 /// What is added to the diagonal of the normal equations, of columns of norm one.
 const RIDGE: f64 = 1e-9;
 /// Fits, each with the torques weighted by what the one before left of them.
-const FITS: usize = 3;
+pub(super) const FITS: usize = 3;
 /// No torque is taken to be told better than to this share (RMS).
-const LEAST_LEFT: f64 = 1e-3;
+pub(super) const LEAST_LEFT: f64 = 1e-3;
 
 /// What is left of each torque, RMS over its own.
 pub(super) struct Left {
     pub relative: Vec<f64>,
     /// For each torque the factor by which it would suit the others best; none where they do not tell.
     pub scales: Vec<Option<f64>>,
+    /// The base parameters of the fit.
+    pub parameters: Vec<f64>,
 }
 
 impl Left {
@@ -39,7 +41,7 @@ impl Left {
 }
 
 /// Products of a torque's columns: base parameters, then those of its own that are free, then the torque.
-struct Products {
+pub(super) struct Products {
     matrix: Mat<f64>,
     base: usize,
 }
@@ -55,8 +57,7 @@ pub(super) fn left(
 ) -> Result<Left, IdentificationError> {
     let products = products(tree, base, samples, reading)?;
     let count = base.count();
-    let torque: Vec<f64> =
-        products.iter().map(|own| own.at(count + OWN, count + OWN).max(f64::MIN_POSITIVE)).collect();
+    let torque: Vec<f64> = products.iter().map(|own| own.torque_squares().max(f64::MIN_POSITIVE)).collect();
     let free: Vec<Products> = products.iter().map(|own| own.without(&[0, 1, VISCOUS, COULOMB])).collect();
     let frictionless: Vec<Products> = products.iter().map(|own| own.without(&[0, 1])).collect();
     let mut drives = vec![false; products.len()];
@@ -81,7 +82,18 @@ pub(super) fn left(
     let relative = (0..all.len()).map(|joint| (all[joint].squares(&parameters) / torque[joint]).sqrt());
     // A torque of another scale may have turned the weights against those that it disturbs.
     let scales = (0..all.len()).map(|joint| scale(&all, &first_weights, count, joint));
-    Ok(Left { relative: relative.collect(), scales: scales.collect() })
+    Ok(Left { relative: relative.collect(), scales: scales.collect(), parameters })
+}
+
+/// Products beside each joint's own columns: offset, rotor inertia and friction are fitted.
+pub(super) fn free_products(
+    tree: &Tree,
+    base: &BaseParameters,
+    samples: &Samples,
+    reading: &Reading,
+) -> Result<Vec<Products>, IdentificationError> {
+    let products = products(tree, base, samples, reading)?;
+    Ok(products.iter().map(|own| own.without(&[0, 1, VISCOUS, COULOMB])).collect())
 }
 
 fn products(
@@ -92,9 +104,7 @@ fn products(
 ) -> Result<Vec<Products>, IdentificationError> {
     let joints = samples.joints;
     let mut robot = tree.clone();
-    if !reading.with_gravity {
-        robot.gravity = [0.0; 3];
-    }
+    robot.gravity = reading.gravity;
     let regressor = JointTorqueRegressor::new(&robot);
     let mut scratch = regressor.scratch();
     let (mut pairs, mut phi) =
@@ -136,12 +146,36 @@ fn products(
 }
 
 impl Products {
-    fn at(&self, row: usize, column: usize) -> f64 {
+    /// The product of two columns.
+    pub fn at(&self, row: usize, column: usize) -> f64 {
         self.matrix[(row, column)]
     }
 
     fn torque(&self) -> usize {
         self.matrix.nrows() - 1
+    }
+
+    /// The torque's squares.
+    pub fn torque_squares(&self) -> f64 {
+        self.at(self.torque(), self.torque())
+    }
+
+    /// The product of a base parameter's column and the torque.
+    pub fn share(&self, row: usize) -> f64 {
+        self.at(row, self.torque())
+    }
+
+    /// The squares of the torque that base parameters foretell.
+    pub fn squares_of_model(&self, parameters: &[f64]) -> f64 {
+        self.product_of_models(parameters, parameters).max(0.0)
+    }
+
+    /// The product of the torques that two sets of base parameters foretell.
+    pub fn product_of_models(&self, one: &[f64], other: &[f64]) -> f64 {
+        let along = |row: usize| -> f64 {
+            other.iter().enumerate().map(|(column, value)| self.at(row, column) * value).sum()
+        };
+        one.iter().enumerate().map(|(row, value)| value * along(row)).sum()
     }
 
     /// What is left beside some of the joint's own columns: they are fitted, whatever the others are.
@@ -171,14 +205,8 @@ impl Products {
 
     /// The sum of squares that base parameters leave of the torque.
     fn squares(&self, parameters: &[f64]) -> f64 {
-        let torque = self.torque();
-        let mut sum = self.at(torque, torque);
-        for (row, own) in parameters.iter().enumerate() {
-            let along: f64 =
-                parameters.iter().enumerate().map(|(column, other)| self.at(row, column) * other).sum();
-            sum += own * (along - 2.0 * self.at(row, torque));
-        }
-        sum.max(0.0)
+        let product: f64 = parameters.iter().enumerate().map(|(row, value)| self.share(row) * value).sum();
+        (self.torque_squares() - 2.0 * product + self.product_of_models(parameters, parameters)).max(0.0)
     }
 
     /// Whether the friction that suits these base parameters best would drive its joint. `self` has offset
@@ -188,7 +216,7 @@ impl Products {
         let right = |row: usize| {
             let taken: f64 =
                 parameters.iter().enumerate().map(|(column, value)| self.at(row, column) * value).sum();
-            self.at(row, self.torque()) - taken
+            self.share(row) - taken
         };
         let (first, second) = (right(v), right(s));
         let determinant = self.at(v, v) * self.at(s, s) - self.at(v, s).powi(2);
@@ -218,7 +246,7 @@ fn fit(all: &[&Products], weights: &[f64], count: usize) -> Vec<f64> {
         all.iter().zip(weights).map(|(own, weight)| weight * own.at(row, column)).sum()
     };
     solved(&Mat::from_fn(count, count, sum), |row| {
-        all.iter().zip(weights).map(|(own, weight)| weight * own.at(row, own.torque())).sum()
+        all.iter().zip(weights).map(|(own, weight)| weight * own.share(row)).sum()
     })
 }
 
@@ -226,26 +254,23 @@ fn fit(all: &[&Products], weights: &[f64], count: usize) -> Vec<f64> {
 /// parameters, as one more unknown.
 fn scale(all: &[&Products], weights: &[f64], count: usize, joint: usize) -> Option<f64> {
     let own = all[joint];
-    let torque = own.torque();
-    let square = own.at(torque, torque);
+    let square = own.torque_squares();
     if square <= 0.0 {
         return None;
     }
-    let share = |row: usize| own.at(row, torque);
     let matrix = Mat::from_fn(count, count, |row, column| {
         let sum: f64 = all.iter().zip(weights).map(|(other, weight)| weight * other.at(row, column)).sum();
-        sum - weights[joint] * share(row) * share(column) / square
+        sum - weights[joint] * own.share(row) * own.share(column) / square
     });
     let others = || all.iter().zip(weights).enumerate().filter(|(other, _)| *other != joint);
-    let parameters = solved(&matrix, |row| {
-        others().map(|(_, (other, weight))| weight * other.at(row, other.torque())).sum()
-    });
-    let along: f64 = parameters.iter().enumerate().map(|(row, value)| share(row) * value).sum();
+    let parameters =
+        solved(&matrix, |row| others().map(|(_, (other, weight))| weight * other.share(row)).sum());
+    let along: f64 = parameters.iter().enumerate().map(|(row, value)| own.share(row) * value).sum();
     Some(along / square).filter(|scale| scale.is_finite() && *scale != 0.0)
 }
 
 /// The solution of normal equations, columns scaled to norm one; zeros where it has none.
-fn solved(matrix: &Mat<f64>, right: impl Fn(usize) -> f64) -> Vec<f64> {
+pub(super) fn solved(matrix: &Mat<f64>, right: impl Fn(usize) -> f64) -> Vec<f64> {
     let count = matrix.nrows();
     let scale = |at: usize| if matrix[(at, at)] > 0.0 { matrix[(at, at)].sqrt() } else { 1.0 };
     let scales: Vec<f64> = (0..count).map(scale).collect();
