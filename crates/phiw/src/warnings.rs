@@ -90,7 +90,7 @@ pub fn of_log(survey: &Survey) -> Vec<String> {
     let gap = |gap: &phiw_telemetry::segments::GapCount| {
         let (count, line) = (gap.count, gap.first_line);
         let rows = if count == 1 { "row" } else { "rows" };
-        match gap.reason {
+        Some(match gap.reason {
             GapReason::TimeJump if count == 1 => {
                 format!("{name}: time jumps at {rows_are} {line}; the log is split there")
             }
@@ -115,11 +115,13 @@ pub fn of_log(survey: &Survey) -> Vec<String> {
                     columns.join(", ")
                 )
             }
+            // `check` says these, with what follows from them.
+            GapReason::Held | GapReason::ZeroRow => return None,
             GapReason::LeftOut => format!("{name}: {count} {rows} left out by the map"),
             reason => format!(
                 "{name}: {count} {rows} skipped ({reason}), first at {rows_are} {line}; the log is split there"
             ),
-        }
+        })
     };
     let mut warnings: Vec<String> = survey.notes.iter().map(|note| format!("{name}: {note}")).collect();
     if let Some(Payload::Known { link, mass_kg, .. }) = survey.source.facts().payload {
@@ -127,7 +129,7 @@ pub fn of_log(survey: &Survey) -> Vec<String> {
             "{name}: the torques of a payload of {mass_kg} kg at `{link}`, a point mass, are taken off those that were measured"
         ));
     }
-    warnings.extend(survey.gaps.iter().map(gap));
+    warnings.extend(survey.gaps.iter().filter_map(gap));
     if survey.short_segments > 0 {
         warnings
             .push(format!("{name}: {} stretches between gaps are too short to use", survey.short_segments));

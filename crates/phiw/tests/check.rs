@@ -79,6 +79,21 @@ fn findings_name_the_column_and_go_into_the_file() {
     check(torque(|torque, _| torque.abs()), &[("unsigned_torque", "tau.joint_1")]);
     check(torque(|torque, largest| torque.min(0.4 * largest)), &[("flat_top", "tau.joint_1")]);
     check(torque(|torque, _| 1000.0 * torque), &[("torque_unit", "tau.joint_1")]);
+    let rows_of_three = |values: &mut Vec<f64>, change: fn(usize) -> usize| {
+        let read = values.clone();
+        let rows = values.chunks_mut(3).enumerate();
+        rows.for_each(|(row, values)| values.copy_from_slice(&read[3 * change(row)..][..3]));
+    };
+    let fourth = |row: usize| row / 4 * 4;
+    let held = |log: &mut Recording| {
+        rows_of_three(&mut log.q, fourth);
+        rows_of_three(&mut log.tau, fourth);
+    };
+    check(held, &[("held_rows", "t")]);
+    check(|log| rows_of_three(&mut log.tau, fourth), &[("held_signal", "tau")]);
+    let missed =
+        |log: &mut Recording| log.tau.chunks_mut(3).skip(40).step_by(97).for_each(|row| row.fill(0.0));
+    check(missed, &[("zero_rows", "tau")]);
 }
 
 #[test]

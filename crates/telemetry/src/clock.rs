@@ -47,7 +47,7 @@ pub(crate) fn stamped_interpolation_error(t: [f64; 5], x: [f64; 5]) -> f64 {
 }
 
 /// Weights of four samples at stamps `t` in the value at `at` of the cubic through them.
-fn lagrange(t: [f64; 4], at: f64) -> [f64; 4] {
+pub(crate) fn lagrange(t: [f64; 4], at: f64) -> [f64; 4] {
     std::array::from_fn(|i| (0..4).filter(|&j| j != i).map(|j| (at - t[j]) / (t[i] - t[j])).product())
 }
 

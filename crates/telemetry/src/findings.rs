@@ -6,7 +6,9 @@ pub use crate::check_settings::CheckSettings;
 use crate::Survey;
 use crate::alignment::Alignment;
 use crate::joint_survey::{JointSurvey, TorqueSurvey};
+use crate::segments::GapReason;
 use crate::signal_shape::SignalShape;
+use crate::zero_rows::ZeroRows;
 use std::fmt;
 
 /// What is wrong.
@@ -36,6 +38,12 @@ pub enum FindingKind {
     Clock,
     /// Few samples.
     Sampling,
+    /// Rows that stand in the log several times.
+    HeldRows,
+    /// A signal that keeps each value for several rows.
+    HeldSignal,
+    /// Rows of zeros, of messages that were missed.
+    ZeroRows,
     /// A torque in another unit.
     TorqueUnit,
     /// A joint that does not move.
@@ -58,6 +66,9 @@ impl FindingKind {
             FindingKind::EncoderSteps => "encoder_steps",
             FindingKind::Clock => "clock",
             FindingKind::Sampling => "sampling",
+            FindingKind::HeldRows => "held_rows",
+            FindingKind::HeldSignal => "held_signal",
+            FindingKind::ZeroRows => "zero_rows",
             FindingKind::TorqueUnit => "torque_unit",
             FindingKind::StandsStill => "stands_still",
         }
@@ -81,6 +92,12 @@ impl FindingKind {
             FindingKind::EncoderSteps => "accelerations are noisy, and rotor inertias uncertain",
             FindingKind::Clock => "velocities and accelerations carry the stamps' error",
             FindingKind::Sampling => "accelerations can't be told",
+            FindingKind::HeldRows => "read as they are, they would be steps in time, and look like delays",
+            FindingKind::HeldSignal => {
+                "it is late by half of that on the mean, which looks like a delay; accelerations from held positions are \
+                 those of steps"
+            }
+            FindingKind::ZeroRows => "as measurements they would be jumps that no model can follow",
             FindingKind::TorqueUnit => "all parameters would be off by this factor",
             FindingKind::StandsStill => "nothing of what it moves can be told",
         }
@@ -102,6 +119,15 @@ impl FindingKind {
             FindingKind::EncoderSteps => "log the encoder's full resolution, or move further and slower",
             FindingKind::Clock => "stamp samples when they are taken",
             FindingKind::Sampling => "log faster: 100 Hz or more",
+            FindingKind::HeldRows => {
+                "the repeats are left out; log a reading when it comes, with the stamp of that time"
+            }
+            FindingKind::HeldSignal => {
+                "log all signals of a joint when they are read, or all at the rate of the slowest"
+            }
+            FindingKind::ZeroRows => {
+                "they are left out, and bridged from the rows beside; find out why messages are missed"
+            }
             FindingKind::TorqueUnit => {
                 "convert it (mA by the torque constant and the gear), or mend the URDF's limit"
             }
@@ -148,8 +174,74 @@ pub fn findings(survey: &Survey, settings: &CheckSettings) -> Vec<Finding> {
             measured: format!("has {:.1} samples a second", survey.rate_hz()),
         });
     }
+    all.extend(mended(survey));
+    all.extend(held(survey));
     for joint in &survey.joints {
         all.extend(of_joint(joint, settings));
+    }
+    all
+}
+
+/// Rows that were mended.
+fn mended(survey: &Survey) -> Vec<Finding> {
+    let mut all = Vec::new();
+    let repeats = survey.gaps.iter().find(|gap| gap.reason == GapReason::Held);
+    if let (Some(rows), Some(repeats)) = (survey.held_rows(), repeats) {
+        all.push(Finding {
+            kind: FindingKind::HeldRows,
+            column: "t".to_owned(),
+            measured: format!(
+                "runs on while nothing is read: {} of {} rows repeat the one before to the last digit, {rows} rows to a \
+                 reading",
+                repeats.count, survey.rows
+            ),
+        });
+    }
+    let ZeroRows { positions, torques } = survey.zero_rows();
+    for (column, rows) in [("q", positions), ("tau", torques)] {
+        if rows > 0 {
+            let rows_are = if rows == 1 { "row" } else { "rows" };
+            all.push(Finding {
+                kind: FindingKind::ZeroRows,
+                column: column.to_owned(),
+                measured: format!(
+                    "of all joints is exactly 0 in {rows} {rows_are} between others that are far from it"
+                ),
+            });
+        }
+    }
+    all
+}
+
+/// Signals that are held, though not all at once; one for all joints where they are alike.
+fn held(survey: &Survey) -> Vec<Finding> {
+    let positions = |joint: &JointSurvey| joint.position_shape.held;
+    let torques = |joint: &JointSurvey| joint.torque.and_then(|torque| torque.shape.held);
+    let signals: [(&str, Vec<Option<f64>>); 2] = [
+        ("q", survey.joints.iter().map(positions).collect()),
+        ("tau", survey.joints.iter().map(torques).collect()),
+    ];
+    let mut all = Vec::new();
+    for (signal, rows) in signals {
+        let finding = |column: String, whose: &str, rows: f64| Finding {
+            kind: FindingKind::HeldSignal,
+            column,
+            measured: format!(
+                "{whose}keeps each value for {rows:.1} rows ({:.1} ms), in which other columns change",
+                1e3 * rows * survey.period
+            ),
+        };
+        let first = rows.first().copied().flatten().filter(|_| rows.len() > 1);
+        let alike = |first: &f64| rows.iter().all(|rows| rows.is_some_and(|rows| (rows - first).abs() < 0.5));
+        if let Some(first) = first.filter(alike) {
+            all.push(finding(signal.to_owned(), "of all joints ", first));
+            continue;
+        }
+        let joints = survey.joints.iter().zip(&rows);
+        let of_joint = |(joint, rows): (&JointSurvey, &Option<f64>)| {
+            Some(finding(format!("{signal}.{}", joint.name), "", (*rows)?))
+        };
+        all.extend(joints.filter_map(of_joint));
     }
     all
 }

@@ -18,6 +18,11 @@ pub enum GapReason {
     StillTorques,
     /// Positions and torques are those of earlier rows, to the last digit: a copy, which says nothing new.
     Repeated,
+    /// The row before, once more to the last digit: the log is faster than what it logs. No segment is split.
+    Held,
+    /// All torques or all positions are exactly 0 between rows in which they are far from it: a message was
+    /// missed. The row is bridged; no segment is split.
+    ZeroRow,
     /// The time stamp of the row before, once more.
     DuplicateStamp,
     /// The last row is cut short, or may be since its line feed is missing.
@@ -29,13 +34,15 @@ pub enum GapReason {
 }
 
 impl GapReason {
-    pub(crate) const ALL: [GapReason; 10] = [
+    pub(crate) const ALL: [GapReason; 12] = [
         GapReason::EmptyCell,
         GapReason::NotFinite,
         GapReason::Huge,
         GapReason::Spike,
         GapReason::StillTorques,
         GapReason::Repeated,
+        GapReason::Held,
+        GapReason::ZeroRow,
         GapReason::DuplicateStamp,
         GapReason::TruncatedLastRow,
         GapReason::LeftOut,
@@ -52,6 +59,8 @@ impl fmt::Display for GapReason {
             GapReason::Spike => "spike",
             GapReason::StillTorques => "no torque changes while the robot moves",
             GapReason::Repeated => "copy of earlier rows",
+            GapReason::Held => "the row before, once more",
+            GapReason::ZeroRow => "zeros of a message that was missed",
             GapReason::DuplicateStamp => "duplicate time stamp",
             GapReason::TruncatedLastRow => "truncated last row",
             GapReason::LeftOut => "left out by the map",

@@ -19,10 +19,12 @@ mod differentiator;
 mod error;
 mod gap;
 mod histogram;
+mod hold;
 mod kernel;
 mod log_rows;
 mod log_source;
 mod map;
+mod mending;
 mod named_columns;
 mod parallel_filter;
 mod plan;
@@ -33,11 +35,14 @@ mod samples;
 mod signal_shape;
 mod spectrum;
 mod spike;
+mod steps;
 mod still;
 mod stream;
 mod survey;
+mod without_held;
 mod without_stretches;
 mod writer;
+mod zero_rows;
 
 pub use block::{Block, Signals};
 pub use columns::TorqueColumns;
@@ -55,6 +60,7 @@ pub use samples::{Sample, samples};
 pub use stream::{StreamSummary, stream};
 pub use survey::{Session, Survey, arrange_session, survey};
 pub use writer::{LogColumns, LogWriter};
+pub use zero_rows::ZeroRows;
 
 /// Zero-phase low-passes, and the derivatives that a smoothing kernel gives.
 pub mod filter {

@@ -3,6 +3,7 @@
 use crate::LogError;
 use crate::columns::Layout;
 use crate::gap::GapReason;
+use crate::segments::RowCounts;
 use std::path::Path;
 
 /// Beyond this magnitude a value is taken for rubbish (an uninitialised cell reads 1e279), not for a
@@ -37,6 +38,11 @@ pub(crate) trait Rows {
     fn rows_are(&self) -> &'static str {
         "line"
     }
+
+    /// Adds to `counts` the rows that did not come, or not as they were, though nothing is split there.
+    fn account(&self, counts: &mut RowCounts) {
+        let _ = counts;
+    }
 }
 
 impl<R: Rows + ?Sized> Rows for &mut R {
@@ -59,6 +65,10 @@ impl<R: Rows + ?Sized> Rows for &mut R {
     fn rows_are(&self) -> &'static str {
         (**self).rows_are()
     }
+
+    fn account(&self, counts: &mut RowCounts) {
+        (**self).account(counts);
+    }
 }
 
 impl<R: Rows + ?Sized> Rows for Box<R> {
@@ -80,6 +90,10 @@ impl<R: Rows + ?Sized> Rows for Box<R> {
 
     fn rows_are(&self) -> &'static str {
         (**self).rows_are()
+    }
+
+    fn account(&self, counts: &mut RowCounts) {
+        (**self).account(counts);
     }
 }
 

@@ -195,14 +195,14 @@ impl Recording {
 }
 
 /// The rows of a recording, as if they were read from a file.
-struct RecordingRows<'a> {
+pub(crate) struct RecordingRows<'a> {
     recording: &'a Recording,
     layout: Layout,
     next: usize,
 }
 
 impl<'a> RecordingRows<'a> {
-    fn new(recording: &'a Recording) -> Self {
+    pub fn new(recording: &'a Recording) -> Self {
         let n = recording.joints.len();
         let has = |signal: Optional, joint: usize| {
             let values = match signal {

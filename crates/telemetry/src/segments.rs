@@ -69,6 +69,14 @@ impl RowCounts {
         }
     }
 
+    /// Rows for a reason that splits nothing; none is no gap.
+    pub fn add(&mut self, reason: GapReason, count: u64, first_line: u64) {
+        if count > 0 {
+            self.gaps.push(GapCount { reason, count, first_line });
+            self.gaps.sort_by_key(|gap| gap.first_line);
+        }
+    }
+
     /// The reasons in words, starting with a separator; empty where there are none.
     pub fn reasons(&self, rows_are: &str) -> String {
         let words: Vec<_> = GapReason::ALL
@@ -161,6 +169,7 @@ pub(crate) fn split(
     if let Some(segment) = current {
         sink.end(segment);
     }
+    rows.account(&mut counts);
     let (_, total) = rows.progress();
     sink.progress(total, total);
     Ok(counts)

@@ -2,6 +2,7 @@
 //! stretches.
 
 use crate::histogram::Histogram;
+use crate::hold::{RunCounter, is_jump};
 use serde::{Deserialize, Serialize};
 
 /// Stretches of one value from this length on are counted \[s\].
@@ -42,6 +43,10 @@ pub struct SignalShape {
     pub still: Option<Still>,
     /// Rows in all such stretches.
     pub still_rows: u64,
+    /// Mean number of rows for which each value is held between jumps, where the log is faster than what it
+    /// logs there.
+    #[serde(default)]
+    pub held: Option<f64>,
 }
 
 /// A stretch in which a signal kept one value while the joint moved.
@@ -73,6 +78,7 @@ pub(crate) struct ShapeCollector {
     /// Largest and smallest value, and the rows at them.
     ends: [(f64, u64); 2],
     runs: u64,
+    between_jumps: RunCounter,
     run: Option<Run>,
     still: Option<Still>,
     still_rows: u64,
@@ -100,6 +106,7 @@ impl ShapeCollector {
             sides: [Histogram::new(), Histogram::new()],
             ends: [(f64::NEG_INFINITY, 0), (f64::INFINITY, 0)],
             runs: 0,
+            between_jumps: RunCounter::new(),
             run: None,
             still: None,
             still_rows: 0,
@@ -142,13 +149,14 @@ impl ShapeCollector {
             Some(run) if run.value == x => {
                 run.last = t;
                 run.rows += 1;
+                self.between_jumps.repeat();
                 run.range = [run.range[0].min(q), run.range[1].max(q)];
             }
             _ => {
                 if let Some(run) = &self.run {
                     let difference = (x - run.value).abs();
                     self.differences.push(difference);
-                    self.least_difference = self.least_difference.min(difference);
+                    self.between_jumps.change(is_jump(difference, &mut self.least_difference));
                 }
                 self.end_run();
                 self.run = Some(Run { value: x, from: t, last: t, rows: 1, range: [q, q] });
@@ -171,6 +179,7 @@ impl ShapeCollector {
     /// The segment is over.
     pub fn end_segment(&mut self) {
         self.end_run();
+        self.between_jumps.end_segment();
         self.near_zero = false;
     }
 
@@ -197,6 +206,7 @@ impl ShapeCollector {
             mean_run: rows / self.runs.max(1) as f64,
             still: self.still,
             still_rows: self.still_rows,
+            held: self.between_jumps.hold().map(|hold| hold.mean),
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::columns::Layout;
 use crate::gap::GapReason;
 use crate::histogram::Histogram;
 use crate::reader::{Row, Rows};
-use crate::segments::SpikeCount;
+use crate::segments::{RowCounts, SpikeCount};
 use phiw_spikes::{SpikeSettings, WINDOW, bend, excursion, excursion_at_edge, spike_length};
 use std::collections::VecDeque;
 use std::path::Path;
@@ -56,6 +56,12 @@ impl SpikeFinder {
         let bounds: Vec<f64> =
             self.columns.iter().enumerate().map(|(place, column)| bound(place, column)).collect();
         self.columns.iter().zip(&bounds).any(|((_, most), bound)| most > bound).then_some(bounds)
+    }
+
+    /// By how much a sample of a column usually differs from the mean of its neighbours: the median, of those
+    /// that do.
+    pub fn median_bend(&self, place: usize) -> f64 {
+        self.columns[place].0.quantile(0.5)
     }
 
     /// The largest excursion of each column but the time, as a multiple of what is usual; 0 where that is not
@@ -210,6 +216,10 @@ impl<R: Rows> Rows for WithoutSpikes<R> {
 
     fn path(&self) -> &Path {
         self.rows.path()
+    }
+
+    fn account(&self, counts: &mut RowCounts) {
+        self.rows.account(counts);
     }
 }
 

@@ -3,10 +3,10 @@
 use crate::blocks::BlockMaker;
 use crate::clock::Resampler;
 use crate::log_rows::open_log;
+use crate::mending::without;
 use crate::reader::Rows;
 use crate::segments::Segment;
 use crate::segments::{RowCounts, SegmentSink, split};
-use crate::survey::without;
 use crate::{Block, Conditioning, LogError, LogPlan, Survey};
 use std::ops::ControlFlow;
 
@@ -88,9 +88,14 @@ pub(crate) fn usable_rows(
     survey: &Survey,
     sink: &mut dyn SegmentSink,
 ) -> Result<RowCounts, LogError> {
-    if survey.spike_bounds.is_empty() && survey.still.is_empty() && survey.repeated.is_empty() {
+    if survey.mending.is_none()
+        && survey.spike_bounds.is_empty()
+        && survey.still.is_empty()
+        && survey.repeated.is_empty()
+    {
         return split(rows, survey.longest_step, sink);
     }
+    let rows = survey.mending.of(rows);
     let mut without = without(rows, &survey.spike_bounds, &survey.still, &survey.repeated);
     split(&mut without, survey.longest_step, sink)
 }

@@ -6,19 +6,22 @@ use crate::clock::{Clock, uniform_interpolation_error};
 use crate::columns::{Layout, TorqueColumns};
 use crate::gap::GapReason;
 use crate::histogram::Histogram;
+use crate::hold::HeldRowFinder;
 use crate::joint_survey::JointSurvey;
 use crate::joint_survey::{Five, JointCollector};
 use crate::log_rows::open_log;
 use crate::log_source::LogSource;
-use crate::reader::{Row, Rows};
+use crate::mending::{Mended, Mending, without};
+use crate::reader::Rows;
 use crate::repeated::RepetitionFinder;
 use crate::segments::{GapCount, Segment};
 use crate::segments::{RowCounts, SegmentSink, SpikeCount, split};
 use crate::spectrum::Spectrum;
 use crate::spectrum::SpectrumEstimator;
 use crate::spike::{SpikeFinder, WithoutSpikes};
+use crate::steps::Steps;
 use crate::still::StillFinder;
-use crate::without_stretches::WithoutStretches;
+use crate::zero_rows::{ZeroRowFinder, ZeroRows};
 use phiw_spikes::{SpikeSettings, WINDOW};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -67,6 +70,9 @@ pub struct Survey {
     /// are counted as gaps.
     #[serde(default)]
     pub repeated: Vec<[f64; 2]>,
+    /// What was mended in its rows.
+    #[serde(default)]
+    pub(crate) mending: Mending,
     /// Columns in the header that are not used.
     pub ignored_columns: Vec<String>,
     /// Median distance of consecutive stamps, in seconds; exact over the first 65536, checked against a
@@ -133,6 +139,17 @@ impl Survey {
         (start, self.segments.last().map_or(start, |segment| segment.t_end))
     }
 
+    /// Rows for which each reading stands in the log, where it stands there several times; the repeats are
+    /// counted as gaps.
+    pub fn held_rows(&self) -> Option<usize> {
+        (self.mending.held > 1).then_some(self.mending.held)
+    }
+
+    /// Rows of zeros that a driver logged for what it had not got; they are counted as gaps, and bridged.
+    pub fn zero_rows(&self) -> ZeroRows {
+        self.mending.zero_rows
+    }
+
     /// Time covered by the segments, in seconds.
     pub fn duration(&self) -> f64 {
         self.segments.iter().map(|segment| segment.t_end - segment.t_start).sum()
@@ -191,22 +208,22 @@ pub(crate) fn survey_rows<R: Rows>(
     joints: &[String],
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<(Survey, R), LogError> {
-    let head = Steps::of_head(&mut open()?)?;
-    let mut rows = open()?;
-    let mut collector = Collector::new(rows.layout(), head, progress);
-    let mut counts = split(&mut rows, head.longest(), &mut collector)?;
-    let all = collector.all_steps();
-    if !head.holds_for(all) {
-        // The steps of the whole log differ from those of its head: the pass is repeated with them.
-        rows = open()?;
-        collector = Collector::new(rows.layout(), all, progress);
-        counts = split(&mut rows, all.longest(), &mut collector)?;
+    let mut mending = Mending::default();
+    let (mut collector, mut counts, mut rows) = pass(open, &mending, progress)?;
+    if let Some(hold) = collector.held.hold() {
+        // Rows that were written several times look like steps: the pass is repeated with each once.
+        mending.held = hold.rows;
+        (collector, counts, rows) = pass(open, &mending, progress)?;
+    }
+    if let Some(bounds) = collector.zeros.bounds(|place| collector.spikes.median_bend(place)) {
+        (mending.zero_bounds, mending.longest_step) = (bounds, collector.steps.longest());
+        (collector, counts, rows) = pass(open, &mending, progress)?;
     }
     let (mut spikes, mut spike_bounds) = (Vec::new(), Vec::new());
     if let Some(bounds) = collector.spikes.bounds(rows.layout(), SpikeSettings::default()) {
         // Spikes would distort all statistics: the pass is repeated without them.
         let steps = collector.steps;
-        let mut without = WithoutSpikes::new(open()?, bounds.clone());
+        let mut without = WithoutSpikes::new(mending.of(open()?), bounds.clone());
         collector = Collector::new(without.layout(), steps, progress);
         counts = split(&mut without, steps.longest(), &mut collector)?;
         spikes = without.counts(joints);
@@ -219,7 +236,7 @@ pub(crate) fn survey_rows<R: Rows>(
         // Rows without logged torques would bias all parameters towards zero, and copies make them look
         // better known than they are: the pass is repeated without them.
         let steps = collector.steps;
-        let mut without = without(open()?, &spike_bounds, &still, &repeated);
+        let mut without = without(mending.of(open()?), &spike_bounds, &still, &repeated);
         collector = Collector::new(without.layout(), steps, progress);
         counts = split(&mut without, steps.longest(), &mut collector)?;
         let without = without.into_inner().into_inner();
@@ -243,66 +260,32 @@ pub(crate) fn survey_rows<R: Rows>(
         });
     }
     let survey = collector.finish(rows.path(), rows.rows_are(), joints, counts);
-    Ok((Survey { spikes, spike_bounds, still, repeated, ..survey }, rows))
+    mending.zero_rows = rows.counts();
+    let survey = Survey { spikes, spike_bounds, still, repeated, mending, ..survey };
+    Ok((survey, rows.into_inner().into_inner()))
 }
 
-/// Rows without spikes, and without stretches in which torques stand still or that repeat earlier ones.
-pub(crate) fn without<R: Rows>(
-    rows: R,
-    spike_bounds: &[f64],
-    still: &[[f64; 2]],
-    repeated: &[[f64; 2]],
-) -> WithoutStretches<WithoutStretches<WithoutSpikes<R>>> {
-    let bounds = match spike_bounds {
-        [] => vec![f64::INFINITY; rows.layout().width],
-        bounds => bounds.to_vec(),
-    };
-    let without = WithoutSpikes::new(rows, bounds);
-    let without = WithoutStretches::new(without, GapReason::StillTorques, still.to_vec());
-    WithoutStretches::new(without, GapReason::Repeated, repeated.to_vec())
-}
+/// What a pass over all rows gives: what it collected, its totals, and the rows at their end.
+type Pass<'a, R> = (Collector<'a>, RowCounts, Mended<R>);
 
-/// How far apart the stamps are.
-#[derive(Debug, Clone, Copy)]
-struct Steps {
-    median: f64,
-    /// The 99th percentile.
-    high: f64,
-}
-
-/// Steps at the head of a log whose median is exact.
-const HEAD: usize = 1 << 16;
-
-impl Steps {
-    fn of_head(rows: &mut dyn Rows) -> Result<Self, LogError> {
-        let mut values = vec![0.0; rows.layout().width];
-        let mut steps = Vec::new();
-        let mut previous = None;
-        while steps.len() < HEAD {
-            match rows.next(&mut values)? {
-                Row::Sample { .. } => {
-                    // Time that stands still or runs backwards is reported by `split`.
-                    steps.extend(previous.map(|previous| values[0] - previous).filter(|step| *step > 0.0));
-                    previous = Some(values[0]);
-                }
-                Row::Gap { .. } => previous = None,
-                Row::End => break,
-            }
-        }
-        steps.sort_by(f64::total_cmp);
-        let quantile = |p: f64| steps.get((p * steps.len() as f64) as usize).copied().unwrap_or(1.0);
-        Ok(Steps { median: quantile(0.5), high: quantile(0.99) })
+/// A pass over all rows, so mended.
+fn pass<'a, R: Rows>(
+    open: &mut dyn FnMut() -> Result<R, LogError>,
+    mending: &Mending,
+    progress: &'a mut dyn FnMut(u64, u64),
+) -> Result<Pass<'a, R>, LogError> {
+    let head = Steps::of_head(&mut mending.of(open()?))?;
+    let mut rows = mending.of(open()?);
+    let mut collector = Collector::new(rows.layout(), head, progress);
+    let mut counts = split(&mut rows, head.longest(), &mut collector)?;
+    let all = collector.all_steps();
+    if !head.holds_for(all) {
+        // The steps of the whole log differ from those of its head: the pass is repeated with them.
+        rows = mending.of(open()?);
+        collector = Collector::new(rows.layout(), all, collector.progress);
+        counts = split(&mut rows, all.longest(), &mut collector)?;
     }
-
-    /// A lost sample doubles the step, jitter widens it: a split comes above 1.5 medians where stamps are
-    /// even, above 2.5 where they are not.
-    fn longest(self) -> f64 {
-        (1.25 * self.high).clamp(1.5 * self.median, 2.5 * self.median)
-    }
-
-    fn holds_for(self, all: Steps) -> bool {
-        (all.median / self.median - 1.0).abs() < 0.2
-    }
+    Ok((collector, counts, rows))
 }
 
 /// A place is uneven where the stamp is off its neighbours' grid by this share of the period.
@@ -316,6 +299,8 @@ struct Collector<'a> {
     spikes: SpikeFinder,
     still: StillFinder,
     repeated: RepetitionFinder,
+    held: HeldRowFinder,
+    zeros: ZeroRowFinder,
     segments: Vec<Segment>,
     short_segments: u64,
     /// The [`WINDOW`] latest samples of the segment, oldest first, flat.
@@ -343,6 +328,8 @@ impl<'a> Collector<'a> {
             spikes: SpikeFinder::new(layout),
             still: StillFinder::new(layout),
             repeated: RepetitionFinder::new(),
+            held: HeldRowFinder::new(layout),
+            zeros: ZeroRowFinder::new(layout),
             steps,
             segments: Vec::new(),
             short_segments: 0,
@@ -405,6 +392,7 @@ impl<'a> Collector<'a> {
             spike_bounds: Vec::new(),
             still: Vec::new(),
             repeated: Vec::new(),
+            mending: Mending::default(),
             excursions: self.spikes.multiples(SpikeSettings::default()),
             ignored_columns: Vec::new(),
             median_period: self.steps.median,
@@ -435,6 +423,9 @@ impl SegmentSink for Collector<'_> {
         if self.in_segment > 0 {
             self.step(values[0] - self.recent[(WINDOW - 1) * width]);
         }
+        self.held.push(values);
+        let before = &self.recent[(WINDOW - 1) * width..];
+        self.zeros.push((self.in_segment > 0).then_some(before), values);
         self.recent.copy_within(width.., 0);
         self.recent[(WINDOW - 1) * width..].copy_from_slice(values);
         self.in_segment += 1;
@@ -485,6 +476,8 @@ impl SegmentSink for Collector<'_> {
         self.in_segment = 0;
         self.still.end();
         self.repeated.end();
+        self.held.end_segment();
+        self.zeros.end_segment();
         self.joints.iter_mut().for_each(JointCollector::end_segment);
         self.spectrum.end_segment();
         true

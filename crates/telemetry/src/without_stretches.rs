@@ -4,6 +4,7 @@ use crate::LogError;
 use crate::columns::Layout;
 use crate::gap::GapReason;
 use crate::reader::{Row, Rows};
+use crate::segments::RowCounts;
 use std::path::Path;
 
 /// Rows of which some stretches are gaps.
@@ -51,5 +52,9 @@ impl<R: Rows> Rows for WithoutStretches<R> {
 
     fn path(&self) -> &Path {
         self.rows.path()
+    }
+
+    fn account(&self, counts: &mut RowCounts) {
+        self.rows.account(counts);
     }
 }

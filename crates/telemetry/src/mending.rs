@@ -1,0 +1,61 @@
+//! What the survey has found to mend in the rows of a log, and the rows so mended, for all passes that
+//! follow.
+
+use crate::gap::GapReason;
+use crate::reader::Rows;
+use crate::spike::WithoutSpikes;
+use crate::without_held::WithoutHeld;
+use crate::without_stretches::WithoutStretches;
+use crate::zero_rows::{WithoutZeroRows, ZeroRows};
+use serde::{Deserialize, Serialize};
+
+/// Rows that are read once though they were written several times, and zeros that are bridged.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Mending {
+    /// Rows for which each is held; 1 where each is a new one.
+    pub held: usize,
+    /// From where on zeros are none of the signal, by place in a row; empty where there are no such rows.
+    #[serde(with = "crate::any_number::list")]
+    pub zero_bounds: Vec<f64>,
+    /// Longest distance of stamps across which zeros are bridged, for each row of zeros and one more \[s\].
+    #[serde(with = "crate::any_number")]
+    pub longest_step: f64,
+    /// Rows that were bridged.
+    pub zero_rows: ZeroRows,
+}
+
+impl Default for Mending {
+    fn default() -> Self {
+        Mending { held: 1, zero_bounds: Vec::new(), longest_step: 0.0, zero_rows: ZeroRows::default() }
+    }
+}
+
+/// Rows of which a [`Mending`] is made.
+pub(crate) type Mended<R> = WithoutZeroRows<WithoutHeld<R>>;
+
+impl Mending {
+    pub fn is_none(&self) -> bool {
+        self.held == 1 && self.zero_bounds.is_empty()
+    }
+
+    pub fn of<R: Rows>(&self, rows: R) -> Mended<R> {
+        let once = WithoutHeld::new(rows, self.held);
+        WithoutZeroRows::new(once, self.zero_bounds.clone(), self.longest_step)
+    }
+}
+
+/// Rows without spikes, and without stretches in which torques stand still or that repeat earlier ones.
+pub(crate) fn without<R: Rows>(
+    rows: R,
+    spike_bounds: &[f64],
+    still: &[[f64; 2]],
+    repeated: &[[f64; 2]],
+) -> WithoutStretches<WithoutStretches<WithoutSpikes<R>>> {
+    let bounds = match spike_bounds {
+        [] => vec![f64::INFINITY; rows.layout().width],
+        bounds => bounds.to_vec(),
+    };
+    let without = WithoutSpikes::new(rows, bounds);
+    let without = WithoutStretches::new(without, GapReason::StillTorques, still.to_vec());
+    WithoutStretches::new(without, GapReason::Repeated, repeated.to_vec())
+}
