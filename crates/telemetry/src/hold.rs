@@ -15,6 +15,9 @@ const LONGEST: usize = 64;
 const STEPS_OF_A_JUMP: f64 = 1.5;
 /// Fewer runs between jumps than this tell nothing.
 const FEWEST: u64 = 8;
+/// The least share of all runs that lie between jumps: a coarse signal that noise moves changes by one step
+/// nearly always, and its few jumps tell of the noise.
+const LEAST_SHARE: f64 = 0.1;
 /// By how much runs may be shorter than the usual one on the mean over all, as a share of it: what is held
 /// changes at no other time, and a value that is read more often does.
 const SHORTER: f64 = 0.125;
@@ -38,7 +41,7 @@ impl Hold {
     /// nothing tells.
     fn of(between_jumps: &Runs, all: &Runs) -> Option<Self> {
         let count: u64 = between_jumps.iter().sum();
-        if count < FEWEST {
+        if count < FEWEST || (count as f64) < LEAST_SHARE * all.iter().sum::<u64>() as f64 {
             return None;
         }
         let mut below = 0;
@@ -258,6 +261,21 @@ mod tests {
             [in_steps(a, 0.05), in_steps(b, 0.05), c, d]
         };
         check("torques alone are held", held(every(1), commanded), None);
+    }
+
+    /// A torque in coarse steps, moved by noise that remembers: of 8595 changes 109 were no single step, and it
+    /// was said to be held for two rows.
+    #[test]
+    fn a_coarse_torque_that_noise_moves_is_not_held() {
+        let runs = |counts: &[(usize, u64)]| {
+            let mut runs = [0; LONGEST + 1];
+            counts.iter().for_each(|(rows, count)| runs[*rows] = *count);
+            runs
+        };
+        let between_jumps = runs(&[(1, 15), (2, 70), (3, 17), (4, 4), (5, 1)]);
+        let all = runs(&[(1, 4268), (2, 2769), (3, 908), (4, 312), (5, 153), (6, 73), (7, 38), (8, 26)]);
+        assert_eq!(Hold::of(&between_jumps, &all), None);
+        assert_eq!(Hold::of(&between_jumps, &between_jumps).map(|hold| hold.rows), Some(2));
     }
 
     fn check(case: &str, found: Option<usize>, expected: Option<usize>) {
