@@ -263,8 +263,8 @@ mod tests {
         check("torques alone are held", held(every(1), commanded), None);
     }
 
-    /// A torque in coarse steps, moved by noise that remembers: of 8595 changes 109 were no single step, and it
-    /// was said to be held for two rows.
+    /// A torque in coarse steps, moved by noise that remembers: of 8595 changes 109 were no single step, and
+    /// it was said to be held for two rows.
     #[test]
     fn a_coarse_torque_that_noise_moves_is_not_held() {
         let runs = |counts: &[(usize, u64)]| {
