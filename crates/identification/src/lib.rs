@@ -18,6 +18,7 @@ mod factor_rows;
 mod fit;
 mod free_constants;
 pub mod held_joints;
+mod held_out_change;
 mod identify;
 mod jackknife;
 mod kept_blocks;
@@ -60,6 +61,7 @@ pub mod fitting {
     pub use crate::factor_rows::FactorRows;
     pub use crate::fit::{Fit, TorqueError, fit, merge, torque_error, torques_with_enough_rows};
     pub use crate::free_constants::{ByConstant, FreeConstant, free_constants};
+    pub use crate::held_out_change::{HeldOutChange, held_out_change};
     pub use crate::identify::Declared;
     pub use crate::own_torque::{OwnTorqueFit, fit_with_own_torque};
 }

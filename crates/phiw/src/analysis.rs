@@ -6,7 +6,7 @@ use crate::{Error, conventions, extents, fingerprint, possible_bodies, told, war
 use phiw_identification::bandwidth::Bandwidth;
 use phiw_identification::consistent::{Consistent, ConsistentSettings, Ellipsoid, Known, consistent};
 use phiw_identification::effect::JointProperty;
-use phiw_identification::fitting::merge;
+use phiw_identification::fitting::{held_out_change, merge};
 use phiw_identification::model::DataFingerprint;
 use phiw_identification::{Data, EffectCatalogue, EffectSpec, Identified, Model, WithRests};
 use phiw_regressor::RegressorError;
@@ -61,8 +61,13 @@ impl<'a> Analysis<'a> {
             Rows::Reduced { fingerprints, .. } => fingerprints.to_vec(),
         };
         let model = Model::of_fit(design, fit, &session.declared, &session.held, cutoffs)?
-            .with_sources(&session.xml, fingerprints)
-            .with_held_out_rmse(&identified.held_out.rmse);
+            .with_sources(&session.xml, fingerprints);
+        let changed = held_out_change(identified)?;
+        // The error on another robot's motion is no error of this model.
+        let model = match changed.is_empty() {
+            true => model.with_held_out_rmse(&identified.held_out.rmse),
+            false => model,
+        };
         let (known, unknown_extents) = known(session)?;
         let settings = ConsistentSettings { known, ..ConsistentSettings::default() };
         let consistent =
@@ -86,6 +91,7 @@ impl<'a> Analysis<'a> {
         warnings.extend(unknown_extents);
         warnings.extend(possible_bodies::warning(&model, &consistent, fit));
         warnings.extend(warnings::at_rest_where_held_out(session, &at_rest));
+        warnings.extend(warnings::changed_where_held_out(session, &changed));
         Ok(Analysis {
             session,
             identified,

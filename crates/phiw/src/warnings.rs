@@ -3,6 +3,8 @@
 use crate::robot_file;
 use crate::session::Session;
 use phiw_identification::Identified;
+use phiw_identification::fitting::HeldOutChange;
+use phiw_report::number::significant;
 use phiw_telemetry::segments::GapReason;
 use phiw_telemetry::{Payload, Survey};
 use std::path::Path;
@@ -58,6 +60,24 @@ pub fn at_rest_where_held_out(session: &Session, joints: &[usize]) -> Option<Str
             "{} does not move in what is held out ({}): nothing is known of the model's error there; hold out a log in which it moves",
             names.join(", "),
             session.logs.held_out_in_words()
+        )
+    })
+}
+
+/// Joints whose error says that the motion held out is another robot's, or of another kind.
+pub fn changed_where_held_out(session: &Session, changes: &[HeldOutChange]) -> Option<String> {
+    let joint = |change: &HeldOutChange| {
+        let name = &session.tree.joint(change.row).joint;
+        format!("{name} {} times", significant(change.ratio, 2))
+    };
+    let joints: Vec<String> = changes.iter().map(joint).collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "what is held out ({}) is of another robot than the training logs (a tool, a repair, another zero), or of \
+             motion unlike theirs (much faster): its error is many times what training motion lets expect ({}); to \
+             see what changed, hold the model on it: phiw explain --model model.json --train LOG",
+            session.logs.held_out_in_words(),
+            joints.join(", ")
         )
     })
 }
