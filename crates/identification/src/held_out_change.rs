@@ -16,8 +16,8 @@ pub struct HeldOutChange {
 /// From which ratio on a torque's error is not what training motion lets expect.
 ///
 /// A quadruped's logs reach 4.5. Of 119 development cases of the suites of `cargo xtask undeclared`, each
-/// through `phiw identify`, three are beyond, all of which were trained slow and held out fast. A tool of half
-/// the mass of an arm's last two links gives 20 to 90, one of a fiftieth of it stays below.
+/// through `phiw identify`, three are beyond, all of which were trained slow and held out fast. A tool of
+/// half the mass of an arm's last two links gives 20 to 90, one of a fiftieth of it stays below.
 const LEAST_RATIO: f64 = 6.0;
 /// Standard deviations of the parameters whose error is expected.
 const EXPECTED_DEVIATIONS: f64 = 2.0;
