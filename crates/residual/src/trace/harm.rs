@@ -17,7 +17,7 @@ pub(super) enum Harm {
 
 impl Search<'_> {
     /// The places of the effects, ascending, that do harm: the worst, the worst of what is left without it,
-    /// and so on. What others are forms of stays.
+    /// and so on. What others are forms of stays, and what another's columns are made of.
     ///
     /// Errors count by their logarithms; while that of all torques together is larger than `harm` allows, by
     /// their squares.
@@ -43,7 +43,11 @@ impl Search<'_> {
                 _ => foretelling.squares(),
             };
             let found = trial.members.par_iter().zip(&trial.places).filter(|(member, place)| {
-                **place >= self.declared && !trial.is_required(member) && !left_out.contains(place)
+                let is_in = |other: usize| !left_out.contains(&other);
+                **place >= self.declared
+                    && is_in(**place)
+                    && !trial.is_required(member)
+                    && !trial.is_material_of_another(member, is_in)
             });
             let without = found.map(|(&member, &place)| {
                 let squares = squares_without(member);

@@ -65,6 +65,18 @@ impl Trial {
         self.members.iter().any(|other| requires(other).contains(&member.hypothesis))
     }
 
+    /// Whether the columns of another effect among those of `is_in` are made of the model's torque, with what
+    /// this one adds to it: as long as that stays, it would do the work of whatever leaves.
+    pub fn is_material_of_another(&self, member: &Member, is_in: impl Fn(usize) -> bool) -> bool {
+        let own = &self.problem.hypotheses[member.hypothesis];
+        let others = self.members.iter().zip(&self.places).filter(|(other, _)| *other != member);
+        others.filter(|(_, place)| is_in(**place)).any(|(other, _)| {
+            let other = &self.problem.hypotheses[other.hypothesis];
+            let shares_torque = || own.torques.iter().any(|torque| other.torques.contains(torque));
+            other.made_of_model && !other.declared && !own.made_of_model && shares_torque()
+        })
+    }
+
     /// What the logarithms of the foretold errors gain: Σ rows·log(without/with).
     pub fn gain(&self, without: &[f64], with: &[f64]) -> f64 {
         let of_torque = |torque: usize| self.torque(torque).rows() * (without[torque] / with[torque]).ln();

@@ -1,0 +1,66 @@
+//! `explain` on logs of real robots, where they lie beside the project.
+
+use phiw::arguments::{ExplainArguments, SessionArguments};
+use phiw::console::Console;
+use std::path::{Path, PathBuf};
+
+/// Path of a robot's logs; nothing, with a message, where they are absent.
+fn logs_of(robot: &str) -> Option<PathBuf> {
+    let logs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/logs").join(robot);
+    if logs.exists() {
+        return Some(logs);
+    }
+    println!("skipped: ../shared/data/logs/{robot} is absent");
+    None
+}
+
+/// The files of a folder whose names begin so, in order.
+fn files(folder: &Path, prefix: &str) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let begins = |path: &PathBuf| {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        name.starts_with(prefix) && name.ends_with(".csv")
+    };
+    let mut files: Vec<PathBuf> = entries.filter(begins).collect();
+    files.sort();
+    files
+}
+
+/// From viscous and Coulomb friction, an offset and rotor inertia EMPS ended where it began: 4.1 % held out and
+/// "no effect accounts for it", against 2.6 % from less. A gain, whose column is made of the model's torque,
+/// did the work of the asymmetric friction; that left as harmful, and then the gain did no good either.
+#[test]
+fn real_robots_end_the_same_whatever_was_declared() {
+    for (robot, urdf) in [("emps", "emps.urdf"), ("tx40", "tx40.urdf"), ("xl330", "robot.urdf")] {
+        let Some(logs) = logs_of(robot) else { continue };
+        let declared: [&[&str]; 3] = [
+            &[],
+            &["viscous_friction", "coulomb_friction"],
+            &["viscous_friction", "coulomb_friction", "torque_offset", "rotor_inertia"],
+        ];
+        let errors = declared.map(|declared| {
+            let out = tempfile::tempdir().unwrap();
+            let session = SessionArguments {
+                urdf: logs.join(urdf),
+                train: files(&logs, "train"),
+                validate: files(&logs, "validate"),
+                declare: declared.iter().map(|&kind| kind.to_owned()).collect(),
+                out: out.path().to_path_buf(),
+                quiet: true,
+                ..SessionArguments::default()
+            };
+            let arguments = ExplainArguments {
+                session,
+                model: None,
+                draws: 0,
+                exclude: Vec::new(),
+                false_name_rate: None,
+                threshold: Vec::new(),
+            };
+            let report = phiw::explain::explain(&arguments, &Console::silent()).unwrap().report;
+            report.after.validate.relative.unwrap()
+        });
+        let best = errors.into_iter().fold(f64::INFINITY, f64::min);
+        assert!(errors.iter().all(|error| *error < 1.05 * best), "{robot}: {errors:?}");
+    }
+}
