@@ -38,6 +38,8 @@ enum Task {
     Oracle(oracle::Arguments),
     /// What it costs that identified bodies can exist, on real logs.
     Consistent(consistent::Arguments),
+    /// What is said of logs that count joints otherwise than the URDF: signs, exchanges, units, mountings.
+    Conventions(conventions::Arguments),
     /// How often 95 % intervals of parameters and bands of torques hold the truth, on synthetic logs.
     Coverage(coverage::Arguments),
     /// Robot logs with effects that nobody declared: generate, trace with `phiw explain`, score.
@@ -70,6 +72,7 @@ fn main() -> anyhow::Result<ExitCode> {
         Task::Plant(arguments) => plant::command(&arguments),
         Task::Fleet(arguments) => fleet::command(&arguments),
         Task::Consistent(arguments) => consistent::command(&arguments),
+        Task::Conventions(arguments) => conventions::command(&arguments),
         Task::Coverage(arguments) => coverage::command(&arguments),
         Task::Undeclared(arguments) => undeclared::command(&arguments),
     };

@@ -15,6 +15,7 @@
 //! | [`retarget`] | how fast and how close is retargeting, over whole databases and against others? |
 //! | [`oracle`] | do dynamics, C3D reader and exported files agree with Pinocchio, ezc3d and MuJoCo? |
 //! | [`consistent`] | what does it cost that identified bodies can exist? |
+//! | [`conventions`] | are signs, units and mountings told that differ between a log and its URDF? |
 //! | [`coverage`] | how often do 95 % intervals and bands hold the truth? |
 //! | [`fleet`] | do logs that are reduced apart give the files of one process, and what is gained? |
 //! | [`synthetic_log`] | does memory grow with the length of a log? It makes the log. |
@@ -22,6 +23,7 @@
 //! Unlike the library crates, experiments print, and write where they are told.
 
 pub mod consistent;
+pub mod conventions;
 pub mod coverage;
 pub mod environment;
 pub mod fleet;

@@ -1,6 +1,8 @@
 //! Whether logs and a robot fit each other, before anything is computed.
 
-pub use crate::conventions::{Convention, ConventionKind, ConventionSettings, conventions};
+pub use crate::conventions::{
+    Convention, ConventionKind, ConventionSettings, UnknownConventionSetting, conventions,
+};
 pub use crate::robot_findings::robot_findings;
 
 use crate::{Design, Effect};

@@ -107,8 +107,8 @@ pub struct Arguments {
     /// Give one of the tracer's thresholds these values one after the other, and print what each value does
     /// to right models and to missing effects (wide suites). With `false_name_probability` that is the rate
     /// of false names, asked and observed.
-    #[arg(long, value_name = "NAME=VALUE,VALUE…", value_parser = values_of_a_threshold)]
-    threshold: Option<ThresholdValues>,
+    #[arg(long, value_name = "NAME=VALUE,VALUE…", value_parser = named_values)]
+    threshold: Option<NamedValues>,
     /// Only cases with this effect among their secrets.
     #[arg(long)]
     kind: Option<Kind>,
@@ -144,18 +144,18 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-/// A threshold by its name, and the values that are tried.
+/// A number that decides by its name, and the values that are tried.
 #[derive(Clone, Debug)]
-struct ThresholdValues {
-    name: String,
-    values: Vec<f64>,
+pub(crate) struct NamedValues {
+    pub name: String,
+    pub values: Vec<f64>,
 }
 
-fn values_of_a_threshold(text: &str) -> Result<ThresholdValues, String> {
+pub(crate) fn named_values(text: &str) -> Result<NamedValues, String> {
     let (name, values) = text.split_once('=').ok_or("write NAME=VALUE,VALUE…")?;
     let values: Result<Vec<f64>, _> = values.split(',').map(str::parse).collect();
     let values = values.map_err(|error| format!("{text}: {error}"))?;
-    Ok(ThresholdValues { name: name.to_owned(), values })
+    Ok(NamedValues { name: name.to_owned(), values })
 }
 
 /// A choice of suites.
@@ -198,7 +198,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<()> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from).div_ceil(arguments.jobs.max(1));
     let mut tracer = tracer::Tracer::find(arguments.phiw.as_deref(), threads)?;
     for seeds in seeds {
-        let Some(ThresholdValues { name, values }) = &arguments.threshold else {
+        let Some(NamedValues { name, values }) = &arguments.threshold else {
             run_and_report(arguments, seeds, &robots, &tracer)?;
             continue;
         };
@@ -257,6 +257,28 @@ fn generate(specs: &[Spec], robots: &[robot::Robot], folder: &std::path::Path) -
         println!("{}", std::fs::read_to_string(folder.join(format!("{}.truth.json", only.seed)))?);
     }
     Ok(())
+}
+
+/// Writes the first right models of the developing seeds, each into a folder of its own, and says their seeds
+/// and these folders.
+///
+/// # Errors
+/// A case cannot be drawn or written.
+pub(crate) fn write_right_models(
+    count: usize,
+    folder: &std::path::Path,
+) -> anyhow::Result<Vec<(u64, PathBuf)>> {
+    let robots = robot::robots()?;
+    let seeds = (0..count).map(|index| Suite::WideRight.seed(Seeds::Dev, index));
+    let write = |seed: u64| {
+        let no_case = || format!("no robot can have case {seed}");
+        let spec = Spec::of_seed(seed, robots.len()).with_context(no_case)?;
+        let case = case::Case::draw(&spec, &robots).with_context(no_case)?;
+        let own = folder.join(seed.to_string());
+        write::write_visible(&case, &own)?;
+        Ok((seed, own))
+    };
+    seeds.map(write).collect()
 }
 
 fn specs(arguments: &Arguments, seeds: Seeds, robots: &[robot::Robot]) -> anyhow::Result<Vec<Spec>> {

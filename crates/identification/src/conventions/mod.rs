@@ -10,8 +10,10 @@ mod reading;
 mod rough_fit;
 mod samples;
 mod scales;
+mod settings;
 
 pub use reading::ConventionKind;
+pub use settings::{ConventionSettings, UnknownConventionSetting};
 
 use crate::IdentificationError;
 use crate::identify::Data;
@@ -21,28 +23,6 @@ use rayon::prelude::*;
 use reading::{Reading, alternatives};
 use rough_fit::{Left, left};
 use samples::Samples;
-
-/// How a log is read otherwise.
-///
-/// At the default gain nothing is said of 45 right models, 62 with missing effects and six real robots
-/// (`cargo xtask undeclared --suite SUITE --seeds dev --generate DIR`, each through `phiw identify`). They
-/// reached 0.51 while it was chosen; what the tests change in a log gave 2 and more.
-#[derive(Clone, Copy, Debug)]
-pub struct ConventionSettings {
-    /// Rows for each unknown number.
-    pub rows_per_unknown: usize,
-    /// What must be left of some torque (RMS, a share of it) for the log to be read otherwise.
-    pub least_left: f64,
-    /// By how much the sum of the logarithms of what is left of the torques (RMS) must fall for each
-    /// difference. A direction of gravity counts for two, units of all torques for as many as joints but one.
-    pub least_gain: f64,
-}
-
-impl Default for ConventionSettings {
-    fn default() -> Self {
-        ConventionSettings { rows_per_unknown: 12, least_left: 0.05, least_gain: 1.0 }
-    }
-}
 
 /// A difference between a log and the URDF.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,6 +39,7 @@ pub struct Convention {
 
 /// A log's samples, to be read in one way or another.
 struct Log<'a> {
+    settings: &'a ConventionSettings,
     tree: &'a Tree,
     base: BaseParameters,
     samples: Samples,
@@ -109,11 +90,12 @@ pub fn conventions(
     }
     let base = BaseParameters::of_tree(&mounting::askew(tree), BaseParametersOptions::default())?;
     let unknowns = base.count() + 5 * joints;
-    let samples = Samples::of(data, joints, settings.rows_per_unknown * unknowns / joints)?;
+    let rows = settings.rows_per_unknown * unknowns as f64 / joints as f64;
+    let samples = Samples::of(data, joints, rows as usize)?;
     if samples.len() * joints < 3 * unknowns {
         return Ok(Vec::new());
     }
-    let log = Log { tree, base, samples };
+    let log = Log { settings, tree, base, samples };
     let mut reading = Reading::as_named(tree);
     let mut present = log.left_if(&reading)?;
     let mean = |left: &Left| (left.total() / joints as f64).exp();
@@ -156,5 +138,5 @@ pub fn conventions(
         let kind = ConventionKind::AllTorqueScales(scale);
         found.push(Convention { kind, joints: Vec::new(), left_as_named, left: mean(&present) });
     }
-    Ok(found)
+    Ok(scales::merged(found, joints, settings))
 }

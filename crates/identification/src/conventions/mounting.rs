@@ -6,8 +6,6 @@ use crate::IdentificationError;
 use phiw_dynamics::Tree;
 use rayon::prelude::*;
 
-/// From this angle on a base is mounted otherwise \[rad\]; below it is not level, which is an effect.
-const LEAST_ANGLE: f64 = 0.35;
 /// The first step along the sphere of directions, and the last \[rad\].
 const STEPS: (f64, f64) = (0.3, 0.005);
 
@@ -32,7 +30,8 @@ pub(super) fn mounted(log: &Log<'_>, reading: &Reading) -> Result<Option<Candida
         )
     };
     let Some(present) = unit(reading.gravity) else { return Ok(None) };
-    let first = directions().into_iter().filter(|downward| angle(*downward, present) > LEAST_ANGLE);
+    let first =
+        directions().into_iter().filter(|downward| angle(*downward, present) > log.settings.least_angle);
     let Some((mut downward, mut best)) = tried(first.collect())? else { return Ok(None) };
     let mut step = STEPS.0;
     while step > STEPS.1 {
@@ -49,7 +48,7 @@ pub(super) fn mounted(log: &Log<'_>, reading: &Reading) -> Result<Option<Candida
             _ => step /= 2.0,
         }
     }
-    Ok(Some(best).filter(|_| angle(downward, present) > LEAST_ANGLE))
+    Ok(Some(best).filter(|_| angle(downward, present) > log.settings.least_angle))
 }
 
 /// The directions of a cube's faces, edges and corners.

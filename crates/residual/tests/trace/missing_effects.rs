@@ -1,0 +1,252 @@
+//! Effects that the declared model lacks.
+
+use super::robot::{DECLARED, State, URDF, check, folds, named, record, traced, traced_on, traced_robot};
+use phiw_dynamics::random_tree::RandomNumbers;
+use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+use phiw_effects::Catalogue;
+use phiw_identification::fitting::accumulate;
+use phiw_identification::{Design, EffectCatalogue, EffectSpec, Fold};
+use phiw_regressor::BaseParameters;
+use phiw_residual::trace::Verdict;
+use phiw_telemetry::{Conditioning, ConditioningOptions};
+use std::cell::RefCell;
+
+#[test]
+fn a_right_model_is_sufficient() {
+    for seed in 1..=3 {
+        let tracing = traced(seed, &|_, _| ());
+        assert_eq!((named(&tracing), tracing.verdict), (vec![], Verdict::Sufficient), "seed {seed}");
+    }
+}
+
+#[test]
+fn an_offset_is_named() {
+    check(|_, torque| torque[0] += 0.7, &[("torque_offset", &["shoulder"])]);
+}
+
+#[test]
+fn stribeck_friction_is_named() {
+    let stribeck = |state: &State<'_>, torque: &mut [f64]| {
+        torque[1] += (-(state.qd[1] / 0.4).powi(2)).exp() * (state.qd[1] / 0.01).tanh();
+    };
+    check(stribeck, &[("stribeck_friction", &["elbow"])]);
+}
+
+/// Right models whose friction turned as an arctangent does were given a Stribeck friction: how slowly a sign
+/// turns is no effect of its own.
+#[test]
+fn a_sign_that_turns_slowly_is_no_stribeck_friction() {
+    let secret = |state: &State<'_>, torque: &mut [f64]| {
+        for (torque, velocity) in torque.iter_mut().zip(state.qd) {
+            let slow = (velocity / 0.04).atan() * std::f64::consts::FRAC_2_PI;
+            *torque += 3.0 * slow - 0.6 * (velocity / 0.01).tanh();
+        }
+    };
+    let tracing = traced(31, &secret);
+    assert!(named(&tracing).is_empty(), "{:?}", named(&tracing));
+    assert_eq!(tracing.verdict, Verdict::Sufficient);
+    let powers: Vec<Option<&f64>> = tracing
+        .specs
+        .iter()
+        .filter(|spec| spec.kind == "coulomb_friction")
+        .map(|spec| spec.constants.get("sign_power"))
+        .collect();
+    assert_eq!(powers, [Some(&1.0), Some(&1.0)]);
+}
+
+#[test]
+fn a_ripple_is_named_with_its_frequency() {
+    let ripple = |state: &State<'_>, torque: &mut [f64]| torque[0] += 0.4 * (9.0 * state.q[0] + 0.3).sin();
+    check(ripple, &[("torque_ripple", &["shoulder"])]);
+    let tracing = traced(11, &ripple);
+    assert!((tracing.effects[0].spec.constants["periods"] - 9.0).abs() < 0.05);
+}
+
+#[test]
+fn a_shared_transmission_is_named_with_both_joints() {
+    let shared = |state: &State<'_>, torque: &mut [f64]| {
+        let sum = state.qd[0] + state.qd[1];
+        torque.iter_mut().for_each(|torque| *torque += 0.3 * sum + 0.2 * (sum / 0.02).tanh());
+    };
+    check(shared, &[("transmission_coupling", &["shoulder", "elbow"])]);
+}
+
+/// Two bumps of the angle are neither a spring nor a ripple, nor both of them.
+#[test]
+fn a_cable_that_catches_is_a_position_map() {
+    let bump = |q: f64, center: f64, width: f64| (-0.5 * ((q - center) / width).powi(2)).exp();
+    check(
+        |state, torque| torque[1] += 1.2 * bump(state.q[1], -0.4, 0.2) - 0.9 * bump(state.q[1], 0.5, 0.25),
+        &[("position_map", &["elbow"])],
+    );
+}
+
+/// A stop that stiffens was named a map of the position, which follows it more closely with 24 numbers than
+/// the catalogue's stop does with three.
+#[test]
+fn a_stop_that_stiffens_is_a_stop_and_no_map() {
+    let tracing = traced(11, &|state, torque| {
+        torque[1] += 1.5 * ((state.q[1] - 0.9) / 0.3).max(0.0).powf(1.3);
+    });
+    assert_eq!(named(&tracing), [("end_stop".to_owned(), vec!["elbow".to_owned()])]);
+}
+
+/// Friction of the load is the same both ways.
+#[test]
+fn a_drive_that_is_harder_to_drive_back_has_an_efficiency_by_the_direction_of_power() {
+    check(
+        |state, torque| {
+            let speed = state.qd[0];
+            let load = torque[0] - 0.4 * speed - 0.6 * (speed / 0.01).tanh();
+            torque[0] += if load * speed > 0.0 { load / 0.95 - load } else { 0.5 * load - load };
+        },
+        &[("drive_efficiency", &["shoulder"])],
+    );
+}
+
+#[test]
+fn two_secrets_are_both_named() {
+    let both = |state: &State<'_>, torque: &mut [f64]| {
+        torque[0] += 0.15 * state.qd[0] * state.qd[0].abs();
+        torque[1] += 1.1 * (state.q[1] - 0.4);
+    };
+    check(both, &[("joint_spring", &["elbow"]), ("quadratic_friction", &["shoulder"])]);
+}
+
+#[test]
+fn what_is_not_in_the_catalogue_is_not_explained() {
+    // A disturbance that has nothing to do with the motion.
+    let tracing = traced(11, &|state, torque| torque[1] += 0.6 * (9.7 * state.t).sin());
+    assert!(
+        matches!(tracing.verdict, Verdict::Unexplained | Verdict::PartlyExplained),
+        "{:?}",
+        named(&tracing)
+    );
+    assert_eq!(tracing.remaining.joints, ["elbow"]);
+}
+
+/// Bootstrap draws of the training folds: other motion must not lead to another name, nor to one name more.
+#[test]
+fn names_are_the_same_on_bootstrap_draws_of_the_training_folds() {
+    let both = |state: &State<'_>, torque: &mut [f64]| {
+        torque[0] += 0.15 * state.qd[0] * state.qd[0].abs();
+        torque[1] += 1.1 * (state.q[1] - 0.4);
+    };
+    let (train, _) = folds();
+    let expected = named(&traced(11, &both));
+    let mut random = RandomNumbers::new(5);
+    for draw in 0..10 {
+        let pick = |_: &Fold| train[(random.uniform(0.0, train.len() as f64) as usize).min(train.len() - 1)];
+        let drawn: Vec<Fold> = train.iter().map(pick).collect();
+        assert_eq!(named(&traced_on(drawn, &DECLARED, 11, &both, false)), expected, "draw {draw}");
+    }
+}
+
+/// A candidate of which the motion leaves nothing is listed, not left out in silence: the base of a free
+/// rigid body takes up any payload's column of the shoulder's rotor.
+#[test]
+fn what_the_logs_cannot_tell_is_listed() {
+    let tracing = traced(1, &|_, _| ());
+    let unidentifiable: Vec<(&str, &[String])> = tracing
+        .remaining
+        .unidentifiable
+        .iter()
+        .map(|spec| (spec.kind.as_str(), spec.joints.as_slice()))
+        .collect();
+    assert!(unidentifiable.contains(&("rotor_inertia", &["shoulder".to_owned()])), "{unidentifiable:?}");
+}
+
+/// The column of a gain is all torque that the model knows of, an effect found before it included. On a joint
+/// whose rigid body shares no parameter with another that column once did the effect's work in its place, as
+/// a rival of probability 1.
+#[test]
+fn a_gain_is_no_rival_of_an_effect_that_it_contains() {
+    let lift = URDF.replace(
+        "<joint name=\"elbow\" type=\"revolute\"><parent link=\"upper\"/><child link=\"lower\"/><origin xyz=\"0.4 0 0\"/><axis xyz=\"0 1 0\"/>",
+        "<joint name=\"elbow\" type=\"prismatic\"><parent link=\"upper\"/><child link=\"lower\"/><origin xyz=\"0.4 0 0\"/><axis xyz=\"0 1 0\"/>",
+    );
+    assert_ne!(lift, URDF);
+    let warming =
+        |state: &State<'_>, torque: &mut [f64]| torque[1] += 1.5 * (-state.t / 15.0).exp() * state.qd[1];
+    let tracing = traced_robot(&lift, folds().0, &DECLARED, 11, &warming, false);
+    assert_eq!(named(&tracing), [("thermal_drift".to_owned(), vec!["elbow".to_owned()])]);
+    let rivals: Vec<&str> = tracing.effects[0].rivals.iter().map(|rival| rival.spec.kind.as_str()).collect();
+    assert!(!rivals.contains(&"torque_gain"), "{rivals:?}");
+}
+
+/// A candidate whose columns were not finite ended the whole trace: a Stribeck velocity of zero, where steps
+/// of the encoder hide the speed.
+#[test]
+fn a_candidate_that_cannot_be_judged_does_not_end_the_trace() {
+    let tree = read_urdf(URDF, &UrdfOptions::default()).unwrap().tree;
+    let log = record(&tree, 3, &|_, _| ());
+    let surveys = [log.survey().unwrap()];
+    let conditioning = Conditioning::choose(&surveys, &ConditioningOptions::default()).unwrap();
+    let blocks = log.blocks(&conditioning).unwrap();
+    let base = BaseParameters::of_tree(&tree, Default::default()).unwrap();
+    let spec = EffectSpec {
+        kind: "stribeck_friction".to_owned(),
+        joints: vec!["elbow".to_owned()],
+        constants: [
+            ("stribeck_velocity".to_owned(), f64::NAN),
+            ("exponent".to_owned(), 2.0),
+            ("sign_width".to_owned(), 0.0),
+        ]
+        .into(),
+    };
+    let design = || {
+        let effect = Catalogue::default().build(&spec, &tree).unwrap();
+        Design::new(tree.clone(), base.clone(), vec![effect])
+    };
+    let (train, _) = folds();
+    assert!(
+        accumulate(&design(), &train, &[&blocks]).is_err(),
+        "the columns are finite: this test tests nothing"
+    );
+    let design = design().with_candidates_from(0);
+    accumulate(&design, &train, &[&blocks]).unwrap();
+    assert_eq!(design.not_finite(), [0]);
+}
+
+/// One joint at a time, the friction of all joints came out one by one, and beside those that were not in yet
+/// it was taken for other kinds.
+#[test]
+fn friction_of_all_joints_is_found_with_nothing_declared() {
+    let tracing = traced_on(folds().0, &[], 11, &|_, _| (), false);
+    let expected: Vec<(String, Vec<String>)> = ["coulomb_friction", "viscous_friction"]
+        .iter()
+        .flat_map(|kind| ["elbow", "shoulder"].map(|joint| ((*kind).to_owned(), vec![joint.to_owned()])))
+        .collect();
+    assert_eq!(named(&tracing), expected, "{:?}", tracing.verdict);
+    assert!(tracing.model.held_out.relative < 0.1 * tracing.before.1.relative);
+}
+
+/// A friction that falls with the speed makes up for a viscous friction that rises with it: judged without
+/// the former, the latter was none.
+#[test]
+fn a_viscous_friction_is_named_beside_the_stribeck_friction_that_hides_it() {
+    let secret = |state: &State<'_>, torque: &mut [f64]| {
+        let v = state.qd[1];
+        torque[1] += 3.0 * (-(v / 1.2).powi(2)).exp() * (v / 0.01).tanh();
+    };
+    let tracing = traced_on(folds().0, &[], 11, &secret, false);
+    let named = named(&tracing);
+    for kind in ["viscous_friction", "coulomb_friction", "stribeck_friction"] {
+        assert!(named.contains(&(kind.to_owned(), vec!["elbow".to_owned()])), "{kind}: {named:?}");
+    }
+}
+
+/// The error of all joints together is the shoulder's noise, of which the elbow's ripple is a thousandth:
+/// that it hardly falls, or grows a little, is no reason to leave the ripple out.
+#[test]
+fn an_effect_is_not_hidden_by_the_noise_of_another_joint() {
+    for seed in 1..=6 {
+        let random = RefCell::new(RandomNumbers::new(seed));
+        let secret = |state: &State<'_>, torque: &mut [f64]| {
+            torque[0] += random.borrow_mut().uniform(-60.0, 60.0);
+            torque[1] += 0.1 * (12.0 * state.q[1]).sin();
+        };
+        let tracing = traced(seed, &secret);
+        assert_eq!(named(&tracing), [("torque_ripple".to_owned(), vec!["elbow".to_owned()])], "{seed}");
+    }
+}

@@ -1,0 +1,77 @@
+//! What is noise, and what is structure that no effect accounts for.
+
+use super::robot::{RATE, State, named, traced};
+use phiw_dynamics::random_tree::RandomNumbers;
+use phiw_residual::trace::Verdict;
+use std::cell::RefCell;
+
+/// What swings once a second has no correlation over a quarter of a second, and is no noise for that.
+#[test]
+fn a_residual_that_swings_once_a_second_has_structure() {
+    let one_hertz = |state: &State<'_>, torque: &mut [f64]| {
+        torque[1] += 0.15 * (std::f64::consts::TAU * state.t).sin();
+    };
+    let tracing = traced(11, &one_hertz);
+    assert!(
+        matches!(tracing.verdict, Verdict::Unexplained | Verdict::PartlyExplained),
+        "{:?} {:?}",
+        tracing.verdict,
+        named(&tracing)
+    );
+}
+
+/// Torque noise of 0.3 N·m that is correlated over 30 ms.
+fn coloured_noise() -> impl Fn(&mut [f64]) {
+    let state = RefCell::new((RandomNumbers::new(5), [0.0_f64; 2]));
+    move |torque| {
+        let (random, noise) = &mut *state.borrow_mut();
+        let kept = (-1.0 / (0.03 * RATE)).exp();
+        for (torque, noise) in torque.iter_mut().zip(noise) {
+            let normal = (0..12).map(|_| random.uniform(0.0, 1.0)).sum::<f64>() - 6.0;
+            *noise = kept * *noise + (1.0 - kept * kept).sqrt() * normal;
+            *torque += 0.3 * *noise;
+        }
+    }
+}
+
+/// The floor knows nothing of a noise's colour, and such noise stands far above it. It does not follow the
+/// motion.
+#[test]
+fn coloured_noise_is_no_structure() {
+    let noise = coloured_noise();
+    let tracing = traced(11, &|_, torque| noise(torque));
+    assert_eq!(tracing.verdict, Verdict::Sufficient, "{:?}", tracing.remaining.depends_on);
+}
+
+/// A spring of the joint itself takes a part of it; what that leaves is smaller than the noise, and was once
+/// taken for noise.
+#[test]
+fn a_spring_to_the_neighbour_under_coloured_noise_is_not_explained() {
+    let noise = coloured_noise();
+    let spring = |state: &State<'_>, torque: &mut [f64]| {
+        noise(torque);
+        torque[1] += 0.8 * state.q[1] + 0.4 * state.q[0];
+    };
+    let tracing = traced(11, &spring);
+    assert_ne!(tracing.verdict, Verdict::Explained, "{:?}", named(&tracing));
+    assert_ne!(tracing.verdict, Verdict::Sufficient);
+    let follows = &tracing.remaining.depends_on;
+    assert!(follows.iter().any(|follows| follows.signal == "q.shoulder"), "{follows:?}");
+}
+
+/// Its sign changes with every reversal: over tenths of a second it looks like noise.
+#[test]
+fn friction_that_comes_and_goes_around_the_turn_is_not_sufficient() {
+    let noise = coloured_noise();
+    let friction = |state: &State<'_>, torque: &mut [f64]| {
+        noise(torque);
+        torque[1] += 0.5 * (9.0 * state.q[1]).sin() * (state.qd[1] / 0.01).tanh();
+    };
+    let tracing = traced(11, &friction);
+    assert!(
+        matches!(tracing.verdict, Verdict::Unexplained | Verdict::PartlyExplained),
+        "{:?} {:?}",
+        tracing.verdict,
+        named(&tracing)
+    );
+}
