@@ -26,9 +26,9 @@ fn files(folder: &Path, prefix: &str) -> Vec<PathBuf> {
     files
 }
 
-/// From viscous and Coulomb friction, an offset and rotor inertia EMPS ended where it began: 4.1 % held out and
-/// "no effect accounts for it", against 2.6 % from less. A gain, whose column is made of the model's torque,
-/// did the work of the asymmetric friction; that left as harmful, and then the gain did no good either.
+/// From viscous and Coulomb friction, an offset and rotor inertia EMPS ended where it began: 4.1 % held out
+/// and "no effect accounts for it", against 2.6 % from less. A gain, whose column is made of the model's
+/// torque, did the work of the asymmetric friction; that left as harmful, and then the gain did no good.
 #[test]
 fn real_robots_end_the_same_whatever_was_declared() {
     for (robot, urdf) in [("emps", "emps.urdf"), ("tx40", "tx40.urdf"), ("xl330", "robot.urdf")] {

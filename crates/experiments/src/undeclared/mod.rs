@@ -259,17 +259,17 @@ fn generate(specs: &[Spec], robots: &[robot::Robot], folder: &std::path::Path) -
     Ok(())
 }
 
-/// Writes the first right models of the developing seeds, each into a folder of its own, and says their seeds
-/// and these folders.
+/// Writes right models of the developing seeds, by their numbers from 0 on, each into a folder of its own,
+/// and says their seeds and these folders.
 ///
 /// # Errors
 /// A case cannot be drawn or written.
 pub(crate) fn write_right_models(
-    count: usize,
+    numbers: std::ops::Range<usize>,
     folder: &std::path::Path,
 ) -> anyhow::Result<Vec<(u64, PathBuf)>> {
     let robots = robot::robots()?;
-    let seeds = (0..count).map(|index| Suite::WideRight.seed(Seeds::Dev, index));
+    let seeds = numbers.map(|index| Suite::WideRight.seed(Seeds::Dev, index));
     let write = |seed: u64| {
         let no_case = || format!("no robot can have case {seed}");
         let spec = Spec::of_seed(seed, robots.len()).with_context(no_case)?;
