@@ -4,7 +4,7 @@ use crate::Error;
 use crate::analysis::Analysis;
 use crate::arguments::Backend;
 use crate::page::counted;
-use crate::simulate::{Reproduction, Subject, longest_windows, picture, travel, worse};
+use crate::simulate::{Reproduction, Simulated, Subject, longest_windows, picture, travel, worse};
 use phiw_identification::{BlockSource, LogSet};
 use phiw_report::json::{GrowthJson, ReproductionJson};
 use phiw_report::number::percent;
@@ -74,8 +74,8 @@ impl HeldOutReproduction {
     pub fn json(&self) -> Option<ReproductionJson> {
         let reproduction = self.0.as_ref().ok()?;
         let told = reproduction.told();
-        let growth = |identified| {
-            reproduction.growth(identified, false).map(|growth| GrowthJson {
+        let growth = |model| {
+            reproduction.growth(model, false).map(|growth| GrowthJson {
                 share_of_travel: told.iter().map(|&(_, place)| growth.share_of_travel[place]).collect(),
                 lost: told.iter().map(|&(_, place)| growth.lost[place]).collect(),
             })
@@ -84,8 +84,8 @@ impl HeldOutReproduction {
             windows: reproduction.windows,
             window_s: reproduction.window_s,
             horizon_s: told.iter().map(|(horizon, _)| *horizon).collect(),
-            identified: growth(true),
-            nominal: growth(false),
+            identified: growth(Simulated::Identified),
+            nominal: growth(Simulated::Nominal),
             not_simulated: reproduction.left_out.clone(),
             nominal_refused: reproduction.nominal_refused.clone(),
         })
@@ -94,14 +94,18 @@ impl HeldOutReproduction {
     /// The errors against the horizon, with what is to be said of them.
     pub fn pictures(&self) -> Vec<Picture> {
         let Ok(reproduction) = &self.0 else { return Vec::new() };
-        let at = |identified: bool, place: usize| {
-            let growth = reproduction.growth(identified, false);
+        let at = |model: Simulated, place: usize| {
+            let growth = reproduction.growth(model, false);
             growth.map_or("not possible".to_owned(), |growth| {
                 format!("{} %", percent(growth.share_of_travel[place]))
             })
         };
         let told = reproduction.told().into_iter().map(|(horizon, place)| {
-            format!("after {horizon} s {} (URDF: {})", at(true, place), at(false, place))
+            format!(
+                "after {horizon} s {} (URDF: {})",
+                at(Simulated::Identified, place),
+                at(Simulated::Nominal, place)
+            )
         });
         let told: Vec<String> = told.collect();
         let caption = format!(

@@ -58,15 +58,40 @@ pub struct Reproduction {
     pub left_out: Vec<String>,
     /// Why the URDF by itself cannot be simulated, if it cannot.
     pub nominal_refused: Option<String>,
-    /// The URDF (if it can be simulated) and the model, each in open and in closed loop.
+    /// Why the bodies of least squares cannot be simulated, if they cannot.
+    pub least_squares_refused: Option<String>,
+    /// The URDF and the bodies of least squares (if they can be simulated) and the model, each in open and in
+    /// closed loop.
     pub cases: Vec<Case>,
+}
+
+/// What is simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Simulated {
+    /// The URDF by itself.
+    Nominal,
+    /// The bodies and effects that least squares has found.
+    LeastSquares,
+    /// The model as it is used: bodies that can exist, and effects within their bounds.
+    Identified,
+}
+
+impl Simulated {
+    /// Its name in files and on the terminal.
+    pub fn name(self) -> &'static str {
+        match self {
+            Simulated::Nominal => "nominal",
+            Simulated::LeastSquares => "least squares",
+            Simulated::Identified => "identified",
+        }
+    }
 }
 
 /// One model in one loop.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// Whether it is the identified model; else it is the URDF.
-    pub identified: bool,
+    /// What moves.
+    pub model: Simulated,
     /// Whether a PD loop holds it to the log.
     pub closed: bool,
     /// Its errors.
@@ -76,15 +101,14 @@ pub struct Case {
 impl Case {
     /// `identified, open loop`.
     pub fn name(&self) -> String {
-        let model = if self.identified { "identified" } else { "nominal" };
-        format!("{model}, {} loop", if self.closed { "closed" } else { "open" })
+        format!("{}, {} loop", self.model.name(), if self.closed { "closed" } else { "open" })
     }
 }
 
 impl Reproduction {
     /// The errors of a model in a loop, if it could be simulated.
-    pub fn growth(&self, identified: bool, closed: bool) -> Option<&ErrorGrowth> {
-        let is_it = |case: &&Case| (case.identified, case.closed) == (identified, closed);
+    pub fn growth(&self, model: Simulated, closed: bool) -> Option<&ErrorGrowth> {
+        let is_it = |case: &&Case| (case.model, case.closed) == (model, closed);
         self.cases.iter().find(is_it).map(|case| &case.growth)
     }
 
@@ -210,7 +234,8 @@ impl Subject<'_> {
         loops: &[bool],
     ) -> Result<Result<Reproduction, (usize, f64)>, Error> {
         // Bodies that can exist, and friction that dissipates: what least squares alone finds often cannot
-        // move.
+        // move, and is shown beside it where it can.
+        let least_squares_tree = self.model.identified_tree(self.tree)?;
         let identified_tree = self.model.consistent_tree(self.tree)?;
         let mut parameters = self.parameters.to_vec();
         for effect in 0..self.design.effects().len() {
@@ -226,6 +251,10 @@ impl Subject<'_> {
             Ok(Plant::new(backends::of(self.backend, &identified_tree)?)
                 .with_effects(self.design, &parameters)?)
         };
+        let least_squares = || {
+            Ok(Plant::new(backends::of(self.backend, &least_squares_tree)?)
+                .with_effects(self.design, self.parameters)?)
+        };
         let nominal = || {
             Ok(Plant::new(backends::of(self.backend, self.tree)?).with_declared_friction(self.tree, &widths))
         };
@@ -233,17 +262,29 @@ impl Subject<'_> {
             Ok(inertia) => inertia,
             Err(place) => return Ok(Err(place)),
         };
-        let nominal_refused =
-            inertia_refused(self.tree, nominal().map_err(Error::Simulation)?, windows, &self.logs)?;
+        let refused = |what: &str, tree: &Tree, plant: Result<Plant<'_>, _>| {
+            inertia_refused(what, tree, plant.map_err(Error::Simulation)?, windows, &self.logs)
+        };
+        let nominal_refused = refused("the URDF by itself", self.tree, nominal())?;
+        let least_squares_refused =
+            refused("what least squares has found", &least_squares_tree, least_squares())?;
         let mut cases = Vec::new();
         for &closed in loops {
             let loop_inertia = closed.then_some(inertia.as_slice());
+            let mut add = |model, growth: Result<ErrorGrowth, _>| {
+                cases.push(Case { model, closed, growth: growth.map_err(Error::Simulation)? });
+                Ok::<(), Error>(())
+            };
             if nominal_refused.is_none() {
                 let growth = reproduce(&nominal, windows, &self.travel, loop_inertia, settings);
-                cases.push(Case { identified: false, closed, growth: growth.map_err(Error::Simulation)? });
+                add(Simulated::Nominal, growth)?;
+            }
+            if least_squares_refused.is_none() {
+                let growth = reproduce(&least_squares, windows, &self.travel, loop_inertia, settings);
+                add(Simulated::LeastSquares, growth)?;
             }
             let growth = reproduce(&identified, windows, &self.travel, loop_inertia, settings);
-            cases.push(Case { identified: true, closed, growth: growth.map_err(Error::Simulation)? });
+            add(Simulated::Identified, growth)?;
         }
         Ok(Ok(Reproduction {
             windows: windows.len(),
@@ -251,6 +292,7 @@ impl Subject<'_> {
             travel: self.travel.clone(),
             left_out: Plant::left_out(self.design),
             nominal_refused,
+            least_squares_refused,
             cases,
         }))
     }
@@ -275,8 +317,9 @@ fn inertia(mut plant: Plant<'_>, windows: &[Window]) -> Result<Result<Vec<f64>, 
     Ok(Ok(sum.iter().map(|sum| sum / count).collect()))
 }
 
-/// Why the URDF cannot be simulated.
+/// Why a robot cannot be simulated.
 fn inertia_refused(
+    what: &str,
     tree: &Tree,
     plant: Plant<'_>,
     windows: &[Window],
@@ -284,7 +327,7 @@ fn inertia_refused(
 ) -> Result<Option<String>, Error> {
     let said = |(log, t): (usize, f64)| {
         format!(
-            "the URDF by itself cannot be simulated: its M(q) is not positive definite at {t:.3} s of {}{}",
+            "{what} cannot be simulated: its M(q) is not positive definite at {t:.3} s of {}{}",
             logs[log].display(),
             bodies_in_words(tree)
         )

@@ -94,9 +94,10 @@ fn the_identified_model_goes_with_the_log_longer_than_the_urdf() {
         }
     }
     assert!(errors(&report, "identified", "open")[2] < 0.05);
+    assert!(errors(&report, "least_squares", "open")[2] < 0.05);
     let table = fs::read_to_string(scene.path("sim/simulation.csv")).unwrap();
     let header = "model,loop,horizon_s,share_of_travel,lost,rmse.joint_1,rmse.joint_2,rmse.joint_3";
-    assert_eq!((table.lines().next(), table.lines().count()), (Some(header), 1 + 4 * 40));
+    assert_eq!((table.lines().next(), table.lines().count()), (Some(header), 1 + 6 * 40));
     let picture = fs::read_to_string(scene.path("sim/simulation.svg")).unwrap();
     assert!(picture.starts_with("<svg") && picture.contains("nominal, open loop"));
 }
@@ -115,6 +116,22 @@ fn a_model_that_does_worse_than_its_urdf_is_said_to() {
     let sentence = "the identified model reproduces the logs worse than the URDF over 0.5 s in closed loop";
     assert!(stderr.contains(sentence), "{stderr}");
     assert!(scene.report()["warnings"].to_string().contains(sentence));
+}
+
+/// The bodies that least squares has found stand beside the possible ones, where they can move at all.
+#[test]
+fn bodies_of_least_squares_that_cannot_move_are_left_out_with_the_reason() {
+    let scene = Scene::new();
+    scene.spoiled(|model| {
+        for number in model["bodies"][2]["inertial"].as_array_mut().unwrap() {
+            *number = (-number.as_f64().unwrap()).into();
+        }
+    });
+    let (stdout, stderr) = scene.done(&SIMULATE.replace("out/model.json", "model.json"));
+    assert!(!stdout.contains("least squares") && stdout.contains("identified, open loop"), "{stdout}");
+    let reason = "what least squares has found cannot be simulated: its M(q) is not positive definite";
+    assert!(stderr.contains(reason) && stderr.contains("link_3"), "{stderr}");
+    assert!(scene.report()["least_squares_refused"].as_str().unwrap().contains(reason));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What is written and said of a reproduction.
 
-use super::{Case, FILES, Reproduction};
+use super::{Case, FILES, Reproduction, Simulated};
 use crate::Error;
 use crate::arguments::SimulateArguments;
 use crate::model_use::ModelUse;
@@ -45,7 +45,7 @@ fn report(
             (name.clone(), json!(errors))
         };
         json!({
-            "model": if case.identified { "identified" } else { "nominal" },
+            "model": case.model.name().replace(' ', "_"),
             "loop": if case.closed { "closed" } else { "open" },
             "horizon_s": case.growth.horizons,
             "share_of_travel": case.growth.share_of_travel,
@@ -66,6 +66,7 @@ fn report(
         "travel": travel.collect::<Map<String, Value>>(),
         "not_simulated": reproduction.left_out,
         "nominal_refused": reproduction.nominal_refused,
+        "least_squares_refused": reproduction.least_squares_refused,
         "cases": reproduction.cases.iter().map(case).collect::<Vec<_>>(),
         "warnings": warnings,
     })
@@ -77,7 +78,7 @@ fn table(used: &ModelUse, reproduction: &Reproduction) -> String {
     used.joints().iter().for_each(|joint| text.push_str(&format!(",rmse.{joint}")));
     text.push('\n');
     for case in &reproduction.cases {
-        let model = if case.identified { "identified" } else { "nominal" };
+        let model = case.model.name().replace(' ', "_");
         let in_loop = if case.closed { "closed" } else { "open" };
         let growth = &case.growth;
         for (place, horizon) in growth.horizons.iter().enumerate() {
@@ -108,9 +109,11 @@ pub(crate) fn picture(reproduction: &Reproduction) -> Svg {
     plot::error_growth(&growth)
 }
 
-/// Where the URDF does better, what is not simulated, and whether the URDF could be.
+/// Where the URDF does better, what is not simulated, and why the URDF, or what least squares has found,
+/// could not be.
 pub fn warnings(reproduction: &Reproduction) -> Vec<String> {
-    let mut warnings: Vec<String> = reproduction.nominal_refused.iter().cloned().collect();
+    let refused = [&reproduction.nominal_refused, &reproduction.least_squares_refused];
+    let mut warnings: Vec<String> = refused.into_iter().flatten().cloned().collect();
     if !reproduction.left_out.is_empty() {
         let kinds = reproduction.left_out.join(", ");
         warnings.push(format!(
@@ -125,7 +128,10 @@ pub fn warnings(reproduction: &Reproduction) -> Vec<String> {
 pub(crate) fn worse(reproduction: &Reproduction) -> Vec<String> {
     let mut worse = Vec::new();
     for closed in [false, true] {
-        let both = (reproduction.growth(false, closed), reproduction.growth(true, closed));
+        let both = (
+            reproduction.growth(Simulated::Nominal, closed),
+            reproduction.growth(Simulated::Identified, closed),
+        );
         let (Some(nominal), Some(identified)) = both else { continue };
         for (horizon, place) in reproduction.told() {
             let (of_urdf, of_model) = (nominal.share_of_travel[place], identified.share_of_travel[place]);
