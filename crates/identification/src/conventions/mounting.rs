@@ -31,7 +31,7 @@ pub(super) fn mounted(log: &Log<'_>, reading: &Reading) -> Result<Option<Candida
     };
     let Some(present) = unit(reading.gravity) else { return Ok(None) };
     let first =
-        directions().into_iter().filter(|downward| angle(*downward, present) > log.settings.least_angle);
+        directions().into_iter().filter(|downward| angle(*downward, present) > log.settings.least_angle_rad);
     let Some((mut downward, mut best)) = tried(first.collect())? else { return Ok(None) };
     let mut step = STEPS.0;
     while step > STEPS.1 {
@@ -48,7 +48,7 @@ pub(super) fn mounted(log: &Log<'_>, reading: &Reading) -> Result<Option<Candida
             _ => step /= 2.0,
         }
     }
-    Ok(Some(best).filter(|_| angle(downward, present) > log.settings.least_angle))
+    Ok(Some(best).filter(|_| angle(downward, present) > log.settings.least_angle_rad))
 }
 
 /// The directions of a cube's faces, edges and corners.

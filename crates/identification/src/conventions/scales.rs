@@ -194,9 +194,10 @@ pub(super) fn merged(
     let is_other = |joint: &usize| scales[*joint].ln().abs() > settings.least_scale.ln();
     let others: Vec<usize> = (0..joints).filter(is_other).collect();
     let merged = match others.as_slice() {
-        [] => None,
         &[joint] => Some((ConventionKind::TorqueScale(scales[joint]), others)),
+        // Said once, of all torques: nothing to merge, though none may be far off by itself.
         _ if of_units.len() == 1 => return found,
+        [] => None,
         _ => Some((ConventionKind::EachTorqueScale(scales), (0..joints).collect())),
     };
     let (left_as_named, left) = (last.left_as_named, last.left);
@@ -237,6 +238,7 @@ mod tests {
         assert_eq!(merged(&[all(10.0)]), [all(10.0)]);
         let each = |scales: [f64; 2]| found(ConventionKind::EachTorqueScale(scales.to_vec()), &[0, 1]);
         assert_eq!(merged(&[each([3.0, 0.1])]), [each([3.0, 0.1])]);
+        assert_eq!(merged(&[each([1.8, 0.6])]), [each([1.8, 0.6])]);
         assert_eq!(merged(&[each([1000.0, 1.01])]), [found(ConventionKind::TorqueScale(1000.0), &[0])]);
         assert_eq!(
             merged(&[one.clone(), sign.clone(), all(0.02)]),

@@ -21,8 +21,8 @@ pub struct ConventionSettings {
     pub least_common_scale: f64,
     /// How much the URDF's torque must be like the fitted one (cosine) for it to tell all torques' unit.
     pub least_likeness: f64,
-    /// From this angle on a base is mounted otherwise \[rad\]; below it is not level, which is an effect.
-    pub least_angle: f64,
+    /// From this angle on a base is mounted otherwise; below it is not level, which is an effect.
+    pub least_angle_rad: f64,
 }
 
 impl Default for ConventionSettings {
@@ -34,7 +34,7 @@ impl Default for ConventionSettings {
             least_scale: 2.0,
             least_common_scale: 5.0,
             least_likeness: 0.7,
-            least_angle: 0.35,
+            least_angle_rad: 0.35,
         }
     }
 }
@@ -62,7 +62,7 @@ impl ConventionSettings {
             ("least_scale", &mut self.least_scale),
             ("least_common_scale", &mut self.least_common_scale),
             ("least_likeness", &mut self.least_likeness),
-            ("least_angle", &mut self.least_angle),
+            ("least_angle_rad", &mut self.least_angle_rad),
         ];
         if let Some((_, setting)) = all.iter_mut().find(|(own, _)| *own == name) {
             **setting = value;
