@@ -1,5 +1,6 @@
 //! The next motion among 98 of the 18-joint upper body, four of them measured: 132 parameters, motions of 7
-//! s.
+//! s. And among many more, each three of the 98 one after another: 10 000, or as many as the environment
+//! variable `PHIW_BENCH_MOTIONS` says (a motion takes 70 kB).
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use phiw_curriculum::motion::{Motion, MotionDataset};
@@ -12,6 +13,7 @@ use phiw_estimation::Robot;
 use phiw_plant::{MultiSine, Reference};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use std::hint::black_box;
 
 const MOTIONS: usize = 98;
@@ -51,12 +53,42 @@ fn all(criterion: &mut Criterion) {
         measured: Some(&measured),
         history: &[],
     };
+    let many = many();
+    let longer = longer(&candidates, many);
+    let allowed: Vec<usize> = (0..many).collect();
+    let among_many = Question { candidates: &longer, allowed: &allowed, ..question };
     criterion.bench_function("smallest condition, 98 candidates", |bencher| {
         bencher.iter(|| SmallestCondition.choose(black_box(&question), &mut rng));
     });
     criterion.bench_function("torque-optimal, 98 candidates", |bencher| {
         bencher.iter(|| TorqueOptimal.choose(black_box(&question), &mut rng));
     });
+    let mut group = criterion.benchmark_group("many");
+    group.sample_size(10);
+    group.bench_function(format!("smallest condition, {many} candidates"), |bencher| {
+        bencher.iter(|| SmallestCondition.choose(black_box(&among_many), &mut rng));
+    });
+    group.finish();
+}
+
+fn many() -> usize {
+    std::env::var("PHIW_BENCH_MOTIONS").ok().and_then(|count| count.parse().ok()).unwrap_or(10_000)
+}
+
+/// `count` motions, each three of `candidates` one after another.
+fn longer(candidates: &MotionCandidates, count: usize) -> MotionCandidates {
+    let all = candidates.all();
+    let triples = (0..all.len()).flat_map(|a| (0..a).flat_map(move |b| (0..b).map(move |c| [a, b, c])));
+    let triples: Vec<[usize; 3]> = triples.take(count).collect();
+    assert_eq!(triples.len(), count, "more motions than there are triples");
+    let joined = |[a, b, c]: &[usize; 3]| {
+        let mut triangle = all[*a].triangle.clone();
+        triangle.absorb(&mut all[*b].triangle.clone());
+        triangle.absorb(&mut all[*c].triangle.clone());
+        triangle
+    };
+    let triangles = triples.par_iter().map(joined).collect();
+    MotionCandidates::of_triangles(triangles, candidates.weights(), 100.0).expect("motions of one robot")
 }
 
 criterion_group!(selection, all);

@@ -3,6 +3,7 @@
 use super::Triangle;
 use crate::CurriculumError;
 use crate::motion::{Motion, MotionDataset};
+use phiw_dynamics::check::check_size;
 use phiw_estimation::{EstimationError, Evidence, Robot, RobotModel, grouped_factor};
 use phiw_identification::{Design, EffectSpec};
 use phiw_regressor::RegressorError;
@@ -119,6 +120,30 @@ impl MotionCandidates {
         }
     }
 
+    /// Of R of each motion, however it came about: of motions that were reduced elsewhere, or before. The rows
+    /// were weighted with `weights`; a motion has `rate_hz` rows a second.
+    ///
+    /// # Errors
+    /// There is no motion, or their columns are not the same.
+    pub fn of_triangles(
+        triangles: Vec<Triangle>,
+        weights: &[f64],
+        rate_hz: f64,
+    ) -> Result<Self, CurriculumError> {
+        let count = triangles.first().ok_or(CurriculumError::NoMotions)?.size();
+        for triangle in &triangles {
+            check_size("columns of a motion's factor", triangle.size(), count)?;
+        }
+        let candidate =
+            |triangle: Triangle| MotionCandidate { condition_number: triangle.condition_number(), triangle };
+        let candidates: Vec<MotionCandidate> = triangles.into_par_iter().map(candidate).collect();
+        let mut everything = Triangle::empty(count);
+        candidates.iter().for_each(|candidate| everything.absorb(&mut candidate.triangle.clone()));
+        let parameters = (0..count).collect();
+        let whole = everything.clone();
+        Ok(MotionCandidates { weights: weights.to_vec(), parameters, rate_hz, candidates, everything, whole })
+    }
+
     fn of_designs(
         design: &(dyn Fn() -> Result<Design, EstimationError> + Sync),
         dataset: &MotionDataset,
@@ -127,21 +152,14 @@ impl MotionCandidates {
         let reduce = |motion: &Motion| {
             let design = design()?;
             let factor = grouped_factor(&design, motion.block())?.combine(weights)?;
-            let triangle = Triangle::of_factor(&factor);
-            Ok(MotionCandidate { condition_number: triangle.condition_number(), triangle })
+            Ok(Triangle::of_factor(&factor))
         };
-        let candidates: Result<Vec<MotionCandidate>, CurriculumError> =
+        let triangles: Result<Vec<Triangle>, CurriculumError> =
             dataset.motions().par_iter().map(reduce).collect();
-        let candidates = candidates?;
-        let count = design()?.parameter_count();
-        let mut everything = Triangle::empty(count);
-        candidates.iter().for_each(|candidate| everything.absorb(&mut candidate.triangle.clone()));
         let mut rates: Vec<f64> = dataset.motions().iter().map(|motion| 1.0 / motion.period_s()).collect();
         rates.sort_by(f64::total_cmp);
         let rate_hz = rates.get(rates.len() / 2).copied().unwrap_or(1.0);
-        let parameters = (0..count).collect();
-        let whole = everything.clone();
-        Ok(MotionCandidates { weights: weights.to_vec(), parameters, rate_hz, candidates, everything, whole })
+        Self::of_triangles(triangles?, weights, rate_hz)
     }
 
     /// R of all motions together.

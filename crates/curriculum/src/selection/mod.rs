@@ -1,6 +1,8 @@
 //! Which motion next: the optimisation (11), and what it is compared with.
 
 mod candidates;
+mod condition_bound;
+mod lanczos;
 mod optimal;
 mod random;
 mod smallest_condition;
@@ -15,6 +17,7 @@ pub use triangle::Triangle;
 use crate::IterationRecord;
 use crate::motion::MotionDataset;
 use rand::Rng;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// What a selection chooses from.
@@ -100,7 +103,8 @@ pub fn decide(motions: &[Scored], best: Best) -> Option<Choice> {
 }
 
 /// The allowed motion with the smallest `cost`.
-fn smallest(allowed: &[usize], cost: impl Fn(usize) -> f64) -> Choice {
-    let scored: Vec<Scored> = allowed.iter().map(|&motion| Scored { motion, score: cost(motion) }).collect();
+fn smallest(allowed: &[usize], cost: impl Fn(usize) -> f64 + Sync) -> Choice {
+    let scored: Vec<Scored> =
+        allowed.par_iter().map(|&motion| Scored { motion, score: cost(motion) }).collect();
     decide(&scored, Best::Smallest).unwrap_or(Choice { motion: 0, merit: None, runner_up: None })
 }

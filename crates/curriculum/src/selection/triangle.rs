@@ -5,6 +5,7 @@
 //! two are thrown away. Here the QR of one triangle on top of another touches the non-zeros only (n³/3
 //! multiplications), and Lanczos' method finds the two in some tens of products.
 
+use super::lanczos::largest_eigenvalue;
 use faer::Mat;
 use phiw_dynamics::dense::dot;
 use phiw_regressor::factor::{Factor, solve_lower, solve_upper};
@@ -13,20 +14,25 @@ use phiw_regressor::factor::{Factor, solve_lower, solve_upper};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Triangle {
     size: usize,
-    /// `size` × `size`, column-major; zeros below the diagonal.
+    /// Column after column, each down to its diagonal.
     entries: Vec<f64>,
+}
+
+/// Where a column begins among the entries.
+const fn begin(column: usize) -> usize {
+    column * (column + 1) / 2
 }
 
 impl Triangle {
     /// Of no rows.
     pub fn empty(size: usize) -> Self {
-        Triangle { size, entries: vec![0.0; size * size] }
+        Triangle { size, entries: vec![0.0; begin(size)] }
     }
 
     /// The R of Φ alone, the right-hand side of the factor left out.
     pub fn of_factor(factor: &Factor) -> Self {
         let size = factor.parameters();
-        let entries = (0..size).flat_map(|column| &factor.column(column)[..size]).copied().collect();
+        let entries = (0..size).flat_map(|column| &factor.column(column)[..=column]).copied().collect();
         Triangle { size, entries }
     }
 
@@ -37,7 +43,7 @@ impl Triangle {
 
     /// The non-zero part of a column: rows up to the diagonal.
     pub fn column(&self, column: usize) -> &[f64] {
-        &self.entries[column * self.size..][..=column]
+        &self.entries[begin(column)..][..=column]
     }
 
     /// Takes in the rows of another triangle: R of \[this; other\] by Householder reflections that keep to
@@ -49,29 +55,24 @@ impl Triangle {
     /// For triangles of different sizes.
     pub fn absorb(&mut self, other: &mut Triangle) {
         assert_eq!(self.size, other.size, "triangles of different sizes");
-        let size = self.size;
-        for pivot in 0..size {
-            let (head, rest) = other.entries.split_at_mut((pivot + 1) * size);
-            let below = &mut head[pivot * size..][..=pivot];
-            let top = self.entries[pivot * size + pivot];
-            let norm = (top * top + dot(below, below)).sqrt();
-            if norm == 0.0 {
-                continue;
-            }
-            // The reflection that sends (top, below) to (∓norm, 0), scaled so that its vector begins with 1.
-            let signed = if top < 0.0 { -norm } else { norm };
-            let first = top + signed;
-            let factor = first / signed;
-            below.iter_mut().for_each(|value| *value /= first);
-            self.entries[pivot * size + pivot] = -signed;
-            for column in pivot + 1..size {
-                let under = &mut rest[(column - pivot - 1) * size..][..=pivot];
-                let over = &mut self.entries[column * size + pivot];
-                let along = factor * (*over + dot(below, under));
-                *over -= along;
-                under.iter_mut().zip(&*below).for_each(|(value, direction)| *value -= along * direction);
-            }
+        pulp::Arch::new().dispatch(Absorb {
+            size: self.size,
+            above: &mut self.entries,
+            below: &mut other.entries,
+        });
+    }
+
+    /// The same with diagonal elements no nearer to zero than this share of the largest, so that it can be
+    /// inverted.
+    pub(super) fn with_least_diagonal(&self, share: f64) -> Self {
+        let mut raised = self.clone();
+        let diagonal = |column: usize| self.column(column)[column].abs();
+        let least = share * (0..self.size).map(diagonal).fold(f64::MIN_POSITIVE, f64::max);
+        for column in 0..self.size {
+            let own = &mut raised.entries[begin(column) + column];
+            *own = if own.abs() >= least { *own } else { least };
         }
+        raised
     }
 
     /// R of some of the columns, which are ascending.
@@ -91,8 +92,7 @@ impl Triangle {
                 layers.push(Triangle::empty(columns.len()));
             }
             for place in first(row)..columns.len() {
-                layers[layer].entries[place * columns.len() + first(row)] =
-                    self.entries[columns[place] * self.size + row];
+                layers[layer].entries[begin(place) + first(row)] = self.column(columns[place])[row];
             }
         }
         layers.iter_mut().for_each(|layer| selected.absorb(layer));
@@ -117,14 +117,11 @@ impl Triangle {
 
     /// R·x.
     pub(crate) fn multiply(&self, x: &[f64], product: &mut [f64]) {
-        product.fill(0.0);
-        for (column, &value) in x.iter().enumerate() {
-            product.iter_mut().zip(self.column(column)).for_each(|(sum, entry)| *sum += value * entry);
-        }
+        pulp::Arch::new().dispatch(Multiply { triangle: self, x, product });
     }
 
     /// Rᵀ·x, in place: from the last element, as each needs those before it.
-    fn multiply_transposed(&self, x: &mut [f64]) {
+    pub(super) fn multiply_transposed(&self, x: &mut [f64]) {
         for column in (0..self.size).rev() {
             x[column] = dot(self.column(column), &x[..=column]);
         }
@@ -207,104 +204,105 @@ impl Triangle {
     /// For triangles of different sizes.
     pub fn variance_along(&self, of: &Triangle) -> f64 {
         assert_eq!(self.size, of.size, "triangles of different sizes");
-        let mut sum = 0.0;
-        let mut row = vec![0.0; self.size];
-        for index in 0..self.size {
-            row.iter_mut()
-                .enumerate()
-                .for_each(|(column, value)| *value = of.entries[column * of.size + index]);
-            self.solve_transposed(&mut row);
-            sum += dot(&row, &row);
-        }
+        let sum = pulp::Arch::new().dispatch(VarianceAlong { of, inverted: self });
         if sum.is_finite() { sum } else { f64::INFINITY }
+    }
+}
+
+/// The reflections of [`Triangle::absorb`]; a type and no closure, so that all of it is compiled for the widest
+/// registers there are.
+struct Absorb<'a> {
+    size: usize,
+    above: &'a mut [f64],
+    below: &'a mut [f64],
+}
+
+impl pulp::NullaryFnOnce for Absorb<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Absorb { size, above, below } = self;
+        for pivot in 0..size {
+            let (head, mut rest) = below.split_at_mut(begin(pivot + 1));
+            let below = &mut head[begin(pivot)..];
+            let top = above[begin(pivot) + pivot];
+            let norm = (top * top + dot(below, below)).sqrt();
+            if norm == 0.0 {
+                continue;
+            }
+            // The reflection that sends (top, below) to (∓norm, 0), scaled so that its vector begins with 1.
+            let signed = if top < 0.0 { -norm } else { norm };
+            let first = top + signed;
+            let factor = first / signed;
+            below.iter_mut().for_each(|value| *value /= first);
+            above[begin(pivot) + pivot] = -signed;
+            for column in pivot + 1..size {
+                let (own, after) = std::mem::take(&mut rest).split_at_mut(column + 1);
+                rest = after;
+                let under = &mut own[..=pivot];
+                let over = &mut above[begin(column) + pivot];
+                let along = factor * (*over + dot(below, under));
+                *over -= along;
+                under.iter_mut().zip(&*below).for_each(|(value, direction)| *value -= along * direction);
+            }
+        }
+    }
+}
+
+/// [`Triangle::multiply`], for the widest registers.
+struct Multiply<'a> {
+    triangle: &'a Triangle,
+    x: &'a [f64],
+    product: &'a mut [f64],
+}
+
+impl pulp::NullaryFnOnce for Multiply<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Multiply { triangle, x, product } = self;
+        product.fill(0.0);
+        for (column, &value) in x.iter().enumerate() {
+            product.iter_mut().zip(triangle.column(column)).for_each(|(sum, entry)| *sum += value * entry);
+        }
+    }
+}
+
+/// [`Triangle::variance_along`], for the widest registers: the sum of the squares of R⁻ᵀXᵀ.
+struct VarianceAlong<'a> {
+    of: &'a Triangle,
+    inverted: &'a Triangle,
+}
+
+impl pulp::NullaryFnOnce for VarianceAlong<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        let size = self.inverted.size;
+        let mut sum = 0.0;
+        let mut row = vec![0.0; size];
+        for first in 0..size {
+            // A row of X has nothing before its diagonal, and neither has what is solved for.
+            for column in first..size {
+                let entries = self.inverted.column(column);
+                let own = self.of.column(column)[first];
+                row[column] = (own - dot(&entries[first..column], &row[first..column])) / entries[column];
+            }
+            sum += dot(&row[first..], &row[first..]);
+        }
+        sum
     }
 }
 
 /// Part of a column's length that must be new for it not to depend on those before it.
 const INDEPENDENT: f64 = 1e-8;
 
-/// Change of the eigenvalue over one step, as a share, at which it counts as found.
-const SETTLED: f64 = 1e-14;
-
-/// Largest eigenvalue of a symmetric positive definite operator, by Lanczos' method with full
-/// reorthogonalisation.
-///
-/// It starts from a fixed vector with a part along every direction, so that the result is always the same.
-fn largest_eigenvalue(size: usize, mut apply: impl FnMut(&mut [f64])) -> f64 {
-    let mut basis: Vec<Vec<f64>> = Vec::new();
-    let (mut diagonal, mut off) = (Vec::new(), Vec::new());
-    let mut next: Vec<f64> = (0..size).map(|k| 1.0 + 0.7 * (1.7 * k as f64 + 0.3).sin()).collect();
-    let mut before = 0.0;
-    for _ in 0..size {
-        let norm = dot(&next, &next).sqrt();
-        if !norm.is_finite() {
-            return f64::INFINITY;
-        }
-        if norm == 0.0 {
-            break;
-        }
-        next.iter_mut().for_each(|value| *value /= norm);
-        if !basis.is_empty() {
-            off.push(norm);
-        }
-        basis.push(next.clone());
-        apply(&mut next);
-        diagonal.push(dot(&next, &basis[basis.len() - 1]));
-        for _ in 0..2 {
-            for direction in &basis {
-                let along = dot(&next, direction);
-                next.iter_mut().zip(direction).for_each(|(value, unit)| *value -= along * unit);
-            }
-        }
-        let found = largest_of_tridiagonal(&diagonal, &off);
-        if !found.is_finite() {
-            return f64::INFINITY;
-        }
-        if (found - before).abs() <= SETTLED * found && diagonal.len() > 3 {
-            return found;
-        }
-        before = found;
-    }
-    before
-}
-
-/// Largest eigenvalue of a symmetric tridiagonal matrix, by Sturm's count and bisection.
-fn largest_of_tridiagonal(diagonal: &[f64], off: &[f64]) -> f64 {
-    let reach = |row: usize| {
-        let before = if row > 0 { off[row - 1].abs() } else { 0.0 };
-        before + off.get(row).map_or(0.0, |value| value.abs())
-    };
-    let mut high =
-        (0..diagonal.len()).map(|row| diagonal[row] + reach(row)).fold(f64::NEG_INFINITY, f64::max);
-    let mut low = diagonal.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if !high.is_finite() {
-        return f64::INFINITY;
-    }
-    // Whether no eigenvalue is larger than x: all pivots of x·1 − T are positive.
-    let above = |x: f64| {
-        let mut pivot = 1.0;
-        for (row, value) in diagonal.iter().enumerate() {
-            let square = if row > 0 { off[row - 1] * off[row - 1] } else { 0.0 };
-            pivot = x - value - square / pivot;
-            if pivot <= 0.0 {
-                return false;
-            }
-        }
-        true
-    };
-    while high - low > 1e-15 * high.abs() {
-        let middle = 0.5 * (low + high);
-        if middle <= low || middle >= high {
-            break;
-        }
-        if above(middle) { high = middle } else { low = middle }
-    }
-    0.5 * (low + high)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::Triangle;
+    use super::{Triangle, begin};
 
     /// Columns 2 and 4 depend on those before them.
     fn dependent() -> Triangle {
@@ -321,7 +319,7 @@ mod tests {
             // Each row by itself: what is absorbed is triangular.
             let mut one = Triangle::empty(6);
             values.iter().enumerate().skip(row).for_each(|(column, value)| {
-                one.entries[column * 6 + row] = *value;
+                one.entries[begin(column) + row] = *value;
             });
             triangle.absorb(&mut one);
         }
