@@ -191,7 +191,10 @@ impl Search<'_> {
         let design = self.design()?;
         self.parameters.drain(design.effect_parameters(place));
         self.specs.remove(place);
-        self.chosen.alternatives.remove(place - self.declared);
+        match place.checked_sub(self.declared) {
+            Some(found) => drop(self.chosen.alternatives.remove(found)),
+            None => self.declared -= 1,
+        }
         Ok(())
     }
 

@@ -5,7 +5,7 @@ use super::input::{TraceInput, TraceOptions};
 use super::residuals::ranges_of_residual;
 use super::sample::Sample;
 use super::stage::{Fixed, Stage, specs_and_values};
-use super::tracing::Tracing;
+use super::tracing::{Tracing, Withdrawn};
 use crate::selection::{Member, Policy, Problem, select, value};
 use phiw_effects::{Constants, SignalRanges};
 use phiw_identification::{Data, Design, Effect, EffectSpec, Fold, IdentificationError};
@@ -26,18 +26,24 @@ const FINALISTS: usize = 12;
 
 /// Traces the residual of the declared (or held) model.
 ///
+/// What is declared is where the search starts, and stays in the model however little it does. An effect that
+/// the logs refute, since a constant of it is certain to be one that no such effect has (a friction that
+/// drives), leaves it, unless the model is better on motion held out with it.
+///
 /// # Errors
 /// A log cannot be read, or holds too little for the declared model.
 pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, IdentificationError> {
     let sample = Sample::of(input.data, input.ranges.period)?;
     let data = sample.data(&input.data.rest_speeds);
     let fixed = Fixed::new(&input, &data, options)?;
-    let mut search = Search {
+    let search = Search {
         fixed: &fixed,
         whole: if data.train == input.data.train { &data } else { input.data },
         specs: input.declared.clone(),
         parameters: input.parameters.clone(),
         declared: input.declared.len(),
+        declared_stays: fixed.prior.is_some(),
+        withdrawn: Vec::new(),
         folds: split(&data.train),
         chosen: Chosen::default(),
         refuted: Vec::new(),
@@ -46,19 +52,13 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         input: &input,
         options,
     };
-    // A width that is wrong is a friction that is missing.
-    search.refine()?;
-    for _ in 0..ROUNDS {
-        let before = search.names();
-        search.choose()?;
-        search.refine()?;
-        search.leave_out_what_is_not_realised()?;
-        if search.names() == before && !search.contest()? {
-            break;
-        }
+    let tracing = search.clone().run()?;
+    if tracing.withdrawn.is_empty() || tracing.is_no_worse_than_declared() {
+        return Ok(tracing);
     }
-    search.prefer_simpler_forms()?;
-    search.finish()
+    // What leaves is still refuted, whether or not the model can do without it.
+    let withdrawn = tracing.withdrawn.into_iter().map(|own| Withdrawn { kept: true, ..own }).collect();
+    Ok(Tracing { withdrawn, ..Search { declared_stays: true, ..search }.run()? })
 }
 
 /// What the last choice knew beside what it chose.
@@ -85,8 +85,12 @@ pub(super) struct Search<'a> {
     pub specs: Vec<EffectSpec>,
     /// The base parameters, then those of the effects.
     pub parameters: Vec<f64>,
-    /// Number of effects that were declared.
+    /// Number of effects that were declared and have not left.
     pub declared: usize,
+    /// Whether declared effects stay whatever the logs say.
+    pub declared_stays: bool,
+    /// Declared effects that the logs refute.
+    pub withdrawn: Vec<Withdrawn>,
     /// Stretches of the training motion.
     pub folds: Vec<Fold>,
     pub chosen: Chosen,
@@ -101,6 +105,29 @@ pub(super) struct Search<'a> {
 }
 
 impl Search<'_> {
+    /// The search from where it starts to its end.
+    fn run(mut self) -> Result<Tracing, IdentificationError> {
+        // A width that is wrong is a friction that is missing.
+        self.refine()?;
+        loop {
+            for _ in 0..ROUNDS {
+                let before = self.names();
+                self.choose()?;
+                self.refine()?;
+                self.leave_out_what_is_not_realised()?;
+                if self.names() == before && !self.contest()? {
+                    break;
+                }
+            }
+            // Only once nothing else is missing: what is missing makes up for itself by impossible constants.
+            if !self.withdraw()? {
+                break;
+            }
+        }
+        self.prefer_simpler_forms()?;
+        self.finish()
+    }
+
     pub fn policy(&self) -> Policy {
         Policy {
             finalists: FINALISTS,

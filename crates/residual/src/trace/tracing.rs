@@ -91,17 +91,36 @@ pub struct Remaining {
     pub unidentifiable: Vec<EffectSpec>,
 }
 
+/// A declared effect that the logs refute: a constant of it is certain to be one that no such effect has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Withdrawn {
+    /// Kind, joints and constants.
+    pub spec: EffectSpec,
+    /// The name of the constant.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// What the logs make of it, 95 %.
+    pub interval_95: [f64; 2],
+    /// What it may be.
+    pub bounds: (f64, f64),
+    /// Whether it is in the model nevertheless, since that is worse on motion held out without it.
+    pub kept: bool,
+}
+
 /// The result of a trace.
 pub struct Tracing {
     /// The verdict.
     pub verdict: Verdict,
-    /// Declared effects, then those named, then the refinements, with their constants.
+    /// Declared effects that have not left, then those named, then the refinements, with their constants.
     pub specs: Vec<EffectSpec>,
     /// The final model; with a held model its parameters are those held, changed by what was found.
     pub model: Identified,
     /// The constants that were found by scanning, with their deviations; none against a held model, whose
     /// parameters stay as they are.
     pub constants: Vec<ScannedConstant>,
+    /// Declared effects that the logs refute.
+    pub withdrawn: Vec<Withdrawn>,
     /// Error of the declared (or held) model: training, held out.
     pub before: (TorqueError, TorqueError),
     /// The effects that were added and have a name, in order.
@@ -117,4 +136,15 @@ pub struct Tracing {
     /// Kinds and joints of which some constants could not be judged, since their columns are not finite on
     /// these logs.
     pub not_judged: Vec<(String, Vec<String>)>,
+}
+
+/// How far the errors of one model are apart that was fitted twice.
+pub(super) const ROUNDING: f64 = 1e-9;
+
+impl Tracing {
+    /// Whether the model's error on motion held out is no worse than the declared one's, of all torques
+    /// together.
+    pub(super) fn is_no_worse_than_declared(&self) -> bool {
+        self.model.held_out.relative <= (1.0 + ROUNDING) * self.before.1.relative
+    }
 }

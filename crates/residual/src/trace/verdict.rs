@@ -3,15 +3,13 @@
 use super::harm::Harm;
 use super::scanned::scanned_constants;
 use super::search::Search;
-use super::tracing::{Tracing, Verdict};
+use super::tracing::{ROUNDING, Tracing, Verdict};
 use phiw_identification::fitting::{
     OwnTorqueFit, Rests, TorqueError, accumulate, accumulate_folds, fit, fit_with_own_torque, torque_error,
 };
-use phiw_identification::{Design, Effect, EffectSpec, IdentificationError, Identified};
+use phiw_identification::{Design, EffectSpec, IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
 
-/// How far the errors of one model are apart that was fitted twice.
-const ROUNDING: f64 = 1e-9;
 /// Times that the bound for the error on trial is lowered, before all that was found leaves.
 const TIGHTENINGS: usize = 2;
 /// How much lower it is than what would just suffice.
@@ -25,7 +23,7 @@ impl Search<'_> {
         let before = self.declared_error()?;
         let most = before.1.relative * (1.0 + ROUNDING);
         let tracing = self.clone().finish_with(before.clone(), Harm::EachTorque)?;
-        if self.is_no_worse(&tracing) {
+        if tracing.is_no_worse_than_declared() || !tracing.withdrawn.is_empty() {
             return Ok(tracing);
         }
         let tracing = self.with_a_say_of_what_is_held_out(before, most)?;
@@ -41,13 +39,13 @@ impl Search<'_> {
     ) -> Result<Tracing, IdentificationError> {
         let tracing =
             self.clone().finish_with(before.clone(), Harm::HeldOut { most_relative: f64::INFINITY })?;
-        if self.is_no_worse(&tracing) {
+        if tracing.is_no_worse_than_declared() {
             return Ok(tracing);
         }
         // What is made of the model's torque was judged with that of an earlier fit.
         if let Some(without) = self.without_what_depends_on_the_model()? {
             let tracing = without.finish_with(before.clone(), Harm::EachTorque)?;
-            if self.is_no_worse(&tracing) {
+            if tracing.is_no_worse_than_declared() {
                 return Ok(tracing);
             }
         }
@@ -56,18 +54,12 @@ impl Search<'_> {
         let mut most_relative = most;
         for _ in 0..TIGHTENINGS {
             let tracing = self.clone().finish_with(before.clone(), Harm::HeldOut { most_relative })?;
-            if self.is_no_worse(&tracing) {
+            if tracing.is_no_worse_than_declared() {
                 return Ok(tracing);
             }
             most_relative *= TIGHTER * most / tracing.model.held_out.relative;
         }
         self.finish_with(before, Harm::HeldOut { most_relative: 0.0 })
-    }
-
-    /// Whether a model's error on motion held out is no worse than the declared one's, of all torques
-    /// together.
-    fn is_no_worse(&self, tracing: &Tracing) -> bool {
-        tracing.model.held_out.relative <= (1.0 + ROUNDING) * tracing.before.1.relative
     }
 
     /// The same without the effects that were found and whose columns are made of the model's torque or are
@@ -94,7 +86,8 @@ impl Search<'_> {
     ) -> Result<Tracing, IdentificationError> {
         let (mut effects, named) = self.name(harm)?;
         let refinements = effects.split_off(named);
-        if effects.is_empty() && refinements.is_empty() && self.is_worse_than(&before.1)? {
+        let as_declared = effects.is_empty() && refinements.is_empty() && self.withdrawn.is_empty();
+        if as_declared && self.is_worse_than(&before.1)? {
             self.specs.clone_from(&self.input.declared);
             self.parameters.clone_from(&self.input.parameters);
         }
@@ -123,11 +116,11 @@ impl Search<'_> {
         let mut constants = Vec::new();
         if self.fixed.prior.is_none() {
             constants = scanned_constants(self.fixed.catalogue, &mut model, data)?;
-            let impossible = self.impossible(&model);
+            let impossible = self.impossible(&model.design, &model.fit);
             let uncertain = self.uncertain(&model, effects.len())?;
             if !impossible.is_empty() || !uncertain.is_empty() {
                 let changes = !impossible.is_empty();
-                impossible.into_iter().rev().try_for_each(|place| self.remove(place))?;
+                self.remove_impossible(impossible)?;
                 if changes {
                     self.refine()?;
                 }
@@ -142,6 +135,7 @@ impl Search<'_> {
             specs: self.specs,
             model,
             constants,
+            withdrawn: self.withdrawn,
             before,
             effects,
             refinements,
@@ -155,7 +149,7 @@ impl Search<'_> {
     /// search left it.
     ///
     /// Where columns are made of the model's torque, it is that of the fit: the model as it is used.
-    fn final_fit(&self, nothing_was_found: bool) -> Result<OwnTorqueFit, IdentificationError> {
+    pub(super) fn final_fit(&self, nothing_was_found: bool) -> Result<OwnTorqueFit, IdentificationError> {
         let (design, data) = (self.design()?, self.whole);
         let folds = [data.train.as_slice(), &data.held_out].concat();
         let train = data.train.len();
@@ -172,21 +166,6 @@ impl Search<'_> {
         let design = design.with_own_reference(&first.parameters)?;
         let folds = if design.needs().of_reference() { read(&design)? } else { folds };
         Ok(OwnTorqueFit { design, fit: first, folds })
-    }
-
-    /// The places, ascending, of the effects that were found and of which a parameter is certain to be beyond
-    /// its bounds: its 95 % interval is. Constants that were refined since it was chosen may have led there,
-    /// or a point of linearisation that has moved.
-    fn impossible(&self, model: &Identified) -> Vec<usize> {
-        let found = model.design.effects().iter().enumerate().skip(self.declared);
-        let is_beyond = |place: usize, effect: &dyn Effect| {
-            let own = model.design.effect_parameters(place);
-            own.zip(effect.parameters()).any(|(parameter, info)| {
-                let [low, high] = model.fit.intervals_95[parameter];
-                high < info.bounds.0 || low > info.bounds.1
-            })
-        };
-        found.filter(|(place, effect)| is_beyond(*place, effect.as_ref())).map(|(place, _)| place).collect()
     }
 
     /// Of the `named` effects, the first that were found, those of which no parameter is certain: the 95 %
