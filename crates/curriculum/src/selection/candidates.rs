@@ -120,8 +120,8 @@ impl MotionCandidates {
         }
     }
 
-    /// Of R of each motion, however it came about: of motions that were reduced elsewhere, or before. The rows
-    /// were weighted with `weights`; a motion has `rate_hz` rows a second.
+    /// Of R of each motion, however it came about: of motions that were reduced elsewhere, or before. The
+    /// rows were weighted with `weights`; a motion has `rate_hz` rows a second.
     ///
     /// # Errors
     /// There is no motion, or their columns are not the same.

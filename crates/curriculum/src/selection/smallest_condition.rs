@@ -10,9 +10,9 @@ use std::collections::BinaryHeap;
 /// Equation (11): the motion with which cond of all measured rows and its own is smallest.
 ///
 /// Exact, but most candidates are never merged. Each has a lower bound of its cond for the price of two
-/// products with what has been measured, a closer one for the price of twenty, and its own cond for that of a
-/// merge. Whichever candidate has the lowest number is looked at more closely, until two numbers that are exact
-/// are no higher than any bound.
+/// products with what has been measured, a closer one for the price of twenty, and its own cond for that of
+/// a merge. Whichever candidate has the lowest number is looked at more closely, until two numbers that are
+/// exact are no higher than any bound.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SmallestCondition;
 

@@ -209,8 +209,8 @@ impl Triangle {
     }
 }
 
-/// The reflections of [`Triangle::absorb`]; a type and no closure, so that all of it is compiled for the widest
-/// registers there are.
+/// The reflections of [`Triangle::absorb`]; a type and no closure, so that all of it is compiled for the
+/// widest registers there are.
 struct Absorb<'a> {
     size: usize,
     above: &'a mut [f64],

@@ -6,8 +6,8 @@ use phiw_identification::fitting::Fit;
 use phiw_identification::{Design, IdentificationError};
 
 impl Search<'_> {
-    /// The places, ascending, of the effects of which a parameter is certain to be beyond its bounds: its 95 %
-    /// interval is. Constants that were refined since it was chosen may have led there, or a point of
+    /// The places, ascending, of the effects of which a parameter is certain to be beyond its bounds: its
+    /// 95 % interval is. Constants that were refined since it was chosen may have led there, or a point of
     /// linearisation that has moved; or it was declared. Of declared effects none where these stay.
     pub(super) fn impossible(&self, design: &Design, fit: &Fit) -> Vec<(usize, Withdrawn)> {
         let first = if self.declared_stays { self.declared } else { 0 };
