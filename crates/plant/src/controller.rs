@@ -4,6 +4,7 @@ use crate::PlantError;
 use crate::error::check_value;
 use crate::step_solver::inverse;
 use phiw_dynamics::check::check_size;
+use phiw_dynamics::dense::Cholesky;
 use phiw_dynamics::{DimensionError, Tree, Workspace};
 
 /// What a controller believes that a motion needs.
@@ -102,6 +103,9 @@ pub struct GainSettings {
     /// Position gain over the effort limit \[1/rad, 1/m\] that a joint has at least, as dry friction would
     /// hold a light joint wherever it is.
     pub stiffness: f64,
+    /// Where the robot's weight would pull it over from the neutral configuration, however well the model knows
+    /// it: position gain over what just holds a joint, that each has at least. 0 to let it fall.
+    pub gravity: f64,
     /// Largest K_p·T² over the joint's inertia, as commands that are held are a delay: the square of the
     /// largest bandwidth times T.
     pub held_inertia: f64,
@@ -111,10 +115,10 @@ pub struct GainSettings {
 
 impl Default for GainSettings {
     /// Small gains, as the paper's: half of the effort limit for a radian, of which a robot's own weight
-    /// pulls a third. The bounds of held commands leave the loops of `cargo xtask paper` (0.01 s) stable in
+    /// pulls a third, and no less than its weight asks for. The bounds of held commands leave the loops of `cargo xtask paper` (0.01 s) stable in
     /// both engines.
     fn default() -> Self {
-        GainSettings { bandwidth: 0.0, stiffness: 0.5, held_inertia: 0.04, held_friction: 0.3 }
+        GainSettings { bandwidth: 0.0, stiffness: 0.5, gravity: 1.5, held_inertia: 0.04, held_friction: 0.3 }
     }
 }
 
@@ -139,20 +143,54 @@ impl Gains {
         if !viscous.is_empty() {
             check_size("the joints' viscous friction", viscous.len(), joints)?;
         }
-        let GainSettings { bandwidth, stiffness, held_inertia, held_friction } = *settings;
+        let GainSettings { bandwidth, stiffness, gravity, held_inertia, held_friction } = *settings;
+        let pulls = weight_pulls(tree)?;
         let viscous = |joint: usize| viscous.get(joint).copied().unwrap_or(0.0);
-        let stiff = |joint: usize| {
-            let wanted =
-                (bandwidth * bandwidth * inertia[joint]).max(stiffness * tree.joint(joint).limits.effort);
+        let stiff = |joint: usize, against_weight: f64| {
+            let wanted = (bandwidth * bandwidth * inertia[joint])
+                .max(stiffness * tree.joint(joint).limits.effort)
+                .max(gravity * against_weight);
             let most =
                 held_inertia * inertia[joint] / period_s.powi(2) + held_friction * viscous(joint) / period_s;
             wanted.min(most)
         };
-        let position: Vec<f64> = (0..joints).map(stiff).collect();
+        let mut position: Vec<f64> = (0..joints).map(|joint| stiff(joint, 0.0)).collect();
+        let stands = |row: usize, column: usize| {
+            let own = if row == column { position[row] } else { 0.0 };
+            own - 0.5 * (pulls[row][column] + pulls[column][row])
+        };
+        if Cholesky::of(joints, stands).is_none() {
+            // More than a row's sum on the diagonal makes all joints together stand (Gershgorin).
+            let row = |joint: usize| -> f64 {
+                let others = pulls[joint].iter().enumerate().filter(|(other, _)| *other != joint);
+                pulls[joint][joint] + others.map(|(_, pull)| pull.abs()).sum::<f64>()
+            };
+            position = (0..joints).map(|joint| stiff(joint, row(joint))).collect();
+        }
         let damping =
             |joint: usize| (2.0 * (position[joint] * inertia[joint]).sqrt() - viscous(joint)).max(0.0);
         Ok(Gains { velocity: (0..joints).map(damping).collect(), position })
     }
+}
+
+/// The torque per radian (force per metre) with which the robot's weight pulls each joint away from the neutral
+/// configuration where another joint moves, and where it moves itself, as an inverted pendulum.
+fn weight_pulls(tree: &Tree) -> Result<Vec<Vec<f64>>, DimensionError> {
+    const STEP: f64 = 1e-4;
+    let (size, joints) = (tree.velocity_size(), tree.joint_count());
+    let (neutral, rest) = (tree.neutral_configuration(), vec![0.0; size]);
+    let mut workspace = Workspace::new(tree);
+    let mut held = |joint: usize, step: f64| -> Result<Vec<f64>, DimensionError> {
+        let (mut q, mut torque) = (neutral.clone(), vec![0.0; size]);
+        q[neutral.len() - joints + joint] += step;
+        tree.inverse_dynamics(&q, &rest, &rest, &mut workspace, &mut torque)?;
+        Ok(torque.split_off(size - joints))
+    };
+    let of_joint = |joint: usize| {
+        let (before, after) = (held(joint, -STEP)?, held(joint, STEP)?);
+        Ok(before.iter().zip(&after).map(|(before, after)| (before - after) / (2.0 * STEP)).collect())
+    };
+    (0..joints).map(of_joint).collect()
 }
 
 /// The least [`apparent_inertia`] of each joint over configurations.
@@ -262,6 +300,7 @@ mod tests {
         let settings = |bandwidth, stiffness| GainSettings {
             bandwidth,
             stiffness,
+            gravity: 0.0,
             held_inertia: 0.04,
             held_friction: 0.3,
         };
@@ -286,6 +325,31 @@ mod tests {
         assert!(gains.velocity.iter().all(|&gain| gain == 0.0));
         assert!(Gains::held(&tree, &inertia[1..], &[], 0.01, &GainSettings::default()).is_err());
         assert!(Gains::held(&tree, &inertia, &friction[1..], 0.01, &GainSettings::default()).is_err());
+        Ok(())
+    }
+
+    /// A rod of 8 kg that stands upright, its centre of mass 0.5 m above the joint: m·g·c = 39.24 N·m/rad.
+    #[test]
+    fn a_body_that_stands_above_its_joint_is_held() -> Result<(), Box<dyn std::error::Error>> {
+        let urdf = |z: f64| {
+            format!(
+                r#"<robot name="rod"><link name="base"/>
+                <link name="rod"><inertial><origin xyz="0 0 {z}"/><mass value="8"/>
+                  <inertia ixx="0.7" iyy="0.7" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+                <joint name="hip" type="revolute"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>
+                  <limit lower="-1" upper="1" effort="40" velocity="4"/></joint></robot>"#
+            )
+        };
+        let position = |z: f64, gravity: f64| -> Result<f64, Box<dyn std::error::Error>> {
+            let tree = phiw_dynamics::urdf::read_urdf(&urdf(z), &Default::default())?.tree;
+            let settings = GainSettings { gravity, ..GainSettings::default() };
+            Ok(Gains::held(&tree, &[2.7], &[], 0.01, &settings)?.position[0])
+        };
+        // Half of the effort limit would let it fall.
+        assert!((position(0.5, 0.0)? - 20.0).abs() < 1e-9);
+        assert!((position(0.5, 1.5)? - 1.5 * 39.24).abs() < 1e-3, "{}", position(0.5, 1.5)?);
+        // One that hangs needs no more.
+        assert!((position(-0.5, 1.5)? - 20.0).abs() < 1e-9);
         Ok(())
     }
 

@@ -25,7 +25,7 @@ const HIGHEST_HZ: f64 = 1.2;
 const USED: [f64; 2] = [0.6, 0.7];
 /// Gains that are small, so that tracking is poor.
 const GAINS: GainSettings =
-    GainSettings { bandwidth: 8.0, stiffness: 0.15, held_inertia: 0.04, held_friction: 0.0 };
+    GainSettings { bandwidth: 8.0, stiffness: 0.15, gravity: 0.0, held_inertia: 0.04, held_friction: 0.0 };
 /// Least inertia of a rotor behind its gear, over the effort limit \[kg·m²/(N·m)\]: in light joints it
 /// outweighs the link.
 const ROTOR: f64 = 1e-3;
