@@ -103,8 +103,8 @@ pub struct GainSettings {
     /// Position gain over the effort limit \[1/rad, 1/m\] that a joint has at least, as dry friction would
     /// hold a light joint wherever it is.
     pub stiffness: f64,
-    /// Where the robot's weight would pull it over from the neutral configuration, however well the model knows
-    /// it: position gain over what just holds a joint, that each has at least. 0 to let it fall.
+    /// Where the robot's weight would pull it over from the neutral configuration, however well the model
+    /// knows it: position gain over what just holds a joint, that each has at least. 0 to let it fall.
     pub gravity: f64,
     /// Largest K_p·T² over the joint's inertia, as commands that are held are a delay: the square of the
     /// largest bandwidth times T.
@@ -115,8 +115,8 @@ pub struct GainSettings {
 
 impl Default for GainSettings {
     /// Small gains, as the paper's: half of the effort limit for a radian, of which a robot's own weight
-    /// pulls a third, and no less than its weight asks for. The bounds of held commands leave the loops of `cargo xtask paper` (0.01 s) stable in
-    /// both engines.
+    /// pulls a third, and no less than its weight asks for. The bounds of held commands leave the loops of
+    /// `cargo xtask paper` (0.01 s) stable in both engines.
     fn default() -> Self {
         GainSettings { bandwidth: 0.0, stiffness: 0.5, gravity: 1.5, held_inertia: 0.04, held_friction: 0.3 }
     }
@@ -173,8 +173,8 @@ impl Gains {
     }
 }
 
-/// The torque per radian (force per metre) with which the robot's weight pulls each joint away from the neutral
-/// configuration where another joint moves, and where it moves itself, as an inverted pendulum.
+/// The torque per radian (force per metre) with which the robot's weight pulls each joint away from the
+/// neutral configuration where another joint moves, and where it moves itself, as an inverted pendulum.
 fn weight_pulls(tree: &Tree) -> Result<Vec<Vec<f64>>, DimensionError> {
     const STEP: f64 = 1e-4;
     let (size, joints) = (tree.velocity_size(), tree.joint_count());
