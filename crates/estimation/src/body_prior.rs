@@ -11,6 +11,7 @@ use phiw_consistency::{PriorSettings, PseudoInertia, possible_priors};
 use phiw_dynamics::dense::Cholesky;
 use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
 use phiw_identification::Design;
+use std::ops::Range;
 
 /// Rows of a pseudo-inertia.
 const ROWS: usize = 4;
@@ -41,7 +42,8 @@ impl BodyPrior {
         let rounded: Vec<[f64; PARAMETERS_PER_BODY]> = described
             .iter()
             .map(|body| {
-                round(body, roundness, settings.least_mass * mean_mass, settings.least_radius * lengths)
+                let masses = settings.least_mass * mean_mass..mean_mass;
+                round(body, roundness, masses, settings.least_radius * lengths)
             })
             .collect();
         // What is nothing at all stays for the general remedy.
@@ -161,17 +163,25 @@ impl BodyPrior {
 /// impossible: second moments about the centre of mass along all axes are then at least that share of their
 /// mean. The mean is at least a quarter of that about the joint, and a sphere's of `least_radius`: what is
 /// left of an inertia without its mass's own share may be less than nothing where each of them is uncertain.
+///
+/// A body whose first moments ask for a larger second moment than it has is too light for them: its centre of
+/// mass would be far outside of it. It is given the mass with which it is not, up to the mean of all bodies
+/// (the end of `masses`, which begins with the least). Of all ways to make it possible this is the one that a
+/// motion can take back at the least price: what is lighter than its prior costs a logarithm, what is heavier
+/// or elsewhere, many times the prior's size, costs its square.
 fn round(
     body: &[f64; PARAMETERS_PER_BODY],
     roundness: f64,
-    least_mass: f64,
+    masses: Range<f64>,
     least_radius: f64,
 ) -> [f64; PARAMETERS_PER_BODY] {
-    let mass = body[0].max(least_mass);
     let whole = PseudoInertia::of_parameters(body);
+    let about_joint: f64 = (0..3).map(|axis| whole.entry(axis, axis)).sum();
+    let first_moment: f64 = (0..3).map(|axis| whole.entry(axis, 3).powi(2)).sum();
+    let asked_for = if about_joint > 0.0 { first_moment / about_joint } else { 0.0 };
+    let mass = body[0].max(masses.start).max(asked_for.min(masses.end));
     let centre: [f64; 3] = std::array::from_fn(|axis| whole.entry(axis, 3) / mass);
     let about = |row: usize, column: usize| whole.entry(row, column) - mass * centre[row] * centre[column];
-    let about_joint: f64 = (0..3).map(|axis| whole.entry(axis, axis)).sum();
     let about_centre: f64 = (0..3).map(|axis| about(axis, axis)).sum();
     let mean = about_centre.max(LEFT_OF_INERTIA * about_joint).max(3.0 * mass * least_radius.powi(2)) / 3.0;
     let Ok(eigen) = Mat::from_fn(3, 3, about).self_adjoint_eigen(Side::Lower) else { return *body };
@@ -271,7 +281,27 @@ mod tests {
     fn whatever_was_believed_the_prior_is_possible() {
         let bodies = [[2.0, 0.6, -2.0, 1.0, 0.1, 0.6, 0.2, -0.3, 0.1, 0.3], [0.0; 10], [1.0; 10]];
         for body in bodies {
-            assert!(PseudoInertia::of_parameters(&round(&body, 0.4, 0.1, 0.02)).is_possible(), "{body:?}");
+            assert!(
+                PseudoInertia::of_parameters(&round(&body, 0.4, 0.1..1.0, 0.02)).is_possible(),
+                "{body:?}"
+            );
         }
+    }
+
+    /// A hand of 1.3 kg that was believed to weigh 0.11 kg, with the same first moment: its centre of mass
+    /// would be a metre away. A prior about that cost hundreds of nats, and no log of a minute moved it.
+    #[test]
+    fn a_body_that_is_too_light_for_its_first_moment_does_not_bar_the_true_one() {
+        let hand = [1.3, 0.11, 0.0, 0.0, 0.0065, 0.0, 0.016, 0.0, 0.0, 0.016];
+        let believed = [0.11, 0.11, 0.0, 0.0, 0.006, 0.0, 0.017, 0.0, 0.0, 0.023];
+        let far = |prior: [f64; PARAMETERS_PER_BODY]| {
+            PseudoInertia::of_parameters(&hand).divergence(&PseudoInertia::of_parameters(&prior))
+        };
+        let mended = round(&believed, 0.4, 0.1..2.0, 0.02);
+        assert!(far(mended) < 40.0, "{mended:?}: {}", far(mended));
+        // What it was: the centre of mass stays a metre away.
+        assert!(far(round(&believed, 0.4, 0.1..0.1, 0.02)) > 200.0);
+        // A possible body keeps its mass.
+        assert_eq!(round(&hand, 0.4, 0.1..2.0, 0.02)[0], 1.3);
     }
 }

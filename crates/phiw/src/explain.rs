@@ -12,7 +12,7 @@ use crate::model_file::ModelFile;
 use crate::output::take_folder;
 use crate::report_json::{by_joint, report_json};
 use crate::session::{Session, read_robot};
-use crate::{Error, bandwidth, summary};
+use crate::{Error, bandwidth, refuted, summary};
 use indexmap::IndexMap;
 use phiw_effects::{Catalogue, SignalRanges, smoothing_corner_hz};
 use phiw_identification::fitting::TorqueError;
@@ -24,7 +24,7 @@ use phiw_report::json::{
 };
 use phiw_report::number::significant;
 use phiw_residual::trace::{
-    self, HeldModel, ScannedConstant, Thresholds, TraceInput, TraceOptions, Tracing, Withdrawn, trace,
+    self, HeldModel, ScannedConstant, Thresholds, TraceInput, TraceOptions, Tracing, trace,
 };
 use std::fmt::Write;
 
@@ -106,7 +106,7 @@ fn results_in_band(
     analysis.warnings.extend(tracing.not_judged.iter().map(|(kind, joints)| {
         format!("{kind} of {} could not be judged on these logs (its columns are not finite): not all of it was sought", joints.join(", "))
     }));
-    analysis.warnings.extend(tracing.withdrawn.iter().map(withdrawn));
+    analysis.warnings.extend(refuted::sentences(&tracing.withdrawn));
     if tracing.held_out_had_a_say {
         analysis.warnings.push(HELD_OUT_HAD_A_SAY.to_owned());
     }
@@ -129,28 +129,6 @@ fn results_in_band(
     let mut summary = story(&analysis, &tracing, in_draws);
     summary.push_str(&summary::summary(&analysis, &arguments.session.out, &files));
     Ok(Results { files, summary, warnings: analysis.warnings, report })
-}
-
-/// What is said of a declared effect that the logs refute.
-fn withdrawn(effect: &Withdrawn) -> String {
-    let [low, high] = effect.interval_95.map(|value| significant(value, 3));
-    let (bound, side) = match effect.interval_95[1] < effect.bounds.0 {
-        true => (effect.bounds.0, "below"),
-        false => (effect.bounds.1, "above"),
-    };
-    let what_follows = match effect.kept {
-        true => "it stays, since without it the error on motion held out is larger",
-        false => "it is not in the model",
-    };
-    format!(
-        "{} of {} was declared, and the logs refute it: its {} is between {low} and {high} {} (95 %), and can not \
-         be {side} {}; {what_follows}",
-        effect.spec.kind.replace('_', " "),
-        effect.spec.joints.join(", "),
-        effect.name,
-        effect.unit,
-        significant(bound, 3),
-    )
 }
 
 /// What is said where motion held out decided what is in the model.

@@ -40,6 +40,7 @@ pub mod page;
 mod parameters;
 pub mod possible_bodies;
 pub mod predict;
+mod refuted;
 pub mod report_json;
 pub mod retarget;
 pub mod robot_file;

@@ -190,6 +190,13 @@ impl Setup {
         };
         let slower = method::slower(arguments, &subject);
         let dataset = MotionDataset::new(subject.tree.joint_count(), motions.identification)?;
+        let subject = match arguments.method {
+            Some(Method::Ours) => {
+                let all = dataset.motions().iter().chain(&motions.validation);
+                subject.with_gains_for(all, timing.control_period_s)?
+            }
+            _ => subject,
+        };
         let dataset = dataset.with_slower(&slower)?;
         let weights = subject.row_weights(if arguments.noise > 0.0 { arguments.noise } else { NOISELESS });
         let candidates = MotionCandidates::new(&robot, robot.declared(), &dataset, &weights)?.determined();

@@ -4,13 +4,14 @@ use super::arguments::Method;
 use super::whole_body::{self, Standing};
 use crate::environment;
 use anyhow::Context;
+use phiw_curriculum::motion::Motion;
 use phiw_dynamics::inertia::InertialParameters;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf_file};
 use phiw_dynamics::{Foot, Tree, World};
 use phiw_effects::Catalogue;
 use phiw_estimation::{Robot, RobotModel};
 use phiw_identification::EffectSpec;
-use phiw_plant::{Friction, GainSettings, Gains, PlantEffect, apparent_inertia};
+use phiw_plant::{Friction, GainSettings, Gains, PlantEffect, apparent_inertia, least_apparent_inertia};
 use phiw_zmp::{Stance, SupportPolygon, feet_from_toml};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -37,6 +38,8 @@ const VISCOUS_SHARE: f64 = 0.02;
 const FASTEST: f64 = 4.0;
 /// Inertia of each rotor of the Torobo \[kg·m²\], as its file says in words since a URDF has no place for it.
 const TOROBO_ARMATURE: f64 = 0.1;
+/// Time between the configurations at which the joints' inertias are looked at \[s\].
+const INERTIA_EVERY_S: f64 = 0.1;
 /// Base of the Torobo: mass \[kg\], half a side of its square sole and height of its centre \[m\].
 const BASE: [f64; 3] = [25.0, 0.2, 0.2];
 
@@ -148,6 +151,31 @@ impl Subject {
         let settings = GainSettings::default();
         let gains = Gains::held(&self.tree, &inertia, &self.viscous, control_period_s, &settings)?;
         Ok(Subject { rotor_inertia, declares_rotors: method == Method::Ours, gains, ..self })
+    }
+
+    /// The same with gains for what each joint feels least in any of these motions: with its hand turned a
+    /// wrist feels a fifth of what it feels in the neutral configuration, and gains that are made for that
+    /// and held for a period are unstable there. On its feet it keeps the gains that it has.
+    ///
+    /// # Errors
+    /// A motion is not of this robot.
+    pub fn with_gains_for<'a>(
+        self,
+        motions: impl Iterator<Item = &'a Motion>,
+        control_period_s: f64,
+    ) -> anyhow::Result<Self> {
+        if self.standing.is_some() {
+            return Ok(self);
+        }
+        let configurations = |motion: &'a Motion| {
+            let every = ((INERTIA_EVERY_S / motion.period_s()).round() as usize).max(1);
+            (0..motion.samples()).step_by(every).map(|sample| motion.sample(sample)[0].to_vec())
+        };
+        let all = motions.flat_map(configurations).chain([self.tree.neutral_configuration()]);
+        let inertia = least_apparent_inertia(&self.tree, &self.rotor_inertia, all)?;
+        let settings = GainSettings::default();
+        let gains = Gains::held(&self.tree, &inertia, &self.viscous, control_period_s, &settings)?;
+        Ok(Subject { gains, ..self })
     }
 
     /// What is declared.
