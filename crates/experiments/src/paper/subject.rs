@@ -277,3 +277,43 @@ pub fn arm_gains(tree: &Tree, viscous: &[f64], control_period_s: f64) -> anyhow:
     let inertia = apparent_inertia(tree, &[], &tree.neutral_configuration())?;
     Ok(Gains::held(tree, &inertia, viscous, control_period_s, &GainSettings::default())?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD_S: f64 = 0.01;
+
+    /// Raised arms and turned hands: gains of the neutral configuration are too stiff for some joint there.
+    #[test]
+    fn gains_are_no_stiffer_than_any_motion_allows() -> anyhow::Result<()> {
+        let subject = Subject::read(SubjectName::UpperBody18, PERIOD_S)?;
+        let (samples, joints) = (41, subject.tree.joint_count());
+        let swing = |t_s: f64, q: &mut [f64], _: &mut [f64], _: &mut [f64]| {
+            for (joint, q) in q.iter_mut().enumerate() {
+                let limits = subject.tree.joint(joint).limits;
+                let end = if joint % 2 == 0 { limits.lower } else { limits.upper };
+                *q = 0.9 * end * (t_s / 4.0);
+            }
+        };
+        let motion = Motion::of_reference("reach", "reach", joints, (samples, 0.1), swing)?;
+        let too_stiff = |gains: &Gains| -> anyhow::Result<bool> {
+            for sample in 0..samples {
+                let inertia = apparent_inertia(&subject.tree, &[], motion.sample(sample)[0])?;
+                let settings = GainSettings::default();
+                let own = Gains::held(&subject.tree, &inertia, &subject.viscous, PERIOD_S, &settings)?;
+                let mut pairs = gains.position.iter().zip(&own.position);
+                if pairs.any(|(gain, most)| *gain > most * (1.0 + 1e-9)) {
+                    return Ok(true);
+                }
+            }
+            Ok(false)
+        };
+        assert!(too_stiff(&subject.gains)?);
+        let gains = Subject::read(SubjectName::UpperBody18, PERIOD_S)?
+            .with_gains_for([&motion].into_iter(), PERIOD_S)?
+            .gains;
+        assert!(!too_stiff(&gains)?);
+        Ok(())
+    }
+}
