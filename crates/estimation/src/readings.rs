@@ -99,6 +99,14 @@ impl Readings {
         readings
     }
 
+    /// Whether they are of a log of so many periods and joints: those that an earlier version wrote down are
+    /// not.
+    pub(crate) fn fits(&self, periods: usize, joints: usize) -> bool {
+        let count = periods * joints;
+        let sizes = [self.noise.len(), self.products.len(), self.sums.len()];
+        sizes == [joints, count * TRIANGLE, count * CUBIC]
+    }
+
     /// Σ weight·shares·sharesᵀ of a period and joint, and what its readings have beside a cubic, Σ
     /// weight·shares·(angle − cubic).
     pub(crate) fn of_period(
@@ -128,6 +136,14 @@ impl Readings {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn readings_of_another_log_are_told() {
+        let recording = Recording { joints: vec!["a".to_owned()], q: vec![0.0; 5], ..Recording::default() };
+        let readings = Readings::of(&recording, &[0.0, 1.0, 2.0, 3.0, 4.0], 4, &[1e-3]);
+        assert!(readings.fits(4, 1));
+        assert!(!readings.fits(5, 1) && !readings.fits(2, 2) && !Readings::default().fits(4, 1));
+    }
 
     /// A joint that takes four readings for a step, stands, and then takes two steps a reading.
     #[test]

@@ -85,6 +85,12 @@ impl Belief<'_> {
         if !measured.still.is_empty() || periods < 3 {
             return Ok(None);
         }
+        if !readings.fits(periods, joints) {
+            return Err(EstimationError::Log(
+                "its encoders' readings are not of its rows, or were written down by an earlier version: read the \
+                 log again",
+            ));
+        }
         let stretches = self.stretches(measured)?;
         let asked = self.asked(measured)?;
         let (t, n) = (measured.period_s, joints);
