@@ -41,8 +41,9 @@ struct Known {
     weight: f64,
 }
 
-/// Longest run of equal readings that sharpens the change at its end: beyond that the error is no longer that
-/// of the time, since an encoder's own lines are a tenth of a step off. Set by hand, no command calibrates it.
+/// Longest run of equal readings that sharpens the change at its end. Beyond that the error is no longer
+/// that of the time, since an encoder's own lines are a tenth of a step off. Set by hand, no command
+/// calibrates it.
 const LONGEST_RUN: usize = 10;
 
 /// What readings say of one joint's angle.
