@@ -3,7 +3,7 @@
 use crate::declaration::{cannot_act, joint_indices, nearest};
 use crate::{EffectKind, FittedEffect, Mechanisms, ServoFriction};
 use crate::{coupling, drift, drive, efficiency, elasticity, external, friction, hysteresis};
-use crate::{logged_torque, position, position_map, sensing};
+use crate::{logged_torque, position, position_map, sensing, torque_zero};
 use phiw_codegen::JointTorque;
 use phiw_dynamics::Tree;
 use phiw_identification::effect::{EffectError, EffectParameter, JointProperty};
@@ -45,6 +45,7 @@ impl Default for Catalogue {
                 Box::new(efficiency::DriveEfficiency),
                 Box::new(position_map::PositionMap),
                 Box::new(logged_torque::TorqueSmoothing),
+                Box::new(torque_zero::TorqueZeroByLog),
             ],
         }
     }

@@ -53,17 +53,29 @@ impl Catalogue {
         sites.iter().all(|site| !kind.scan(site, ranges).is_empty())
     }
 
+    /// A kind that can be declared, by its name.
+    ///
+    /// # Errors
+    /// There is none of that name, or it is only ever found.
+    pub fn declarable(&self, name: &str) -> Result<&dyn EffectKind, EffectError> {
+        let kind = self.kind(name)?;
+        if kind.is_of_training_logs() {
+            return Err(EffectError::NotDeclared { kind: name.to_owned() });
+        }
+        Ok(kind)
+    }
+
     /// Declarations in the syntax of [`declare`](Self::declare), each kind's united and its joints in the
     /// order of the robot; empty ones and `rigid_body`, which is always there, are left out.
     ///
     /// # Errors
-    /// A kind or a joint is unknown, or a kind cannot act where it is declared.
+    /// A kind or a joint is unknown, or a kind cannot act where it is declared, or not be declared.
     pub fn united(&self, declared: &[String], tree: &Tree) -> Result<Vec<String>, EffectError> {
         let mut united: Vec<(&dyn EffectKind, Sites)> = Vec::new();
         let texts = declared.iter().map(|text| text.trim());
         for text in texts.filter(|text| !text.is_empty() && *text != "rigid_body") {
             let selector = EffectSelector::read(text);
-            let kind = self.kind(&selector.kind)?;
+            let kind = self.declarable(&selector.kind)?;
             let sites = declared_sites(kind, &selector, tree)?;
             match united.iter_mut().find(|(other, _)| other.name() == kind.name()) {
                 Some((_, own)) => own.extend(sites),

@@ -45,6 +45,11 @@ impl<'a> FittedEffect<'a> {
         self.spec.constants.get(name).copied().unwrap_or_default()
     }
 
+    /// The values of its parameters, in their order and units.
+    pub fn values(&self) -> &'a [f64] {
+        self.values
+    }
+
     /// The value of the parameter at `place`, in its own unit; zero if there is none.
     pub fn value(&self, place: usize) -> f64 {
         self.values.get(place).copied().unwrap_or_default()

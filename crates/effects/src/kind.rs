@@ -169,6 +169,12 @@ pub trait EffectKind: Send + Sync {
         false
     }
 
+    /// Whether its parameters belong to the training logs and say nothing of any other motion: it cannot be
+    /// declared, and motion held out is no judge of it.
+    fn is_of_training_logs(&self) -> bool {
+        false
+    }
+
     /// Whether it changes with the time since the session began, so that logs whose clocks each begin anew
     /// cannot tell it.
     fn needs_session_time(&self) -> bool {
@@ -207,6 +213,8 @@ pub struct SignalRanges {
     pub ripple_frequencies: Vec<Vec<f64>>,
     /// Whether any joint has a temperature.
     pub temperature: bool,
+    /// Number of training logs.
+    pub logs: usize,
 }
 
 impl SignalRanges {
@@ -238,6 +246,7 @@ impl SignalRanges {
             period: surveys.first().map_or(0.0, |survey| survey.period),
             ripple_frequencies: vec![Vec::new(); count],
             temperature: surveys.iter().any(|survey| survey.joints.iter().any(|joint| joint.temperature)),
+            logs: surveys.len(),
         }
     }
 }

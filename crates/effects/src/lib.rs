@@ -19,6 +19,7 @@ mod position;
 mod position_map;
 mod sensing;
 mod sign;
+mod torque_zero;
 mod trigonometric_spline;
 
 pub use catalogue::{Catalogue, sentence};
@@ -28,3 +29,4 @@ pub use kind::{Constants, EffectKind, JointRange, Signal, SignalRanges};
 pub use logged_torque::smoothing_corner_hz;
 pub use mechanism::{Mechanism, Mechanisms, ServoFriction};
 pub use sign::smooth_sign;
+pub use torque_zero::{TorqueZeros, torque_zeros};

@@ -54,6 +54,7 @@ impl Zoo {
             period: PERIOD,
             ripple_frequencies: vec![vec![12.0]; joints],
             temperature: true,
+            logs: 2,
         };
         let (mut effects, mut kinds) = (Vec::new(), Vec::new());
         for kind in Catalogue::default().kinds() {

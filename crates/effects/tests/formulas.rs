@@ -82,6 +82,7 @@ fn every_formula_is_its_effect() {
         period: 0.01,
         ripple_frequencies: vec![vec![12.0]; joints],
         temperature: false,
+        logs: 2,
     };
     let mut random = RandomNumbers::new(7);
     let mut with = Vec::new();

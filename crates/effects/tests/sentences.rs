@@ -69,6 +69,7 @@ const SENTENCES: &[(&str, &str)] = &[
         "The torque of shoulder depends on its position in no simple form (a cable, a hose, cogging): it varies by 0.159 N·m RMS from -1.000 to 1.000 rad.",
     ),
     ("torque_smoothing", "The torque of shoulder is low-passed before it is logged, at about 0.2 Hz."),
+    ("torque_zero_by_log", "The zero of the torque of shoulder differs from log to log, by up to 1.00 N·m."),
 ];
 
 /// The kind on its first site, with the last of its constants and parameters 0.5, 0.25, 0.125, …
@@ -86,6 +87,7 @@ fn said(tree: &Tree, kind: &dyn EffectKind) -> String {
         period: 0.01,
         ripple_frequencies: vec![vec![12.0]; 2],
         temperature: false,
+        logs: 2,
     };
     let site = kind.sites(tree).remove(0);
     let constants = kind.scan(&site, &ranges).pop().unwrap();

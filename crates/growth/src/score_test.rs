@@ -320,5 +320,7 @@ fn ranges(robot: &Robot, logs: &[MotionLog]) -> SignalRanges {
         period: logs.first().map_or(0.0, |log| log.period_s),
         ripple_frequencies: vec![Vec::new(); joints],
         temperature: false,
+        // A simulated or real loop zeroes no torque between motions.
+        logs: 1,
     }
 }

@@ -177,6 +177,14 @@ pub enum EffectError {
         /// All known kinds.
         known: Vec<String>,
     },
+    /// A kind that is only ever found.
+    #[error(
+        "effect `{kind}` belongs to the training logs and cannot be declared; `phiw explain` seeks it by itself"
+    )]
+    NotDeclared {
+        /// What was asked for.
+        kind: String,
+    },
     /// No such joint.
     #[error("effect `{kind}` names the joint `{joint}`, which the robot does not have or which does not move{}; moving joints are: {}", nearest.as_ref().map(|name| format!(" (did you mean `{name}`?)")).unwrap_or_default(), known.join(", "))]
     UnknownJoint {

@@ -35,33 +35,26 @@ impl Interruption {
 
 /// A log of a session, which is read again for every pass.
 pub struct LogFile<'a> {
-    survey: &'a Survey,
-    conditioning: &'a Conditioning,
-    payload: Option<&'a KnownPayload>,
-    interruption: &'a Interruption,
-    progress: Progress<'a>,
-}
-
-impl<'a> LogFile<'a> {
-    pub(crate) fn new(
-        survey: &'a Survey,
-        conditioning: &'a Conditioning,
-        payload: Option<&'a KnownPayload>,
-        interruption: &'a Interruption,
-        progress: Progress<'a>,
-    ) -> Self {
-        LogFile { survey, conditioning, payload, interruption, progress }
-    }
+    pub(crate) survey: &'a Survey,
+    pub(crate) conditioning: &'a Conditioning,
+    pub(crate) payload: Option<&'a KnownPayload>,
+    /// What its torques are off by, joint by joint \[N·m, N\]; empty where nothing is known.
+    pub(crate) torque_zeros: &'a [f64],
+    pub(crate) interruption: &'a Interruption,
+    pub(crate) progress: Progress<'a>,
 }
 
 impl BlockSource for LogFile<'_> {
     fn stream(&self, sink: &mut dyn FnMut(Block) -> ControlFlow<()>) -> Result<(), LogError> {
-        let LogFile { survey, conditioning, payload, interruption, progress } = *self;
+        let LogFile { survey, conditioning, payload, torque_zeros, interruption, progress } = *self;
         let what = reading("reading", &survey.path);
         let mut report = |done: u64, total: u64| progress(&what, done, total);
         interruption.check()?;
         let mut goes_on = Ok(());
-        let mut sink = |block| {
+        let mut sink = |mut block: Block| {
+            for row in block.tau.chunks_exact_mut(block.joints.max(1)) {
+                row.iter_mut().zip(torque_zeros).for_each(|(torque, zero)| *torque -= zero);
+            }
             goes_on = interruption.check();
             if goes_on.is_ok() { sink(block) } else { ControlFlow::Break(()) }
         };

@@ -24,6 +24,8 @@ pub struct LogSet {
     conditioning: Conditioning,
     /// What the robot held in each log.
     payloads: Vec<Option<KnownPayload>>,
+    /// What the torques of each log are off by, joint by joint \[N·m, N\]; empty where nothing is known.
+    torque_zeros: Vec<Vec<f64>>,
     interruption: Interruption,
 }
 
@@ -119,7 +121,8 @@ impl LogSet {
         let conditioning = Conditioning::choose(training, options)?;
         // Cut-offs that were told must fit the logs held out, too.
         held_out.iter().try_for_each(|survey| conditioning.plan(survey).map(drop))?;
-        Ok(LogSet { train: train.len(), conditioning, surveys, payloads, interruption })
+        let torque_zeros = vec![Vec::new(); surveys.len()];
+        Ok(LogSet { train: train.len(), conditioning, surveys, payloads, torque_zeros, interruption })
     }
 
     /// Logs that were surveyed and conditioned before, the first `train` of them to fit; they are read as
@@ -136,7 +139,9 @@ impl LogSet {
         let payloads = surveys.iter().map(|survey| KnownPayload::of(tree, &survey.source));
         let payloads = payloads.collect::<Result<Vec<_>, LogError>>()?;
         let interruption = Interruption::default();
-        Ok(LogSet { train: train.min(surveys.len()), surveys, conditioning, payloads, interruption })
+        let torque_zeros = vec![Vec::new(); surveys.len()];
+        let train = train.min(surveys.len());
+        Ok(LogSet { train, surveys, conditioning, payloads, torque_zeros, interruption })
     }
 
     /// Reads a log from another place from now on; its content must be the same.
@@ -156,6 +161,7 @@ impl LogSet {
             train: self.train,
             conditioning,
             payloads: self.payloads.clone(),
+            torque_zeros: self.torque_zeros.clone(),
             interruption: self.interruption.clone(),
         }
     }
@@ -176,6 +182,12 @@ impl LogSet {
     /// told (see [`bandwidth`](crate::bandwidth)).
     pub fn set_parallel_cutoff(&mut self, cutoff_hz: f64) {
         self.conditioning.parallel_cutoff_hz = cutoff_hz;
+    }
+    /// Takes these zeros off the torques of a log from now on, joint by joint \[N·m, N\].
+    pub fn set_torque_zeros(&mut self, log: usize, zeros: Vec<f64>) {
+        if let Some(own) = self.torque_zeros.get_mut(log) {
+            *own = zeros;
+        }
     }
     /// What calls work on the logs off.
     pub fn interruption(&self) -> &Interruption {
@@ -252,8 +264,14 @@ impl LogSet {
         conditioning: &'a Conditioning,
         progress: Progress<'a>,
     ) -> LogFile<'a> {
-        let payload = self.payloads[log].as_ref();
-        LogFile::new(&self.surveys[log], conditioning, payload, &self.interruption, progress)
+        LogFile {
+            survey: &self.surveys[log],
+            conditioning,
+            payload: self.payloads[log].as_ref(),
+            torque_zeros: &self.torque_zeros[log],
+            interruption: &self.interruption,
+            progress,
+        }
     }
 }
 

@@ -83,6 +83,10 @@ impl<'a> Sample<'a> {
         let size = rows * self.block.joints;
         values.get(self.index * size..(self.index + 1) * size).unwrap_or(&[])
     }
+    /// Which log of the session it is from, counted from 0.
+    pub fn log(&self) -> usize {
+        self.block.log
+    }
     /// Time in the session \[s\].
     pub fn time(&self) -> f64 {
         self.block.t[self.index] + self.block.session_offset

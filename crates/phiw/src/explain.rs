@@ -12,6 +12,7 @@ use crate::model_file::ModelFile;
 use crate::output::take_folder;
 use crate::report_json::{by_joint, report_json};
 use crate::session::{Session, read_robot};
+use crate::torque_zeros::ZerosOfLogs;
 use crate::{Error, bandwidth, refuted, summary};
 use indexmap::IndexMap;
 use phiw_effects::{Catalogue, SignalRanges, smoothing_corner_hz};
@@ -50,24 +51,42 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
 /// The same, without writing anything.
 ///
 /// Where the torque was low-passed before it was logged, it is traced again in the band that this has left:
-/// above its corner a filter's form decides, and what is not known of it looks like effects.
+/// above its corner a filter's form decides, and what is not known of it looks like effects. Where its zero
+/// differs from log to log, it is traced again without these zeros: they belong to logs, not to a model.
 ///
 /// # Errors
 /// An input is wrong.
 pub fn results(arguments: &ExplainArguments, console: &Console) -> Result<Results, Error> {
-    results_in_band(arguments, console, None)
+    results_knowing(arguments, console, &OfTheLogs::default())
 }
 
-fn results_in_band(
+/// What a first trace has told of the logs, so that it begins again without it.
+#[derive(Clone, Default)]
+struct OfTheLogs {
+    /// What is said of a torque that was low-passed, in whose band all is traced.
+    low_passed: Option<String>,
+    /// The zeros of torques that were found and taken off, and in how many traces.
+    torque_zeros: Option<ZerosOfLogs>,
+    traced_for_zeros: usize,
+}
+
+/// Traces that seek zeros of torques: a zero that is small beside others is found once these are off.
+const TRACES_FOR_ZEROS: usize = 3;
+
+fn results_knowing(
     arguments: &ExplainArguments,
     console: &Console,
-    warning: Option<String>,
+    known: &OfTheLogs,
 ) -> Result<Results, Error> {
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
-    let excluded = excluded(arguments)?;
+    let mut excluded = excluded(arguments)?;
     let mut session = Session::open(&arguments.session, &progress)?;
-    // What a filter of the torque makes of the answer is said by the warning.
-    let bandwidth = match (&arguments.model, &warning) {
+    if let Some(zeros) = &known.torque_zeros {
+        zeros.take_off(&mut session.logs);
+        excluded.extend(zeros.excluded(&session, known.traced_for_zeros == TRACES_FOR_ZEROS));
+    }
+    // What a filter of the torque makes of the answer is said by its warning.
+    let bandwidth = match (&arguments.model, &known.low_passed) {
         (None, None) => bandwidth::of_session(&session, &progress)?,
         _ => None,
     };
@@ -82,7 +101,13 @@ fn results_in_band(
         );
         let mut lower = arguments.clone();
         lower.session.parallel_cutoff_hz = Some(corner_hz);
-        return results_in_band(&lower, console, Some(warning));
+        return results_knowing(&lower, console, &OfTheLogs { low_passed: Some(warning), ..known.clone() });
+    }
+    let zeros = ZerosOfLogs::of(&session, &data, &tracing, known.torque_zeros.as_ref())?;
+    if zeros.is_some() {
+        let traced_for_zeros = known.traced_for_zeros + 1;
+        let known = OfTheLogs { torque_zeros: zeros, traced_for_zeros, ..known.clone() };
+        return results_knowing(arguments, console, &known);
     }
     let names = |data: &Data<'_>| {
         let Traced { tracing, .. } = traced(arguments, &excluded, &session, data)?;
@@ -102,7 +127,10 @@ fn results_in_band(
     let mut analysis =
         Analysis::new(&session, Rows::Logs(&data), &tracing.model, None)?.with_bandwidth(bandwidth);
     analysis.noise_floor = floor;
-    analysis.warnings.extend(warning);
+    analysis.warnings.extend(known.low_passed.clone());
+    if let Some(zeros) = &known.torque_zeros {
+        analysis.warnings.extend(zeros.warning(&session, thresholds(arguments)?.least_size));
+    }
     analysis.warnings.extend(tracing.not_judged.iter().map(|(kind, joints)| {
         format!("{kind} of {} could not be judged on these logs (its columns are not finite): not all of it was sought", joints.join(", "))
     }));

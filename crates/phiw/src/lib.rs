@@ -51,6 +51,7 @@ pub mod simulate;
 pub mod summary;
 pub mod threads;
 mod told;
+mod torque_zeros;
 pub mod traces;
 mod training_actuators;
 pub mod warnings;

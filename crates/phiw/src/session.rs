@@ -178,14 +178,14 @@ pub(crate) fn of_training_logs(error: IdentificationError, logs: &[PathBuf]) -> 
 /// Logs that a message names.
 const LOGS_NAMED: usize = 5;
 
-/// The first kind that is unknown, before anything else is looked at: it needs no robot.
+/// The first kind that is unknown or cannot be declared, before anything else is looked at: it needs no robot.
 ///
 /// # Errors
 /// There is one.
 pub(crate) fn known_kinds(declared: &[String], catalogue: &Catalogue) -> Result<(), EffectError> {
     let kinds = declared.iter().map(|declared| EffectSelector::read(declared).kind);
     for kind in kinds.filter(|kind| !kind.is_empty() && kind != "rigid_body") {
-        catalogue.kind(&kind)?;
+        catalogue.declarable(&kind)?;
     }
     Ok(())
 }

@@ -1,6 +1,8 @@
 //! What the situations that came later must do to a log.
 
-use super::case::{Case, DURATION};
+use super::case::{Case, DURATION, even_times};
+use super::plant::record;
+use super::secret::Secret;
 use super::situation::Situation;
 use super::wide_tests::{column, mean, models, small};
 use std::collections::BTreeSet;
@@ -117,4 +119,33 @@ fn a_smoothed_torque_hardly_bends_from_sample_to_sample() {
         let noise = case.sensors.torque_noise[0];
         assert!(bend < 0.5 * noise, "{bend} {noise}");
     });
+}
+
+#[test]
+fn shifting_zeros_are_another_in_each_log() {
+    let robots = models();
+    for number in 0..3 {
+        let case = small(Situation::ShiftingZeros, number, &robots);
+        let deviations = &case.sensors.logging.as_ref().expect("a wide case").torque_zero;
+        assert!(deviations.iter().any(|deviation| *deviation > 0.0));
+        let with: Vec<String> = case.logs().into_iter().map(|(_, log)| log).collect();
+        for joint in (0..2).filter(|joint| deviations[*joint] > 0.0) {
+            let name = format!("tau.joint_{}", joint + 1);
+            let zeros: Vec<f64> = with
+                .iter()
+                .zip(&case.motions)
+                .map(|(log, motion)| {
+                    let times = even_times(motion, 50.0);
+                    let plant: Vec<&Secret> = case.plant.iter().collect();
+                    let record = record(&case.robot.tree, &case.ordinary, &plant, motion, &times);
+                    let expected = mean(record.torque.iter().skip(joint).step_by(2).copied());
+                    mean(column(log, &name).into_iter()) - expected
+                })
+                .collect();
+            let span = zeros.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b))
+                - zeros.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+            // Three normal numbers are hardly ever closer together, or further apart.
+            assert!((0.05..6.0).contains(&(span / deviations[joint])), "{zeros:?} {deviations:?}");
+        }
+    }
 }

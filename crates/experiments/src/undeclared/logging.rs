@@ -72,6 +72,9 @@ pub struct Logging {
     /// Samples for which a torque is held until it is renewed.
     #[serde(skip_serializing_if = "is_one")]
     pub held_samples: usize,
+    /// Standard deviation of the zeros of each log's torques \[N·m, N\], joint by joint; empty for none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub torque_zero: Vec<f64>,
     /// What its clock and its memory do.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rough: Option<RoughClock>,
@@ -196,7 +199,25 @@ impl Logging {
             let corner = rng.log_uniform(3.0, 12.0);
             if rng.chance(0.5) { Smoothing::Means { corner } } else { Smoothing::Butterworth { corner } }
         });
-        Logging { tails, filter, smoothing, velocity, dead_band, torque_step, held_samples, rough }
+        let mut torque_zero = Vec::new();
+        if situation == Situation::ShiftingZeros {
+            let one = rng.index(joints);
+            torque_zero.extend(torque.iter().enumerate().map(|(joint, torque)| {
+                let share = rng.log_uniform(0.02, 0.3);
+                if joint == one || rng.chance(0.6) { share * torque } else { 0.0 }
+            }));
+        }
+        Logging {
+            tails,
+            filter,
+            smoothing,
+            velocity,
+            dead_band,
+            torque_step,
+            held_samples,
+            torque_zero,
+            rough,
+        }
     }
 
     /// The log's text: `t`, `q.*`, `qd.*` if there is such a column, `tau.*`.
@@ -254,8 +275,10 @@ impl Logging {
         let mut torque = record.torque.clone();
         for joint in 0..joints {
             let noise = self.noise(&record.times, sensors.correlation_time, rng);
+            // Drawn only where there is one, so that logs of other situations stay what they were.
+            let zero = self.torque_zero.get(joint).map_or(0.0, |std| std * rng.normal());
             for (row, noise) in torque.chunks_exact_mut(joints).zip(noise) {
-                row[joint] += sensors.torque_noise[joint] * noise;
+                row[joint] += sensors.torque_noise[joint] * noise + zero;
             }
             if self.filter.is_some() || self.smoothing.is_some() {
                 let mut column: Vec<f64> = torque.iter().skip(joint).step_by(joints).copied().collect();

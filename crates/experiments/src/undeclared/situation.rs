@@ -58,11 +58,14 @@ pub enum Situation {
     /// Whoever published the log smoothed the torque, without delay: by means over neighbouring samples, or
     /// by a Butterworth filter that runs forwards and backwards.
     SmoothedTorque,
+    /// The zeros of some torques are others in each log: sensors that are zeroed anew, or drift overnight.
+    /// What they have in common is an offset, so that is no false name.
+    ShiftingZeros,
 }
 
 impl Situation {
     /// All situations.
-    pub const ALL: [Situation; 23] = [
+    pub const ALL: [Situation; 24] = [
         Situation::White,
         Situation::ShortColour,
         Situation::Colour,
@@ -86,11 +89,12 @@ impl Situation {
         Situation::StillJoints,
         Situation::NoisyPositions,
         Situation::SmoothedTorque,
+        Situation::ShiftingZeros,
     ];
     /// Those of the first cases of each suite: so many there were when these were drawn first.
     pub const FIRST: usize = Situation::BLOCKS[0].1;
     /// Situations that came together: the index of their first case, and how many they are.
-    const BLOCKS: [(usize, usize); 3] = [(0, 15), (50_000, 7), (60_000, 1)];
+    const BLOCKS: [(usize, usize); 4] = [(0, 15), (50_000, 7), (60_000, 1), (70_000, 1)];
 
     /// The situation of the case of this index: those of its block in turn.
     pub fn of_index(index: usize) -> Self {

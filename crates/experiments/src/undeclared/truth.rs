@@ -97,6 +97,9 @@ fn allowed(case: &Case) -> Vec<Kind> {
     if matches!(case.spec.situation, Some(Situation::LateFilter | Situation::HeldTorque)) {
         allowed.push(Kind::TimeDelay);
     }
+    if case.spec.situation == Some(Situation::ShiftingZeros) {
+        allowed.push(Kind::TorqueOffset);
+    }
     // Bristles are presliding: their torque depends on the way since the last reversal.
     let mut secrets = case.plant.iter().chain(case.secrets.iter().map(|drawn| &drawn.secret));
     let bristles = |secret: &Secret| matches!(&secret.form, Form::Family(family) if matches!(family.shape, Shape::Bristles { .. }));

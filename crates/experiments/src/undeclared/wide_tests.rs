@@ -40,6 +40,7 @@ fn logging() -> Logging {
         dead_band: vec![0.0; 2],
         torque_step: vec![0.0; 2],
         held_samples: 1,
+        torque_zero: Vec::new(),
         rough: None,
     }
 }

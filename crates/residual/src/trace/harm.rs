@@ -3,6 +3,7 @@
 use super::search::Search;
 use super::trial::Trial;
 use crate::selection::{Member, Products};
+use phiw_effects::EffectKind;
 use rayon::prelude::*;
 
 /// What speaks against an effect.
@@ -46,6 +47,7 @@ impl Search<'_> {
                 let is_in = |other: usize| !left_out.contains(&other);
                 **place >= self.declared
                     && is_in(**place)
+                    && !(matches!(harm, Harm::HeldOut { .. }) && self.is_of_training_logs(**place))
                     && !trial.is_required(member)
                     && !trial.is_material_of_another(member, is_in)
             });
@@ -77,7 +79,9 @@ impl Search<'_> {
         let rows: f64 = trial.held_out.iter().map(Products::rows).sum();
         let sum = |squares: &[f64]| squares.iter().sum::<f64>();
         let found = trial.members.par_iter().zip(&trial.places);
-        let found = found.filter(|(member, place)| **place >= self.declared && !trial.is_required(member));
+        let found = found.filter(|(member, place)| {
+            **place >= self.declared && !trial.is_required(member) && !self.is_of_training_logs(**place)
+        });
         let growth = found.map(|(&member, &place)| {
             let without = trial.held_out_squares_without(&trial.fit, member);
             let of_torque =
@@ -87,5 +91,10 @@ impl Search<'_> {
         });
         let worst = growth.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))?;
         (0.5 * worst.0 > self.options.thresholds.largest_harm.ln()).then_some(worst.1)
+    }
+
+    /// Whether motion held out says nothing of an effect.
+    fn is_of_training_logs(&self, place: usize) -> bool {
+        self.fixed.catalogue.kind(&self.specs[place].kind).is_ok_and(EffectKind::is_of_training_logs)
     }
 }
