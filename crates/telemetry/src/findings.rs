@@ -44,6 +44,8 @@ pub enum FindingKind {
     HeldSignal,
     /// Rows of zeros, of messages that were missed.
     ZeroRows,
+    /// An angle that begins anew after a turn.
+    Turns,
     /// A torque in another unit.
     TorqueUnit,
     /// A joint that does not move.
@@ -69,6 +71,7 @@ impl FindingKind {
             FindingKind::HeldRows => "held_rows",
             FindingKind::HeldSignal => "held_signal",
             FindingKind::ZeroRows => "zero_rows",
+            FindingKind::Turns => "turns",
             FindingKind::TorqueUnit => "torque_unit",
             FindingKind::StandsStill => "stands_still",
         }
@@ -98,6 +101,7 @@ impl FindingKind {
                  those of steps"
             }
             FindingKind::ZeroRows => "as measurements they would be jumps that no model can follow",
+            FindingKind::Turns => "as it stands it would be a motion at an impossible speed",
             FindingKind::TorqueUnit => "all parameters would be off by this factor",
             FindingKind::StandsStill => "nothing of what it moves can be told",
         }
@@ -128,6 +132,7 @@ impl FindingKind {
             FindingKind::ZeroRows => {
                 "they are left out, and bridged from the rows beside; find out why messages are missed"
             }
+            FindingKind::Turns => "it runs on there",
             FindingKind::TorqueUnit => {
                 "convert it (mA by the torque constant and the gear), or mend the URDF's limit"
             }
@@ -209,6 +214,14 @@ fn mended(survey: &Survey) -> Vec<Finding> {
                 ),
             });
         }
+    }
+    for (joint, turns) in survey.joints.iter().zip(survey.turns()).filter(|(_, turns)| **turns > 0) {
+        let times = if *turns == 1 { "once".to_owned() } else { format!("{turns} times") };
+        all.push(Finding {
+            kind: FindingKind::Turns,
+            column: format!("q.{}", joint.name),
+            measured: format!("jumps by a whole turn, {times}"),
+        });
     }
     all
 }

@@ -39,6 +39,7 @@ mod steps;
 mod still;
 mod stream;
 mod survey;
+mod turns;
 mod without_held;
 mod without_stretches;
 mod writer;

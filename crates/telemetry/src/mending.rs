@@ -4,12 +4,14 @@
 use crate::gap::GapReason;
 use crate::reader::Rows;
 use crate::spike::WithoutSpikes;
+use crate::turns::WithoutTurns;
 use crate::without_held::WithoutHeld;
 use crate::without_stretches::WithoutStretches;
 use crate::zero_rows::{WithoutZeroRows, ZeroRows};
 use serde::{Deserialize, Serialize};
 
-/// Rows that are read once though they were written several times, and zeros that are bridged.
+/// Rows that are read once though they were written several times, zeros that are bridged, and turns that are
+/// undone.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Mending {
     /// Rows for which each is held; 1 where each is a new one.
@@ -22,25 +24,34 @@ pub(crate) struct Mending {
     pub longest_step: f64,
     /// Rows that were bridged.
     pub zero_rows: ZeroRows,
+    /// How often each joint's position jumped by a turn; empty where nobody counted.
+    #[serde(default)]
+    pub turns: Vec<u64>,
 }
 
 impl Default for Mending {
     fn default() -> Self {
-        Mending { held: 1, zero_bounds: Vec::new(), longest_step: 0.0, zero_rows: ZeroRows::default() }
+        Mending {
+            held: 1,
+            zero_bounds: Vec::new(),
+            longest_step: 0.0,
+            zero_rows: ZeroRows::default(),
+            turns: Vec::new(),
+        }
     }
 }
 
 /// Rows of which a [`Mending`] is made.
-pub(crate) type Mended<R> = WithoutZeroRows<WithoutHeld<R>>;
+pub(crate) type Mended<R> = WithoutTurns<WithoutZeroRows<WithoutHeld<R>>>;
 
 impl Mending {
     pub fn is_none(&self) -> bool {
-        self.held == 1 && self.zero_bounds.is_empty()
+        self.held == 1 && self.zero_bounds.is_empty() && self.turns.iter().all(|turns| *turns == 0)
     }
 
     pub fn of<R: Rows>(&self, rows: R) -> Mended<R> {
         let once = WithoutHeld::new(rows, self.held);
-        WithoutZeroRows::new(once, self.zero_bounds.clone(), self.longest_step)
+        WithoutTurns::new(WithoutZeroRows::new(once, self.zero_bounds.clone(), self.longest_step))
     }
 }
 

@@ -150,6 +150,11 @@ impl Survey {
         self.mending.zero_rows
     }
 
+    /// How often the position of each joint jumped by a turn: it runs on there.
+    pub fn turns(&self) -> &[u64] {
+        &self.mending.turns
+    }
+
     /// Time covered by the segments, in seconds.
     pub fn duration(&self) -> f64 {
         self.segments.iter().map(|segment| segment.t_end - segment.t_start).sum()
@@ -260,6 +265,8 @@ pub(crate) fn survey_rows<R: Rows>(
         });
     }
     let survey = collector.finish(rows.path(), rows.rows_are(), joints, counts);
+    mending.turns = rows.counts().to_vec();
+    let rows = rows.into_inner();
     mending.zero_rows = rows.counts();
     let survey = Survey { spikes, spike_bounds, still, repeated, mending, ..survey };
     Ok((survey, rows.into_inner().into_inner()))
