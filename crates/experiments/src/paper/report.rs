@@ -50,10 +50,13 @@ impl Results {
         self.runs.iter().any(|run| run.secret.is_none() && run.arm != Arm::Closed)
     }
 
-    /// How the robot is held in the runs that are compared: one with legs stands on them.
+    /// How the robot is held in the runs that are compared: one with legs stands on them, and so does one of
+    /// which there are no other runs.
     pub fn home(&self) -> Footing {
+        let bolted = self.runs.iter().any(|run| run.footing == Footing::Fixed);
         match self.settings.robot {
             SubjectName::WholeBody => Footing::Standing,
+            _ if !bolted => Footing::Standing,
             _ => Footing::Fixed,
         }
     }
