@@ -2,7 +2,6 @@
 
 mod synthetic;
 
-use phiw::arguments::{ExplainArguments, SessionArguments};
 use phiw::console::Console;
 use phiw::explain::explain;
 use phiw_dynamics::Workspace;
@@ -68,21 +67,9 @@ fn explained(low_passed: impl Fn(&[f64]) -> Vec<f64>) -> ReportJson {
         }
         fs::write(path(name), synthetic::csv(&log)).unwrap();
     }
-    let arguments = ExplainArguments {
-        session: SessionArguments {
-            urdf: path("robot.urdf"),
-            train: vec![path("train.csv")],
-            validate: vec![path("validate.csv")],
-            declare: vec!["viscous_friction".to_owned(), "coulomb_friction".to_owned()],
-            out: path("out"),
-            ..SessionArguments::default()
-        },
-        model: None,
-        draws: 0,
-        exclude: Vec::new(),
-        false_name_rate: None,
-        threshold: Vec::new(),
-    };
+    let logs = [vec![path("train.csv")], vec![path("validate.csv")]];
+    let declare = ["viscous_friction", "coulomb_friction"];
+    let arguments = synthetic::explain_arguments(folder.path(), logs, &declare);
     explain(&arguments, &Console::silent()).unwrap().report
 }
 

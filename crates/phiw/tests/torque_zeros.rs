@@ -2,7 +2,7 @@
 
 mod synthetic;
 
-use phiw::arguments::{ExplainArguments, SessionArguments};
+use phiw::arguments::SessionArguments;
 use phiw::console::Console;
 use phiw::explain::results;
 use phiw::identify::Results;
@@ -26,21 +26,7 @@ fn explained(logs: &[[f64; 3]], validate: bool, declare: &[&str]) -> Results {
         fs::write(&train[index], synthetic::csv(&log)).unwrap();
     }
     let validate = if validate { train.split_off(logs.len() - 1) } else { Vec::new() };
-    let arguments = ExplainArguments {
-        session: SessionArguments {
-            urdf: path("robot.urdf"),
-            train,
-            validate,
-            declare: declare.iter().map(|kind| (*kind).to_owned()).collect(),
-            out: path("out"),
-            ..SessionArguments::default()
-        },
-        model: None,
-        draws: 0,
-        exclude: Vec::new(),
-        false_name_rate: None,
-        threshold: Vec::new(),
-    };
+    let arguments = synthetic::explain_arguments(folder.path(), [train, validate], declare);
     results(&arguments, &Console::silent()).unwrap()
 }
 

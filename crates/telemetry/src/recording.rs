@@ -5,6 +5,7 @@ use crate::log_rows::open_log;
 use crate::reader::{Row, Rows, unusable};
 use crate::stream::stream_rows;
 use crate::survey::survey_rows;
+use crate::turns::WithoutTurns;
 use crate::{Block, Conditioning, LogColumns, LogError, LogSource, LogWriter, Survey, TorqueColumns};
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -41,7 +42,7 @@ impl Recording {
         joints: &[String],
         torque: TorqueColumns,
     ) -> Result<Self, LogError> {
-        let mut reader = open_log(&source.into(), joints, torque)?;
+        let mut reader = WithoutTurns::new(open_log(&source.into(), joints, torque)?);
         let layout = reader.layout().clone();
         let n = joints.len();
         let mut values = vec![0.0; layout.width];

@@ -4,7 +4,8 @@
 use phiw_telemetry::findings::{CheckSettings, FindingKind, findings};
 use phiw_telemetry::segments::GapReason;
 use phiw_telemetry::{
-    Block, Conditioning, ConditioningOptions, Recording, Survey, TorqueColumns, ZeroRows, stream, survey,
+    Block, Conditioning, ConditioningOptions, ControllerSignal, Recording, Survey, TorqueColumns, ZeroRows,
+    stream, survey,
 };
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -204,5 +205,29 @@ fn quick_motion_in_another_unit_is_no_turn() {
         let scaled = Recording { q: log.q.iter().map(|q| factor * q).collect(), ..log.clone() };
         let (found, _) = read(&scaled, &folder.path().join("scaled.csv"));
         assert_eq!(found.turns(), [0, 0], "{factor}");
+    }
+}
+
+/// A recording is what `phiw next` reads, with the controller's reference beside: both run on.
+#[test]
+fn a_recording_and_its_reference_run_on_too() {
+    use std::f64::consts::TAU;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("wrapped.csv");
+    let log = log();
+    let first = log.q[0].rem_euclid(TAU) - log.q[0];
+    // The reference is a row ahead, so that it leaves the turn earlier.
+    let mut text = String::from("t,q.a,qref.a,tau.a\n");
+    for row in 0..log.t.len() - 1 {
+        let (q, ahead) = (log.q[2 * row].rem_euclid(TAU), log.q[2 * row + 2].rem_euclid(TAU));
+        text.push_str(&format!("{},{q},{ahead},{}\n", log.t[row], log.tau[2 * row]));
+    }
+    std::fs::write(&path, text).unwrap();
+    let joints = ["a".to_owned()];
+    let recording = Recording::read(&path, &joints, TorqueColumns::Required).unwrap();
+    let reference = ControllerSignal::Reference.read(&path, &joints).unwrap().unwrap();
+    for row in 0..log.t.len() - 1 {
+        assert!((recording.q[row] - first - log.q[2 * row]).abs() < 1e-9);
+        assert!((reference[row] - first - log.q[2 * row + 2]).abs() < 1e-9);
     }
 }

@@ -3,11 +3,13 @@
 // Each test file uses a part of this.
 #![allow(dead_code)]
 
+use phiw::arguments::{ExplainArguments, SessionArguments};
 use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Tree, Workspace};
 use phiw_telemetry::Recording;
 use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
 
 /// Three revolute joints; `tool` is fixed.
 pub const URDF: &str = r#"<robot name="three_joints">
@@ -84,6 +86,29 @@ pub fn csv(recording: &Recording) -> String {
     let mut text = Vec::new();
     recording.write_to(&mut text).unwrap();
     String::from_utf8(text).unwrap()
+}
+
+/// What asks `phiw explain` for logs of a folder with `robot.urdf`; results would go to `out` there.
+pub fn explain_arguments(
+    folder: &Path,
+    [train, validate]: [Vec<PathBuf>; 2],
+    declare: &[&str],
+) -> ExplainArguments {
+    ExplainArguments {
+        session: SessionArguments {
+            urdf: folder.join("robot.urdf"),
+            train,
+            validate,
+            declare: declare.iter().map(|kind| (*kind).to_owned()).collect(),
+            out: folder.join("out"),
+            ..SessionArguments::default()
+        },
+        model: None,
+        draws: 0,
+        exclude: Vec::new(),
+        false_name_rate: None,
+        threshold: Vec::new(),
+    }
 }
 
 /// A standard normal number (Box and Muller 1958).
