@@ -178,7 +178,8 @@ pub(crate) fn of_training_logs(error: IdentificationError, logs: &[PathBuf]) -> 
 /// Logs that a message names.
 const LOGS_NAMED: usize = 5;
 
-/// The first kind that is unknown or cannot be declared, before anything else is looked at: it needs no robot.
+/// The first kind that is unknown or cannot be declared, before anything else is looked at: that needs no
+/// robot.
 ///
 /// # Errors
 /// There is one.
