@@ -292,7 +292,11 @@ fn weighed(secrets: &[Secret], case: &Case, full: &Ordinary) -> Vec<Drawn> {
             .iter()
             .any(|kind| secrets[index].name == Name::Catalogue(*kind));
         let contained = common && joint.is_some_and(|joint| has(&[Kind::AsymmetricFriction], joint));
+        // What is constant is a part of zeros that are others in each log.
+        let is_offset = secrets[index].name == Name::Catalogue(Kind::TorqueOffset);
+        let is_zero = is_offset && case.spec.situation == Some(Situation::ShiftingZeros);
         !contained
+            && !is_zero
             && size >= 0.9 * SIZES[0]
             && visible[place] >= VISIBLE
             && visible[place] * rows.sqrt() >= CERTAIN
