@@ -3,7 +3,7 @@
 use super::search::Search;
 use super::tracing::Withdrawn;
 use phiw_identification::fitting::Fit;
-use phiw_identification::{Design, IdentificationError};
+use phiw_identification::{Design, EffectSpec, IdentificationError};
 
 impl Search<'_> {
     /// The places, ascending, of the effects of which a parameter is certain to be beyond its bounds: its
@@ -59,5 +59,56 @@ impl Search<'_> {
             self.refine()?;
         }
         Ok(any)
+    }
+
+    /// Counts as declared again what left since it was impossible beside something else that was declared, and
+    /// was found anew: it is nothing that nobody declared.
+    pub(super) fn take_back(&mut self) -> Result<(), IdentificationError> {
+        let back = came_back(&self.specs, self.declared, &self.withdrawn);
+        if back.is_empty() {
+            return Ok(());
+        }
+        let others = (self.declared..self.specs.len()).filter(|place| !back.contains(place));
+        let order: Vec<usize> = (0..self.declared).chain(back.iter().copied()).chain(others).collect();
+        self.reorder(&order)?;
+        self.chosen.alternatives.drain(..back.len());
+        self.declared += back.len();
+        let declared = &self.specs[..self.declared];
+        self.withdrawn.retain(|left| !declared.iter().any(|spec| is_of(spec, left)));
+        Ok(())
+    }
+}
+
+/// Whether an effect is the kind on the joints that left.
+fn is_of(spec: &EffectSpec, left: &Withdrawn) -> bool {
+    left.spec.kind == spec.kind && left.spec.joints == spec.joints
+}
+
+/// The places, among the effects from `declared` on, of those that had left.
+fn came_back(specs: &[EffectSpec], declared: usize, withdrawn: &[Withdrawn]) -> Vec<usize> {
+    (declared..specs.len()).filter(|&place| withdrawn.iter().any(|left| is_of(&specs[place], left))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A viscous friction that was declared, left with a rotor inertia, and was found again without it, had a
+    /// name on a right model (`cargo xtask undeclared --case 2500028`).
+    #[test]
+    fn what_was_declared_and_comes_back_is_nothing_that_nobody_declared() {
+        let viscous = |joint: &str| EffectSpec::new("viscous_friction", &[joint]);
+        let left = |spec: EffectSpec| Withdrawn {
+            spec: spec.with("sign_width", 0.01),
+            name: "fv".to_owned(),
+            unit: "N·m·s/rad".to_owned(),
+            interval_95: [-4.2, -1.2],
+            bounds: (0.0, f64::INFINITY),
+            kept: false,
+        };
+        let withdrawn = [left(viscous("a")), left(EffectSpec::new("rotor_inertia", &["a"]))];
+        let specs = [viscous("b"), EffectSpec::new("joint_spring", &["a"]), viscous("a"), viscous("c")];
+        assert_eq!(came_back(&specs, 1, &withdrawn), [2]);
+        assert_eq!(came_back(&specs, 3, &withdrawn), [0; 0]);
     }
 }

@@ -413,7 +413,7 @@ impl Search<'_> {
     }
 
     /// Puts the effects, with their parameters, into another order.
-    fn reorder(&mut self, order: &[usize]) -> Result<(), IdentificationError> {
+    pub(super) fn reorder(&mut self, order: &[usize]) -> Result<(), IdentificationError> {
         let design = self.design()?;
         let of_effects = order.iter().flat_map(|&place| design.effect_parameters(place));
         self.parameters = (0..self.fixed.base.count())

@@ -124,6 +124,7 @@ impl Search<'_> {
                 break;
             }
         }
+        self.take_back()?;
         self.prefer_simpler_forms()?;
         self.finish()
     }
