@@ -100,7 +100,8 @@ fn found(report: &ReportJson) -> Vec<(String, Vec<String>)> {
 fn every_kind_can_be_declared_alone_on_one_joint_and_on_all() {
     let scene = Scene::new(6.0, |_, _| ());
     let (tree, catalogue) = (synthetic::tree(), Catalogue::default());
-    let kinds: Vec<&dyn EffectKind> = catalogue.kinds().collect();
+    // What belongs to logs is only ever found (`torque_zeros.rs`).
+    let kinds: Vec<&dyn EffectKind> = catalogue.kinds().filter(|kind| !kind.is_of_training_logs()).collect();
     kinds.into_par_iter().for_each(|kind| {
         let first: Vec<String> =
             kind.sites(&tree)[0].iter().map(|&joint| tree.joint(joint).joint.clone()).collect();

@@ -61,8 +61,8 @@ impl Search<'_> {
         Ok(any)
     }
 
-    /// Counts as declared again what left since it was impossible beside something else that was declared, and
-    /// was found anew: it is nothing that nobody declared.
+    /// Counts as declared again what left since it was impossible beside something else that was declared,
+    /// and was found anew: it is nothing that nobody declared.
     pub(super) fn take_back(&mut self) -> Result<(), IdentificationError> {
         let back = came_back(&self.specs, self.declared, &self.withdrawn);
         if back.is_empty() {
