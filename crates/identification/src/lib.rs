@@ -24,6 +24,7 @@ mod jackknife;
 mod kept_blocks;
 mod knowledge;
 mod known_payload;
+mod log_change;
 mod log_file;
 mod log_set;
 mod mirrored;
@@ -63,6 +64,7 @@ pub mod fitting {
     pub use crate::free_constants::{ByConstant, FreeConstant, free_constants};
     pub use crate::held_out_change::{HeldOutChange, held_out_change};
     pub use crate::identify::Declared;
+    pub use crate::log_change::{LogChange, log_changes};
     pub use crate::own_torque::{OwnTorqueFit, fit_with_own_torque};
 }
 

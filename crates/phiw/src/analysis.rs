@@ -6,7 +6,7 @@ use crate::{Error, conventions, extents, fingerprint, possible_bodies, told, war
 use phiw_identification::bandwidth::Bandwidth;
 use phiw_identification::consistent::{Consistent, ConsistentSettings, Ellipsoid, Known, consistent};
 use phiw_identification::effect::JointProperty;
-use phiw_identification::fitting::{held_out_change, merge};
+use phiw_identification::fitting::{held_out_change, log_changes, merge};
 use phiw_identification::model::DataFingerprint;
 use phiw_identification::{Data, EffectCatalogue, EffectSpec, Identified, Model, WithRests};
 use phiw_regressor::RegressorError;
@@ -87,6 +87,8 @@ impl<'a> Analysis<'a> {
         let mut warnings = warnings::all(session, identified);
         if let Rows::Logs(data) = rows {
             warnings.extend(conventions::warnings(session, data)?);
+            let changes = log_changes(fit, &data.train, &identified.train_folds)?;
+            warnings.extend(warnings::of_another_robot(session, &changes));
         }
         warnings.extend(unknown_extents);
         warnings.extend(possible_bodies::warning(&model, &consistent, fit));

@@ -154,6 +154,9 @@ fn describe(tracing: &Tracing) -> String {
             ));
         }
     }
+    if !remaining.by_log.is_empty() {
+        follows.push(format!("{} is told otherwise by one log than by all", remaining.by_log.join(", ")));
+    }
     if follows.is_empty() {
         text.push_str(", and follows none of the signals that were tried");
     } else {

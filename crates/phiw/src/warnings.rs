@@ -3,7 +3,7 @@
 use crate::robot_file;
 use crate::session::Session;
 use phiw_identification::Identified;
-use phiw_identification::fitting::HeldOutChange;
+use phiw_identification::fitting::{HeldOutChange, LogChange};
 use phiw_report::number::significant;
 use phiw_telemetry::segments::GapReason;
 use phiw_telemetry::{Payload, Survey};
@@ -81,6 +81,28 @@ pub fn changed_where_held_out(session: &Session, changes: &[HeldOutChange]) -> O
         )
     })
 }
+
+/// The training log that tells otherwise than all together, by the torques that say so most.
+pub fn of_another_robot(session: &Session, changes: &[LogChange]) -> Option<String> {
+    let odd = changes.first()?.log;
+    let joint = |change: &LogChange| {
+        let name = &session.tree.joint(change.row).joint;
+        format!("{name} {} times", significant(change.ratio, 2))
+    };
+    let own = changes.iter().filter(|change| change.log == odd);
+    let joints: Vec<String> = own.take(JOINTS_NAMED).map(joint).collect();
+    let name = file_name(&session.logs.training().get(odd)?.path);
+    Some(format!(
+        "the training logs do not tell of one robot (a tool, a repair, a warmer drive), or the model lacks what one \
+         of them shows: the model of all leaves of {name} many times what a model of its own leaves ({}); to see \
+         what differs, leave it out, and hold the model of the others on it: phiw explain --model model.json \
+         --train {name}",
+        joints.join(", ")
+    ))
+}
+
+/// Joints that a warning of many names.
+const JOINTS_NAMED: usize = 3;
 
 /// File name of a log.
 pub fn file_name(path: &Path) -> String {

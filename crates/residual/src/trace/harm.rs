@@ -3,7 +3,6 @@
 use super::search::Search;
 use super::trial::Trial;
 use crate::selection::{Member, Products};
-use phiw_effects::EffectKind;
 use rayon::prelude::*;
 
 /// What speaks against an effect.
@@ -91,10 +90,5 @@ impl Search<'_> {
         });
         let worst = growth.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))?;
         (0.5 * worst.0 > self.options.thresholds.largest_harm.ln()).then_some(worst.1)
-    }
-
-    /// Whether motion held out says nothing of an effect.
-    fn is_of_training_logs(&self, place: usize) -> bool {
-        self.fixed.catalogue.kind(&self.specs[place].kind).is_ok_and(EffectKind::is_of_training_logs)
     }
 }

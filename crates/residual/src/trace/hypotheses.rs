@@ -58,17 +58,18 @@ impl Candidates {
         candidates
     }
 
-    /// The same with every hypothesis that is open beside them.
+    /// The same with every hypothesis that is open beside them, of the kinds that are `sought`.
     pub fn all(
         fixed: &Fixed<'_>,
         present: Present<'_>,
         ranges: &SignalRanges,
         options: &TraceOptions,
+        sought: impl Fn(&dyn EffectKind) -> bool,
     ) -> Result<Self, IdentificationError> {
         let mut all = Self::of_model(fixed, present);
         let held = fixed.prior.is_some();
         for (rank, kind) in fixed.catalogue.kinds().enumerate() {
-            if kind.needs_held_model() && !held {
+            if (kind.needs_held_model() && !held) || !sought(kind) {
                 continue;
             }
             for site in kind.sites(fixed.tree) {

@@ -14,6 +14,7 @@ mod hypotheses;
 mod impossible;
 mod input;
 mod naming;
+mod of_training_logs;
 mod probe;
 mod remaining;
 mod residuals;

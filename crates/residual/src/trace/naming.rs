@@ -207,7 +207,7 @@ impl Search<'_> {
 
     /// How improbable an effect must be by chance to have a name: for all hypotheses together it is
     /// `false_name_probability`.
-    fn tail_of_a_name(&self) -> f64 {
+    pub(super) fn tail_of_a_name(&self) -> f64 {
         self.options.thresholds.false_name_probability / self.chosen.hypotheses.max(1) as f64
     }
 

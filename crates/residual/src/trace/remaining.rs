@@ -6,7 +6,7 @@ use super::search::Search;
 use super::tracing::{Disturbance, Remaining};
 use crate::selection::Products;
 use phiw_identification::IdentificationError;
-use phiw_identification::fitting::{Fit, TorqueError};
+use phiw_identification::fitting::{Fit, LogChange, TorqueError};
 use phiw_regressor::least_squares::GroupedFactor;
 
 /// Standard deviations of the parameters whose error on motion held out is expected.
@@ -16,14 +16,15 @@ impl Search<'_> {
     /// Which residuals have structure, and what they follow.
     ///
     /// Structure is what motion foretells on data that were not fitted; what wanders, with a correlation over
-    /// seconds that no sensor's noise has; and what hangs together on one joint and not on others. A residual
-    /// that is larger than noise and neither is a slow disturbance that follows nothing measured; it accuses
-    /// nobody.
+    /// seconds that no sensor's noise has; what hangs together on one joint and not on others; and what a
+    /// training log by itself tells otherwise (`changes`). A residual that is larger than noise and none of
+    /// these is a slow disturbance that follows nothing measured; it accuses nobody.
     pub(super) fn remaining(
         &self,
         held_out: &[GroupedFactor],
         error: &TorqueError,
         fit: &Fit,
+        changes: &[LogChange],
     ) -> Result<Remaining, IdentificationError> {
         let expected = self.expected_squares(held_out, fit)?;
         let large: Vec<usize> =
@@ -59,7 +60,9 @@ impl Search<'_> {
                 && coloured < error.rmse.len()
         };
         let wanders = |row: usize| shape.wander[row] > self.options.thresholds.wander;
-        let is_structured = |row: &usize| following.contains(row) || wanders(*row) || stands_out(*row);
+        let differs = |row: usize| changes.iter().any(|change| change.row == row);
+        let is_structured =
+            |row: &usize| following.contains(row) || wanders(*row) || stands_out(*row) || differs(*row);
         let (structured, colour): (Vec<usize>, Vec<usize>) = large.into_iter().partition(is_structured);
         let name = |row: usize| self.fixed.tree.joint(row).joint.clone();
         let disturbance = |&row: &usize| Disturbance {
@@ -70,6 +73,7 @@ impl Search<'_> {
         };
         remaining.disturbances = colour.iter().map(disturbance).collect();
         remaining.depends_on = probe::probe(fit, &structured)?;
+        remaining.by_log = structured.iter().copied().filter(|&row| differs(row)).map(name).collect();
         remaining.joints = structured.into_iter().map(name).collect();
         Ok(remaining)
     }

@@ -44,8 +44,9 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         declared: input.declared.len(),
         declared_stays: fixed.prior.is_some(),
         withdrawn: Vec::new(),
-        folds: split(&data.train),
+        folds: split(&data.train, 1),
         chosen: Chosen::default(),
+        asks_of_logs: false,
         refuted: Vec::new(),
         uncertain: Vec::new(),
         held_out_had_a_say: false,
@@ -94,6 +95,8 @@ pub(super) struct Search<'a> {
     /// Stretches of the training motion.
     pub folds: Vec<Fold>,
     pub chosen: Chosen,
+    /// Whether what training logs may have of their own is sought, too.
+    pub asks_of_logs: bool,
     /// Effects that promised more to first order than they held in force: they are not sought again.
     pub refuted: Vec<EffectSpec>,
     /// Kinds and joints of which no parameter is certain once their constants are free: they have no name.
@@ -110,23 +113,30 @@ impl Search<'_> {
         // A width that is wrong is a friction that is missing.
         self.refine()?;
         loop {
-            for _ in 0..ROUNDS {
-                let before = self.names();
-                self.choose()?;
-                self.refine()?;
-                self.leave_out_what_is_not_realised()?;
-                if self.names() == before && !self.contest()? {
-                    break;
-                }
-            }
+            self.settle()?;
             // Only once nothing else is missing: what is missing makes up for itself by impossible constants.
             if !self.withdraw()? {
                 break;
             }
         }
+        self.ask_of_logs()?;
         self.take_back()?;
         self.prefer_simpler_forms()?;
         self.finish()
+    }
+
+    /// Chooses and refines until nothing changes.
+    pub(super) fn settle(&mut self) -> Result<(), IdentificationError> {
+        for _ in 0..ROUNDS {
+            let before = self.names();
+            self.choose()?;
+            self.refine()?;
+            self.leave_out_what_is_not_realised()?;
+            if self.names() == before && !self.contest()? {
+                break;
+            }
+        }
+        Ok(())
     }
 
     pub fn policy(&self) -> Policy {
@@ -166,7 +176,9 @@ impl Search<'_> {
         let present = Present { specs: &self.specs, declared: self.declared };
         let mut options = self.options.clone();
         options.excluded.extend(self.refuted.iter().cloned());
-        let mut candidates = Candidates::all(self.fixed, present, &self.ranges()?, &options)?;
+        let mut candidates = Candidates::all(self.fixed, present, &self.ranges()?, &options, |kind| {
+            self.asks_of_logs || !kind.is_of_training_logs()
+        })?;
         let effects = std::mem::take(&mut candidates.effects);
         let stage = self.pass(effects)?;
         let problem = self.fixed.problem(&stage, &mut candidates)?;
@@ -285,9 +297,9 @@ impl Search<'_> {
     }
 }
 
-/// Long stretches cut into equal parts, so that there are enough of them.
-fn split(folds: &[Fold]) -> Vec<Fold> {
-    let parts = FOLDS.div_ceil(folds.len().max(1));
+/// Long stretches cut into equal parts, `least_parts` or more each, so that there are enough of them.
+pub(super) fn split(folds: &[Fold], least_parts: usize) -> Vec<Fold> {
+    let parts = FOLDS.div_ceil(folds.len().max(1)).max(least_parts);
     let cut = |fold: &Fold| {
         let length = fold.end - fold.start;
         let parts = parts.min((length / LEAST_FOLD_S) as usize).max(1);

@@ -82,6 +82,8 @@ pub struct Remaining {
     pub joints: Vec<String>,
     /// Signals that the residuals still follow, strongest first.
     pub depends_on: Vec<Dependence>,
+    /// Those of `joints` of which a training log by itself tells otherwise than all of them together.
+    pub by_log: Vec<String>,
     /// Residuals larger than noise that follow nothing measured: no structure.
     pub disturbances: Vec<Disturbance>,
     /// The best candidates that were not good enough.

@@ -5,7 +5,8 @@ use super::scanned::scanned_constants;
 use super::search::Search;
 use super::tracing::{ROUNDING, Tracing, Verdict};
 use phiw_identification::fitting::{
-    OwnTorqueFit, Rests, TorqueError, accumulate, accumulate_folds, fit, fit_with_own_torque, torque_error,
+    OwnTorqueFit, Rests, TorqueError, accumulate, accumulate_folds, fit, fit_with_own_torque, log_changes,
+    torque_error,
 };
 use phiw_identification::{Design, EffectSpec, IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
@@ -98,7 +99,11 @@ impl Search<'_> {
         let held_out_folds = train_folds.split_off(data.train.len());
         let after = errors(&train_folds, &held_out_folds, &final_fit.parameters)?;
         self.parameters.clone_from(&final_fit.parameters);
-        let remaining = self.remaining(&held_out_folds, &after.1, &final_fit)?;
+        let changes = match self.fixed.prior {
+            Some(_) => Vec::new(),
+            None => log_changes(&final_fit, &data.train, &train_folds)?,
+        };
+        let remaining = self.remaining(&held_out_folds, &after.1, &final_fit, &changes)?;
         let verdict = match (effects.is_empty(), remaining.joints.is_empty()) {
             (true, true) => Verdict::Sufficient,
             (true, false) => Verdict::Unexplained,
