@@ -18,12 +18,19 @@ impl Search<'_> {
         }
         let folds = split(&self.fixed.data.train, PARTS_OF_LOG);
         let mut asked = Search { asks_of_logs: true, folds, ..self.clone() };
-        asked.settle()?;
-        asked.leave_out_what_is_small_of_logs()?;
-        if asked.places_of_training_logs().next().is_some() {
+        asked.choose()?;
+        if asked.has_something_of_training_logs() {
+            asked.settle()?;
+            asked.leave_out_what_is_small_of_logs()?;
+        }
+        if asked.has_something_of_training_logs() {
             *self = asked;
         }
         Ok(())
+    }
+
+    fn has_something_of_training_logs(&self) -> bool {
+        self.places_of_training_logs().next().is_some()
     }
 
     /// Whether an effect is one that training logs have of their own: motion held out says nothing of it.
@@ -36,7 +43,7 @@ impl Search<'_> {
     }
 
     fn leave_out_what_is_small_of_logs(&mut self) -> Result<(), IdentificationError> {
-        if self.places_of_training_logs().next().is_none() {
+        if !self.has_something_of_training_logs() {
             return Ok(());
         }
         let trial = self.trial()?;
