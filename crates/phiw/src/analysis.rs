@@ -87,8 +87,6 @@ impl<'a> Analysis<'a> {
         let mut warnings = warnings::all(session, identified);
         if let Rows::Logs(data) = rows {
             warnings.extend(conventions::warnings(session, data)?);
-            let changes = log_changes(fit, &data.train, &identified.train_folds)?;
-            warnings.extend(warnings::of_another_robot(session, &changes));
         }
         warnings.extend(unknown_extents);
         warnings.extend(possible_bodies::warning(&model, &consistent, fit));
@@ -106,6 +104,18 @@ impl<'a> Analysis<'a> {
             bandwidth: None,
             warnings,
         })
+    }
+
+    /// The same with a warning if the training logs are not of one robot. Not for a held model, whose
+    /// parameters are not those of these logs.
+    ///
+    /// # Errors
+    /// The factors are not of these logs.
+    pub fn with_logs_compared(mut self) -> Result<Self, Error> {
+        let Identified { fit, train_folds, .. } = self.identified;
+        let changes = log_changes(fit, &self.session.logs.training_folds(), train_folds)?;
+        self.warnings.extend(warnings::of_another_robot(self.session, &changes));
+        Ok(self)
     }
 
     /// The same with what other cut-offs would do.

@@ -126,6 +126,9 @@ fn results_knowing(
     let data = session.data(&sources);
     let mut analysis =
         Analysis::new(&session, Rows::Logs(&data), &tracing.model, None)?.with_bandwidth(bandwidth);
+    if arguments.model.is_none() {
+        analysis = analysis.with_logs_compared()?;
+    }
     analysis.noise_floor = floor;
     analysis.warnings.extend(known.low_passed.clone());
     if let Some(zeros) = &known.torque_zeros {

@@ -76,7 +76,7 @@ pub fn results(arguments: &SessionArguments, console: &Console) -> Result<Result
     let (identified, with_rests) = phiw_identification::identify_with_rests(&session.tree, effects, &data)
         .map_err(|error| session.of_training_logs(error))?;
     let analysis = Analysis::new(&session, Rows::Logs(&data), &identified, Some(with_rests))?;
-    let analysis = analysis.with_bandwidth(bandwidth);
+    let analysis = analysis.with_bandwidth(bandwidth).with_logs_compared()?;
     console.finish();
 
     let report = report_json(&analysis);

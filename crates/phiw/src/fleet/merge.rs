@@ -55,7 +55,8 @@ pub fn merge(arguments: &MergeArguments, console: &Console) -> Result<Outcome, E
     let (identified, with_rests) =
         declared.identified(folds, train).map_err(|error| session.of_training_logs(error))?;
     let rows = Rows::Reduced { fingerprints: &fingerprints, poses: &poses };
-    let analysis = Analysis::new(&session, rows, &identified, Some(with_rests))?.with_bandwidth(bandwidth);
+    let analysis = Analysis::new(&session, rows, &identified, Some(with_rests))?;
+    let analysis = analysis.with_bandwidth(bandwidth).with_logs_compared()?;
     console.finish();
 
     let report = report_json(&analysis);
