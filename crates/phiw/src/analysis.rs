@@ -36,6 +36,8 @@ pub struct Analysis<'a> {
     pub noise_floor: Vec<f64>,
     /// What other cut-offs would do, where it was asked.
     pub bandwidth: Option<Bandwidth>,
+    /// The training log that tells otherwise than all together, where logs were compared.
+    pub odd_log: Option<usize>,
     /// What a reader should know before trusting a number.
     pub warnings: Vec<String>,
 }
@@ -102,6 +104,7 @@ impl<'a> Analysis<'a> {
             with_rests,
             noise_floor,
             bandwidth: None,
+            odd_log: None,
             warnings,
         })
     }
@@ -114,7 +117,13 @@ impl<'a> Analysis<'a> {
     pub fn with_logs_compared(mut self) -> Result<Self, Error> {
         let Identified { fit, train_folds, .. } = self.identified;
         let changes = log_changes(fit, &self.session.logs.training_folds(), train_folds)?;
-        self.warnings.extend(warnings::of_another_robot(self.session, &changes));
+        self.odd_log = match self.session.logs.training().len() {
+            // Of two that differ the later one is what has changed.
+            2 => changes.iter().map(|change| change.log).max(),
+            _ => changes.first().map(|change| change.log),
+        };
+        let warning = self.odd_log.and_then(|odd| warnings::of_another_robot(self.session, odd, &changes));
+        self.warnings.extend(warning);
         Ok(self)
     }
 

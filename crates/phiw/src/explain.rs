@@ -8,6 +8,7 @@ use crate::draws::Draws;
 use crate::explain_page;
 use crate::held_out_reproduction::HeldOutReproduction;
 use crate::identify::{Outcome, Results, outputs};
+use crate::log_apart::what_differs;
 use crate::model_file::ModelFile;
 use crate::output::take_folder;
 use crate::report_json::{by_joint, report_json};
@@ -128,6 +129,9 @@ fn results_knowing(
         Analysis::new(&session, Rows::Logs(&data), &tracing.model, None)?.with_bandwidth(bandwidth);
     if arguments.model.is_none() {
         analysis = analysis.with_logs_compared()?;
+        // Logs that are too short to say what differs say nothing of it.
+        let differs = analysis.odd_log.and_then(|odd| what_differs(arguments, odd).ok().flatten());
+        analysis.warnings.extend(differs);
     }
     analysis.noise_floor = floor;
     analysis.warnings.extend(known.low_passed.clone());

@@ -28,6 +28,7 @@ pub mod identify;
 mod identify_arguments;
 mod in_memory;
 pub mod input;
+mod log_apart;
 mod log_inputs;
 pub mod map;
 mod mesh_extent;

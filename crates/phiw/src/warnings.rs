@@ -82,9 +82,8 @@ pub fn changed_where_held_out(session: &Session, changes: &[HeldOutChange]) -> O
     })
 }
 
-/// The training log that tells otherwise than all together, by the torques that say so most.
-pub fn of_another_robot(session: &Session, changes: &[LogChange]) -> Option<String> {
-    let odd = changes.first()?.log;
+/// That the training log `odd` tells otherwise than all together, by the torques that say so most.
+pub fn of_another_robot(session: &Session, odd: usize, changes: &[LogChange]) -> Option<String> {
     let joint = |change: &LogChange| {
         let name = &session.tree.joint(change.row).joint;
         format!("{name} {} times", significant(change.ratio, 2))

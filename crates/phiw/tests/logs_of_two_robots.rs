@@ -37,6 +37,12 @@ fn logs_that_differ_are_said_and_leave_structure() {
     let found = explained(1.5);
     let warning = said(&found).unwrap();
     assert!(warning.contains("joint_3") && warning.contains("phiw explain --model model.json"), "{warning}");
+    let differs =
+        found.warnings.iter().find(|warning| warning.contains("differs from the other training logs"));
+    assert!(
+        differs.unwrap().contains("log_1.csv") && differs.unwrap().contains("torque gain of joint_3"),
+        "{differs:?}"
+    );
     let verdict = found.report.verdict.unwrap();
     assert!(matches!(verdict, Verdict::Unexplained | Verdict::PartlyExplained), "{verdict:?}");
     let remaining = &found.report.remaining;

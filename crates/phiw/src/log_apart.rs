@@ -1,0 +1,52 @@
+//! What differs in a training log that tells otherwise than the others.
+
+use crate::arguments::{ExplainArguments, SessionArguments};
+use crate::console::Console;
+use crate::in_memory::InMemory;
+use crate::warnings::file_name;
+use crate::{Error, explain, identify};
+use phiw_report::json::EffectJson;
+use phiw_report::number::significant;
+use std::path::PathBuf;
+
+/// Says by which effects the training log `odd` differs from the others: the model of these is held, and what
+/// has changed is sought in it. Nothing where nothing is found.
+///
+/// # Errors
+/// The other logs, or this one, hold too little for a model.
+pub fn what_differs(arguments: &ExplainArguments, odd: usize) -> Result<Option<String>, Error> {
+    let session = &arguments.session;
+    let Some(log) = session.train.get(odd) else { return Ok(None) };
+    let others: Vec<PathBuf> = session.train.iter().filter(|other| *other != log).cloned().collect();
+    let console = Console::silent();
+    let model = identify::results(&SessionArguments { train: others, ..session.clone() }, &console)?;
+    let Some(model) = model.files.iter().find(|file| file.name == "model.json") else { return Ok(None) };
+    let model = String::from_utf8_lossy(&model.content).into_owned();
+    let held = ExplainArguments {
+        session: SessionArguments {
+            train: vec![log.clone()],
+            validate: Vec::new(),
+            declare: Vec::new(),
+            in_memory: InMemory { model: Some(model), ..session.in_memory.clone() },
+            ..session.clone()
+        },
+        model: Some(PathBuf::from("model.json")),
+        draws: 0,
+        ..arguments.clone()
+    };
+    let found = explain::results(&held, &console)?;
+    let effects: Vec<String> = found.report.effects.iter().map(in_words).collect();
+    Ok((!effects.is_empty()).then(|| {
+        format!("{} differs from the other training logs by {}", file_name(log), effects.join("; "))
+    }))
+}
+
+/// An effect with its first parameter on each joint.
+fn in_words(effect: &EffectJson) -> String {
+    let value = effect.parameters.iter().filter_map(|(_, own)| {
+        let (name, parameter) = own.iter().next()?;
+        Some(format!("{name} {} {}", significant(parameter.value, 3), parameter.unit))
+    });
+    let values: Vec<String> = value.collect();
+    format!("{} of {} ({})", effect.kind.replace('_', " "), effect.joints.join(", "), values.join(", "))
+}
