@@ -12,10 +12,7 @@ const ALL_S: f64 = 90.0;
 
 /// What is said of the last third of a log, in which the robot is `later`.
 fn changes(tree: &Tree, later: &Tree, seed: u64) -> Vec<HeldOutChange> {
-    let of = |tree| synthetic::recording(tree, seed, ALL_S, 2.0, 0.2, seed);
-    let (mut log, changed) = (of(tree), of(later));
-    let from = JOINTS * log.t.iter().filter(|t| **t < TRAINING_S).count();
-    log.tau[from..].copy_from_slice(&changed.tau[from..]);
+    let log = synthetic::recording_that_changes(tree, later, TRAINING_S, ALL_S, seed);
     let blocks = synthetic::blocks(&log, 4096);
     let mut folds = synthetic::folds(TRAINING_S - 1.0, 8);
     folds.push(Fold { log: 0, start: TRAINING_S + 1.0, end: ALL_S });
@@ -31,12 +28,7 @@ fn a_tool_that_only_the_motion_held_out_has_is_told() {
     for seed in 0..6 {
         let tree = synthetic::robot(seed, JOINTS);
         assert_eq!(changes(&tree, &tree, seed), [], "robot {seed} is as it was");
-        let mut with_tool = tree.clone();
-        let mut parameters = tree.inertial_parameters();
-        let last = parameters.len() - 10;
-        parameters[last..].iter_mut().for_each(|own| *own *= 2.0);
-        with_tool.set_inertial_parameters(&parameters).unwrap();
-        let changes = changes(&tree, &with_tool, seed);
+        let changes = changes(&tree, &synthetic::with_tool(&tree), seed);
         assert!(changes.iter().any(|change| change.ratio > 6.0), "robot {seed}: {changes:?}");
     }
 }

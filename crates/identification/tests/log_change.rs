@@ -11,10 +11,7 @@ const LOG_S: f64 = 40.0;
 
 /// What is said of two logs, of `tree` and of `other`.
 fn changes(tree: &Tree, other: &Tree, seed: u64) -> Vec<LogChange> {
-    let of = |tree| synthetic::recording(tree, seed, 2.0 * LOG_S, 2.0, 0.2, seed);
-    let (mut log, second) = (of(tree), of(other));
-    let from = JOINTS * log.t.iter().filter(|t| **t < LOG_S).count();
-    log.tau[from..].copy_from_slice(&second.tau[from..]);
+    let log = synthetic::recording_that_changes(tree, other, LOG_S, 2.0 * LOG_S, seed);
     let blocks = synthetic::blocks(&log, 4096);
     let data = synthetic::data(&blocks, synthetic::folds(2.0 * LOG_S, 16), Vec::new());
     let effects = (0..JOINTS).map(|joint| vec![synthetic::Viscous::on(tree, joint)]).collect();
@@ -30,12 +27,7 @@ fn a_tool_that_one_training_log_has_is_told() {
     for seed in 0..6 {
         let tree = synthetic::robot(seed, JOINTS);
         assert_eq!(changes(&tree, &tree, seed), [], "robot {seed} is one robot");
-        let mut with_tool = tree.clone();
-        let mut parameters = tree.inertial_parameters();
-        let last = parameters.len() - 10;
-        parameters[last..].iter_mut().for_each(|own| *own *= 2.0);
-        with_tool.set_inertial_parameters(&parameters).unwrap();
-        let changes = changes(&tree, &with_tool, seed);
+        let changes = changes(&tree, &synthetic::with_tool(&tree), seed);
         let largest = changes.first().unwrap_or_else(|| panic!("robot {seed}: nothing is said"));
         assert!(changes.iter().all(|change| change.ratio <= largest.ratio), "{changes:?}");
     }

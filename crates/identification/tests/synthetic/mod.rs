@@ -136,6 +136,25 @@ pub fn blocks(recording: &Recording, block_samples: usize) -> Vec<Block> {
     recording.blocks(&conditioning).unwrap()
 }
 
+/// A recording of [`robot`]s with viscous friction 2: `tree`, and from `from_s` on `later`.
+pub fn recording_that_changes(tree: &Tree, later: &Tree, from_s: f64, seconds: f64, seed: u64) -> Recording {
+    let of = |tree| recording(tree, seed, seconds, 2.0, 0.2, seed);
+    let (mut log, changed) = (of(tree), of(later));
+    let from = tree.joint_count() * log.t.iter().filter(|t| **t < from_s).count();
+    log.tau[from..].copy_from_slice(&changed.tau[from..]);
+    log
+}
+
+/// The robot with a tool as heavy as its last link.
+pub fn with_tool(tree: &Tree) -> Tree {
+    let mut with_tool = tree.clone();
+    let mut parameters = tree.inertial_parameters();
+    let last = parameters.len() - 10;
+    parameters[last..].iter_mut().for_each(|own| *own *= 2.0);
+    with_tool.set_inertial_parameters(&parameters).unwrap();
+    with_tool
+}
+
 /// The time from 0 to `seconds` of log 0 in equal pieces.
 pub fn folds(seconds: f64, count: usize) -> Vec<Fold> {
     let edge = |piece: usize| seconds * piece as f64 / count as f64;
