@@ -54,10 +54,10 @@ impl Effect for Offset {
     }
     fn parameters(&self) -> Vec<EffectParameter> {
         let joint = self.spec.joints.first().cloned().unwrap_or_default();
-        // A joint that turns is off by half a turn at most; where the torque hardly depends on its angle, a
-        // fit would say anything.
+        // A joint that turns is off by half a turn at most, what is in force counted; where the torque hardly
+        // depends on its angle, a fit would say anything.
         let most = if self.unit == "rad" { std::f64::consts::PI } else { f64::INFINITY };
-        let bounds = (-most, most);
+        let bounds = (-most - self.offset, most - self.offset);
         vec![EffectParameter { joint, name: OFFSET.to_owned(), unit: self.unit.to_owned(), bounds }]
     }
     fn entries(&self) -> Vec<Entry> {
@@ -166,4 +166,24 @@ impl EffectKind for ActuatorSaturation {
 fn spec(kind: &str, tree: &Tree, site: &[usize], constants: &Constants) -> EffectSpec {
     let joints = site.iter().map(|&joint| tree.joint(joint).joint.clone()).collect();
     EffectSpec { kind: kind.to_owned(), joints, constants: constants.clone() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
+    use std::f64::consts::PI;
+
+    /// An encoder was said to be off by 3.27 rad: the bound was about what was in force, not about nothing.
+    #[test]
+    fn an_encoder_is_off_by_half_a_turn_at_most_with_what_is_in_force() {
+        let urdf = r#"<robot name="one"><link name="base"/><link name="arm"><inertial><mass value="1"/>
+            <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+            <joint name="j" type="continuous"><parent link="base"/><child link="arm"/></joint></robot>"#;
+        let tree = read_urdf(urdf, &UrdfOptions::default()).unwrap().tree;
+        let offset = EncoderOffset.build(&tree, &[0], &Constants::new());
+        assert_eq!(offset.parameters()[0].bounds, (-PI, PI));
+        let moved = offset.relinearised(&[-2.0]).unwrap();
+        assert_eq!(moved.parameters()[0].bounds, (2.0 - PI, 2.0 + PI));
+    }
 }
