@@ -73,6 +73,17 @@ pub struct TorqueError {
     pub rows: u64,
 }
 
+impl TorqueError {
+    /// `relative` where the error of a torque that is below `share` of it counts as that share: what is as
+    /// good as none can neither grow nor shrink.
+    #[must_use]
+    pub fn relative_from(&self, share: f64) -> f64 {
+        let squares = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
+        let counted = self.rmse.iter().zip(&self.rms_torque).map(|(rmse, torque)| rmse.max(share * torque));
+        (squares(&counted.collect::<Vec<f64>>()) / squares(&self.rms_torque)).sqrt()
+    }
+}
+
 /// Fits a design to the rows of all `folds`, each torque weighted by its own residual.
 ///
 /// # Errors

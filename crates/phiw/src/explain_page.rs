@@ -3,6 +3,7 @@
 use crate::analysis::Analysis;
 use crate::{Error, page as identified_page, possible_bodies};
 use phiw_effects::Signal;
+use phiw_identification::fitting::TorqueError;
 use phiw_identification::{BlockSource, Data, Design, EveryNth, predict};
 use phiw_report::IdentificationPage;
 use phiw_report::json::{UnidentifiableJson, Verdict};
@@ -15,6 +16,8 @@ use phiw_residual::trace::{self, FoundEffect, Ranked, Tracing};
 
 /// Points of a scatter; more would only blacken it.
 const POINTS: usize = 3000;
+/// Joints that are said to have gained where all torques together have not, at most.
+const SAID_TO_HAVE_GAINED: usize = 3;
 /// Rows of the logs that scatters are drawn from, about; of longer ones an even sample.
 const SCATTERED_ROWS: u64 = 60_000;
 
@@ -63,7 +66,7 @@ pub fn page(
 /// The answer in a few sentences.
 pub fn headline(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<String> {
     let declared = identified_page::declared_in_words(analysis);
-    let (before, after) = (tracing.before.1.relative, tracing.model.held_out.relative);
+    let before = tracing.before.1.relative;
     let mut lines = Vec::new();
     match tracing.verdict {
         trace::Verdict::Sufficient => lines.push(format!(
@@ -86,7 +89,7 @@ pub fn headline(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<String> {
                     tracing.refinements.len()
                 ));
             }
-            lines.push(format!("Held-out error {} % → {} %.", percent(before), percent(after)));
+            lines.push(errors_held_out(analysis, tracing));
         }
     }
     if !tracing.remaining.joints.is_empty() {
@@ -94,6 +97,29 @@ pub fn headline(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<String> {
     }
     lines.extend(disturbances(tracing));
     lines
+}
+
+/// The error before and after. Where that of all torques together has grown, by less than what counts, also
+/// of the joints that have gained most.
+fn errors_held_out(analysis: &Analysis<'_>, tracing: &Tracing) -> String {
+    let (before, after) = (&tracing.before.1, &tracing.model.held_out);
+    let all = format!("Held-out error {} % → {} %", percent(before.relative), percent(after.relative));
+    if after.relative <= before.relative {
+        return format!("{all}.");
+    }
+    let ratio = |joint: &usize| after.rmse[*joint] / before.rmse[*joint];
+    let mut gained: Vec<usize> = (0..before.rmse.len()).filter(|joint| ratio(joint) < 1.0).collect();
+    gained.sort_by(|a, b| ratio(a).total_cmp(&ratio(b)));
+    let names = analysis.joints();
+    let of_joint = |joint: &usize| {
+        let share = |error: &TorqueError| percent(error.rmse[*joint] / error.rms_torque[*joint]);
+        format!("{} {} % → {} %", names[*joint], share(before), share(after))
+    };
+    let gained: Vec<String> = gained.iter().take(SAID_TO_HAVE_GAINED).map(of_joint).collect();
+    format!(
+        "{all} of all torques together, as good as nothing on the joints where it has grown; of single joints' torques: {}.",
+        gained.join(", ")
+    )
 }
 
 /// A sentence on what is larger than noise and follows nothing.

@@ -11,7 +11,8 @@ pub(super) enum Harm {
     /// That the logarithms of the torques' foretold errors grow.
     EachTorque,
     /// That the logarithms of the errors on motion held out grow, or that the error of all torques together
-    /// is there larger than `most_relative` of the torques (RMS).
+    /// is there larger than `most_relative` of the torques (RMS); of each torque what is as good as none counts
+    /// as the largest such.
     HeldOut { most_relative: f64 },
 }
 
@@ -23,7 +24,7 @@ impl Search<'_> {
     /// their squares.
     pub(super) fn harmful(&self, trial: &Trial, harm: Harm) -> Vec<usize> {
         let mut left_out: Vec<usize> = Vec::new();
-        let sum = |squares: &[f64]| squares.iter().sum::<f64>();
+        let together = |squares: &[f64]| self.counted_squares(trial, squares);
         let most = match harm {
             Harm::EachTorque => f64::INFINITY,
             Harm::HeldOut { most_relative } => {
@@ -52,12 +53,12 @@ impl Search<'_> {
             });
             let without = found.map(|(&member, &place)| {
                 let squares = squares_without(member);
-                (trial.gain(&squares, &present), place, sum(&squares))
+                (trial.gain(&squares, &present), place, together(&squares))
             });
             let mut without: Vec<(f64, usize, f64)> = without.collect();
             without.sort_by(|a, b| a.0.total_cmp(&b.0));
             let harms = without.first().is_some_and(|(gain, ..)| *gain <= 0.0);
-            let too_much = sum(&present) > most;
+            let too_much = together(&present) > most;
             if !harms && too_much {
                 without.sort_by(|a, b| a.2.total_cmp(&b.2));
             }
@@ -76,7 +77,7 @@ impl Search<'_> {
     pub(super) fn misleading(&self, trial: &Trial) -> Option<usize> {
         let present = trial.held_out_squares(&trial.fit);
         let rows: f64 = trial.held_out.iter().map(Products::rows).sum();
-        let sum = |squares: &[f64]| squares.iter().sum::<f64>();
+        let together = |squares: &[f64]| self.counted_squares(trial, squares);
         let found = trial.members.par_iter().zip(&trial.places);
         let found = found.filter(|(member, place)| {
             **place >= self.declared && !trial.is_required(member) && !self.is_of_training_logs(**place)
@@ -86,9 +87,17 @@ impl Search<'_> {
             let of_torque =
                 |torque: usize| trial.held_out[torque].rows() * (present[torque] / without[torque]).ln();
             let mean = (0..present.len()).map(of_torque).sum::<f64>() / rows.max(1.0);
-            (mean.max((sum(&present) / sum(&without)).ln()), place)
+            (mean.max((together(&present) / together(&without)).ln()), place)
         });
         let worst = growth.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))?;
         (0.5 * worst.0 > self.options.thresholds.largest_harm.ln()).then_some(worst.1)
+    }
+
+    /// The sum of what is left of the torques held out, where what is as good as none counts as the largest
+    /// such.
+    fn counted_squares(&self, trial: &Trial, squares: &[f64]) -> f64 {
+        let least = self.options.thresholds.negligible_share.powi(2);
+        let torques = trial.held_out.iter().map(Products::right_hand_side);
+        squares.iter().zip(torques).map(|(squares, torque)| squares.max(least * torque)).sum()
     }
 }

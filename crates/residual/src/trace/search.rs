@@ -54,7 +54,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         options,
     };
     let tracing = search.clone().run()?;
-    if tracing.withdrawn.is_empty() || tracing.is_no_worse_than_declared() {
+    if tracing.withdrawn.is_empty() || search.is_no_worse_than_declared(&tracing) {
         return Ok(tracing);
     }
     // What leaves is still refuted, whether or not the model can do without it.

@@ -38,7 +38,8 @@ pub struct Thresholds {
     /// Share of a torque (RMS) below which it is asked whether other constants of the other effects could do
     /// an effect's work. To ask it of all effects names the same and takes two thirds more time.
     pub small_size: f64,
-    /// A residual below this share of its torque (RMS) is as good as none: nothing is sought in it.
+    /// A residual below this share of its torque (RMS) is as good as none: nothing is sought in it, and it
+    /// does no harm to be larger than it was.
     pub negligible_share: f64,
     /// Factor on the RMS error on motion held out by which an effect may make it larger, in the mean of the
     /// torques or all together.

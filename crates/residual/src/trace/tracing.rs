@@ -142,11 +142,3 @@ pub struct Tracing {
 
 /// How far the errors of one model are apart that was fitted twice.
 pub(super) const ROUNDING: f64 = 1e-9;
-
-impl Tracing {
-    /// Whether the model's error on motion held out is no worse than the declared one's, of all torques
-    /// together.
-    pub(super) fn is_no_worse_than_declared(&self) -> bool {
-        self.model.held_out.relative <= (1.0 + ROUNDING) * self.before.1.relative
-    }
-}

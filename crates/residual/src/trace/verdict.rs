@@ -22,13 +22,25 @@ impl Search<'_> {
     /// the result says so.
     pub(super) fn finish(self) -> Result<Tracing, IdentificationError> {
         let before = self.declared_error()?;
-        let most = before.1.relative * (1.0 + ROUNDING);
+        let most = self.counted(&before.1) * (1.0 + ROUNDING);
         let tracing = self.clone().finish_with(before.clone(), Harm::EachTorque)?;
-        if tracing.is_no_worse_than_declared() || !tracing.withdrawn.is_empty() {
+        if self.is_no_worse_than_declared(&tracing) || !tracing.withdrawn.is_empty() {
             return Ok(tracing);
         }
         let tracing = self.with_a_say_of_what_is_held_out(before, most)?;
         Ok(Tracing { held_out_had_a_say: true, ..tracing })
+    }
+
+    /// Whether the model's error on motion held out is no worse than the declared one's, of all torques
+    /// together.
+    pub(super) fn is_no_worse_than_declared(&self, tracing: &Tracing) -> bool {
+        self.counted(&tracing.model.held_out) <= (1.0 + ROUNDING) * self.counted(&tracing.before.1)
+    }
+
+    /// The error of all torques together, over them, where one that is as good as none counts as the largest
+    /// such: a joint of large torques would hide by its noise what is won on all others.
+    fn counted(&self, error: &TorqueError) -> f64 {
+        error.relative_from(self.options.thresholds.negligible_share)
     }
 
     /// Of the other ways to end the search the first that is no worse there than the declared model, whose
@@ -40,13 +52,13 @@ impl Search<'_> {
     ) -> Result<Tracing, IdentificationError> {
         let tracing =
             self.clone().finish_with(before.clone(), Harm::HeldOut { most_relative: f64::INFINITY })?;
-        if tracing.is_no_worse_than_declared() {
+        if self.is_no_worse_than_declared(&tracing) {
             return Ok(tracing);
         }
         // What is made of the model's torque was judged with that of an earlier fit.
         if let Some(without) = self.without_what_depends_on_the_model()? {
             let tracing = without.finish_with(before.clone(), Harm::EachTorque)?;
-            if tracing.is_no_worse_than_declared() {
+            if self.is_no_worse_than_declared(&tracing) {
                 return Ok(tracing);
             }
         }
@@ -55,10 +67,10 @@ impl Search<'_> {
         let mut most_relative = most;
         for _ in 0..TIGHTENINGS {
             let tracing = self.clone().finish_with(before.clone(), Harm::HeldOut { most_relative })?;
-            if tracing.is_no_worse_than_declared() {
+            if self.is_no_worse_than_declared(&tracing) {
                 return Ok(tracing);
             }
-            most_relative *= TIGHTER * most / tracing.model.held_out.relative;
+            most_relative *= TIGHTER * most / self.counted(&tracing.model.held_out);
         }
         self.finish_with(before, Harm::HeldOut { most_relative: 0.0 })
     }
@@ -206,7 +218,7 @@ impl Search<'_> {
         let design = self.design()?;
         let data = self.whole;
         let folds = accumulate(&design, &data.held_out, &data.sources)?;
-        Ok(torque_error(&folds, &self.parameters)?.relative > declared.relative)
+        Ok(self.counted(&torque_error(&folds, &self.parameters)?) > self.counted(declared))
     }
 
     /// Error of the declared (or held) model: training, held out.
