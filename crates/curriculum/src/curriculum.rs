@@ -4,7 +4,7 @@
 use crate::constraint::{Certainty, Constraint};
 use crate::end::{EndCriterion, FixedCount};
 use crate::experiment::check_noise;
-use crate::growth::{Found, Growth, Rivalry, rivals_to_separate, unconfirmed};
+use crate::growth::{Found, Growth, Rivalry, rivals_to_separate, saved_by_family, unconfirmed};
 use crate::motion::MotionDataset;
 use crate::planner::{Belief, MeasuredSoFar, NoneAllowed, Plan, Policy, plan};
 use crate::random::{Purpose, random};
@@ -208,9 +208,9 @@ impl<'a> Curriculum<'a> {
         for _ in 0..self.settings.most_answers {
             found = growth.look(self.robot, &learning.model, &run.logs, doubted, &refuted)?;
             (learning, believed) =
-                self.confirmed(learning, found.effects.clone(), &run.logs, growth.least_gain())?;
+                self.confirmed(learning, found.answers.clone(), &run.logs, growth.least_gain())?;
             let wrong: Vec<EffectSpec> =
-                found.effects.iter().filter(|effect| !believed.contains(effect)).cloned().collect();
+                found.effects().into_iter().filter(|effect| !believed.contains(effect)).collect();
             if wrong.is_empty() {
                 break;
             }
@@ -228,32 +228,31 @@ impl<'a> Curriculum<'a> {
         Ok(learning)
     }
 
-    /// The model with those of the found `effects` that the estimator's likelihood confirms: the least of
-    /// them goes until each is worth `least_gain`.
+    /// The model with those of the `answers` that the estimator's likelihood confirms: the least of them goes
+    /// until each is worth `least_gain`.
     fn confirmed(
         &self,
         learning: Learning,
-        mut effects: Vec<EffectSpec>,
+        mut answers: Vec<Vec<EffectSpec>>,
         logs: &[MotionLog],
         least_gain: f64,
     ) -> Result<(Learning, Vec<EffectSpec>), CurriculumError> {
-        let mut with = self.fitted(&learning, &effects, logs)?;
+        let mut with = self.fitted(&learning, &answers.concat(), logs)?;
         while let Some(negative_log_likelihood) = self.negative_log_likelihood(&with)? {
             let (mut gains, mut without) = (Vec::new(), Vec::new());
-            for place in 0..effects.len() {
-                let others = [&effects[..place], &effects[place + 1..]].concat();
+            for place in 0..answers.len() {
+                let others = [&answers[..place], &answers[place + 1..]].concat().concat();
                 let learning = self.fitted(&learning, &others, logs)?;
-                gains.push(
-                    self.negative_log_likelihood(&learning)?.unwrap_or(f64::INFINITY)
-                        - negative_log_likelihood,
-                );
+                let grown = self.negative_log_likelihood(&learning)?.unwrap_or(f64::INFINITY)
+                    - negative_log_likelihood;
+                gains.push(saved_by_family(grown, answers[place].len()));
                 without.push(learning);
             }
             let Some(place) = unconfirmed(&gains, least_gain) else { break };
-            effects.remove(place);
+            answers.remove(place);
             with = without.swap_remove(place);
         }
-        Ok((with, effects))
+        Ok((with, answers.concat()))
     }
 
     /// −log L of what was learnt, if the estimator knows it.

@@ -1,6 +1,7 @@
 //! The loop closed by the estimator's own likelihood.
 
 use crate::contest::{Contender, ScoreTestSettings, Winner};
+use crate::hypothesis::Hypothesis;
 use phiw_curriculum::CurriculumError;
 use phiw_curriculum::growth::{Found, Growth};
 use phiw_effects::{Catalogue, Constants, EffectKind, JointRange, SignalRanges};
@@ -142,52 +143,77 @@ impl ScoreTest {
         Ok((model.with_parameters(robot, &specs, &estimate.parameters)?, negative_log_likelihood))
     }
 
-    /// The effects of `near` once everything has been fitted again beside `known`, each with its constants
-    /// refined, and what it is then worth. The score predicts the gain of a large effect only roughly, and
-    /// may predict as much for an effect that explains half of it.
+    /// Effects and families that may be missing, the best first; those that are `refuted` are none.
+    fn hypotheses(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        logs: &[MotionLog],
+        refuted: &[EffectSpec],
+    ) -> Result<Vec<Hypothesis>, CurriculumError> {
+        let mut ranked = self.rank(robot, model, logs)?;
+        ranked.retain(|gain| !refuted.iter().any(|effect| is_alike(effect, &gain.effect)));
+        let present = model.specs();
+        let mut all: Vec<Hypothesis> = ranked.iter().cloned().map(Hypothesis::of_one).collect();
+        for kind in self.catalogue.kinds().filter(|kind| kind.joint_property().is_some()) {
+            let is_kind = |spec: &EffectSpec| spec.kind == kind.name();
+            let members = ranked.iter().filter(|gain| is_kind(&gain.effect)).cloned().collect();
+            let present = present.iter().filter(|spec| is_kind(spec)).count();
+            let asked = kind.sites(robot.tree()).len().saturating_sub(present);
+            all.extend(Hypothesis::of_family(members, asked, self.estimator.score.parameter_price));
+        }
+        all.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+        Ok(all)
+    }
+
+    /// The effects of each of `near` once everything has been fitted again beside `known`, with their
+    /// constants refined, and what it is then worth. The score predicts the gain of a large effect only
+    /// roughly, and may predict as much for an effect that explains half of it.
     fn contenders(
         &self,
         robot: &Robot,
         model: &RobotModel,
         known: &[EffectSpec],
-        near: &[Gain],
+        near: &[Hypothesis],
         logs: &[MotionLog],
-    ) -> Result<(Vec<EffectSpec>, Vec<Contender>), CurriculumError> {
+    ) -> Result<(Vec<Vec<EffectSpec>>, Vec<Contender>), CurriculumError> {
         let (_, without) = self.fit(robot, model, known, logs)?;
-        let (mut effects, mut contenders) = (Vec::new(), Vec::new());
-        for gain in near {
-            let effect = self.refined(robot, model, logs, gain.clone())?.effect;
-            let (_, with) = self.fit(robot, model, &[known, std::slice::from_ref(&effect)].concat(), logs)?;
-            let price = gain.gain - gain.merit;
-            contenders.push(Contender { merit: without - with - price, size: size(robot, &effect) });
-            effects.push(effect);
+        let (mut answers, mut contenders) = (Vec::new(), Vec::new());
+        for hypothesis in near {
+            let refined = self.refined(robot, model, logs, hypothesis.effects.clone())?;
+            let effects: Vec<EffectSpec> = refined.into_iter().map(|gain| gain.effect).collect();
+            let (_, with) = self.fit(robot, model, &[known, &effects].concat(), logs)?;
+            let size = effects.iter().map(|effect| size(robot, effect)).fold(0, usize::saturating_add);
+            contenders.push(Contender { merit: hypothesis.merit_of(without - with), size });
+            answers.push(effects);
         }
-        Ok((effects, contenders))
+        Ok((answers, contenders))
     }
 
-    /// The same effect with constants between those that were tried.
+    /// The same effects with constants between those that were tried, each by itself.
     fn refined(
         &self,
         robot: &Robot,
         model: &RobotModel,
         logs: &[MotionLog],
-        mut best: Gain,
-    ) -> Result<Gain, CurriculumError> {
-        let kind = self.catalogue.kind(&best.effect.kind)?;
+        mut best: Vec<Gain>,
+    ) -> Result<Vec<Gain>, CurriculumError> {
         for step in 0..self.settings.refinements {
-            let near: Vec<EffectSpec> = kind
-                .refine(&best.effect.constants, step)
-                .into_iter()
-                .map(|constants| EffectSpec { constants, ..best.effect.clone() })
-                .collect();
+            let mut near: Vec<EffectSpec> = Vec::new();
+            for gain in &best {
+                let kind = self.catalogue.kind(&gain.effect.kind)?;
+                let refined = kind.refine(&gain.effect.constants, step).into_iter();
+                near.extend(refined.map(|constants| EffectSpec { constants, ..gain.effect.clone() }));
+            }
             if near.is_empty() {
                 break;
             }
-            let gains = self.estimator.gains(robot, model, logs, &near)?;
-            best = gains
-                .into_iter()
-                .flatten()
-                .fold(best, |best, gain| if gain.gain > best.gain { gain } else { best });
+            for gain in self.estimator.gains(robot, model, logs, &near)?.into_iter().flatten() {
+                let own = best.iter_mut().find(|best| is_alike(&best.effect, &gain.effect));
+                if let Some(own) = own.filter(|own| gain.gain > own.gain) {
+                    *own = gain;
+                }
+            }
         }
         Ok(best)
     }
@@ -232,21 +258,25 @@ impl ScoreTest {
             true => model.clone(),
             false => self.fitted(robot, model, &[], logs)?,
         };
-        while found.effects.len() < self.settings.most_effects {
-            let mut ranked = self.rank(robot, &model, logs)?;
-            ranked.retain(|gain| !refuted.iter().any(|effect| is_alike(effect, &gain.effect)));
-            let merits: Vec<f64> = ranked.iter().map(|gain| gain.merit).collect();
-            let near = &ranked[..self.settings.shortlist(&merits)];
+        while found.answers.len() < self.settings.most_effects {
+            let all = self.hypotheses(robot, &model, logs, refuted)?;
+            let merits: Vec<f64> = all.iter().map(|hypothesis| hypothesis.merit).collect();
+            let near = &all[..self.settings.shortlist(&merits)];
             if near.is_empty() {
                 break;
             }
-            let (effects, contenders) = self.contenders(robot, &model, &found.effects, near, logs)?;
+            let known = found.effects();
+            let (mut answers, contenders) = self.contenders(robot, &model, &known, near, logs)?;
             let Some(Winner { winner, rivals }) = self.settings.contest(&contenders) else { break };
-            let pairs = rivals.iter().map(|&rival| [effects[winner].clone(), effects[rival].clone()]);
-            found.rivals.extend(pairs);
-            found.effects.push(effects[winner].clone());
-            if found.effects.len() < self.settings.most_effects {
-                model = self.fitted(robot, &model, &found.effects, logs)?;
+            for rival in rivals {
+                // A family has no rival that a motion could tell it from: each of its joints has.
+                if let ([own], [other]) = (answers[winner].as_slice(), answers[rival].as_slice()) {
+                    found.rivals.push([own.clone(), other.clone()]);
+                }
+            }
+            found.answers.push(answers.swap_remove(winner));
+            if found.answers.len() < self.settings.most_effects {
+                model = self.fitted(robot, &model, &found.effects(), logs)?;
             }
         }
         Ok(found)

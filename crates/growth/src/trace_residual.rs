@@ -112,7 +112,8 @@ impl Growth for TraceResidual {
         let present = &model.specs()[robot.declared().len()..];
         let mut torques = coloured(robot, model, logs, &self.whiteness)?;
         if torques.is_empty() && !doubted {
-            return Ok(Found { effects: present.to_vec(), rivals: Vec::new() });
+            let answers = present.iter().map(|effect| vec![effect.clone()]).collect();
+            return Ok(Found { answers, rivals: Vec::new() });
         }
         let (tree, catalogue) = (robot.tree(), self.catalogue.as_ref());
         for spec in present {
@@ -145,7 +146,7 @@ impl Growth for TraceResidual {
             for rival in effect.rivals.iter().filter(|rival| rival.confidence >= self.least_rival) {
                 found.rivals.push([effect.spec.clone(), rival.spec.clone()]);
             }
-            found.effects.push(effect.spec);
+            found.answers.push(vec![effect.spec]);
         }
         Ok(found)
     }

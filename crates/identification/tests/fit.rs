@@ -5,6 +5,7 @@ mod synthetic;
 use phiw_dynamics::Tree;
 use phiw_identification::checks::InputError;
 use phiw_identification::effect::{EffectParameter, Entry, Evaluator, Needs, Sample};
+use phiw_identification::fitting::TorqueError;
 use phiw_identification::{
     BlockSource, Data, Effect, EffectSpec, Fold, IdentificationError, Identified, Variants, identify, predict,
 };

@@ -91,7 +91,8 @@ fn an_effect_far_below_the_noise_of_a_row_is_found_in_many() {
         // In 18 s of this noise Coulomb and quadratic friction are nearly as likely: then one is the other's
         // rival.
         let is_it = |spec: &EffectSpec| spec.kind == kind && spec.joints == [name];
-        let [effect] = found.effects.as_slice() else { panic!("{kind}: {found:?}, {best:?}") };
+        let effects = found.effects();
+        let [effect] = effects.as_slice() else { panic!("{kind}: {found:?}, {best:?}") };
         assert_eq!(effect.joints, [name], "{kind}: {best:?}");
         let named = is_it(effect) || ranked.iter().take(2).any(|gain| is_it(&gain.effect));
         assert!(named, "{kind}: {best:?}");

@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 /// What the score test says of all logs of a run beside the declared model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Detection {
-    /// −log L that the secret's own kind saves on its own joints, with the best constants of the catalogue;
-    /// none where the catalogue can not ask for it.
+    /// −log L that the secret's own kind saves on its own joints, with the best constants of the catalogue; of
+    /// a family, in the mean of its joints. None where the catalogue can not ask for it.
     pub secret: Option<f64>,
     /// Of all other effects the one with the most merit: its name, the −log L that it saves, and its merit.
     pub other: Option<(String, f64, f64)>,
@@ -43,8 +43,13 @@ impl Setup {
             .into_iter()
             .partition(|gain| is_secret(file, &gain.effect));
         let name = |effect: &EffectSpec| format!("{}[{}]", effect.kind, effect.joints.join("+"));
+        let joints = match file.secret {
+            Some(kind) if kind.is_family() => file.secret_joints.len(),
+            _ => 1,
+        };
+        let sum: f64 = own.iter().map(|gain| gain.gain).sum();
         Ok(Some(Detection {
-            secret: own.first().map(|gain| gain.gain),
+            secret: (!own.is_empty()).then(|| sum / joints as f64),
             other: others.first().map(|other| (name(&other.effect), other.gain, other.merit)),
         }))
     }

@@ -84,13 +84,16 @@ pub fn do_all(
     let alike: Vec<&[Job]> =
         jobs.chunk_by(|one, other| one.secret == other.secret && one.seed == other.seed).collect();
     let do_alike = |jobs: &&[Job]| -> anyhow::Result<Vec<Outcome>> {
-        let secret = jobs[0].secret.map(|kind| setup.secret(kind, jobs[0].seed)).transpose()?;
+        let secret = match jobs[0].secret {
+            Some(kind) => setup.secret(kind, jobs[0].seed)?,
+            None => Vec::new(),
+        };
         let mut own = None;
-        if secret.is_some() && !jobs.iter().all(|job| job.is_done(out)) {
-            own = Some(setup.validation(jobs[0].backend, secret.as_ref())?);
+        if !secret.is_empty() && !jobs.iter().all(|job| job.is_done(out)) {
+            own = Some(setup.validation(jobs[0].backend, &secret)?);
         }
         let validation = own.as_ref().unwrap_or(&setup.validation);
-        let run = |job: &Job| job.run(setup, secret.as_ref(), validation, out, &left, progress);
+        let run = |job: &Job| job.run(setup, &secret, validation, out, &left, progress);
         jobs.par_iter().map(run).collect()
     };
     let outcomes: Vec<Vec<Outcome>> = alike.par_iter().map(do_alike).collect::<anyhow::Result<_>>()?;
@@ -105,7 +108,7 @@ impl Job {
     fn run(
         &self,
         setup: &Setup,
-        secret: Option<&PlantEffect>,
+        secret: &[PlantEffect],
         validation: &Validation,
         out: &Path,
         left: &AtomicUsize,
@@ -174,12 +177,12 @@ impl Job {
         Ok(Outcome::Done)
     }
 
-    fn begin(&self, setup: &Setup, secret: Option<&PlantEffect>) -> anyhow::Result<RunFile> {
+    fn begin(&self, setup: &Setup, secret: &[PlantEffect]) -> anyhow::Result<RunFile> {
         let own = || unreliable_model(&setup.truth, self.seed);
         let initial = setup.initial_of_all_seeds().unwrap_or_else(own);
         let tree = setup.robot.tree();
         let name = |&joint: &usize| tree.joint_names().nth(joint).unwrap_or_default().to_owned();
-        let joints = secret.map_or_else(Vec::new, |effect| effect.joints(tree));
+        let joints: Vec<usize> = secret.iter().flat_map(|effect| effect.joints(tree)).collect();
         Ok(RunFile {
             arm: self.arm,
             footing: self.footing,

@@ -63,10 +63,16 @@ pub fn rows(results: &Results) -> Vec<[String; 10]> {
                 [least, .., most] => format!("{:.1} ({least:.1} to {most:.1})", median(&deviations)),
                 [only] => format!("{only:.1}"),
             },
-            kind.map_or_else(
-                || "–".to_owned(),
-                |_| format!("{} of {count}", of(Arm::Closed).filter(|run| is_it(run)).count()),
-            ),
+            match kind {
+                None => "–".to_owned(),
+                Some(kind) => {
+                    let named = of(Arm::Closed).filter(|run| is_it(run)).count();
+                    let joints = kind.is_family().then(|| share_of_joints(of(Arm::Closed)));
+                    let joints = joints
+                        .map_or_else(String::new, |share| format!(", {:.0} % of the joints", 100.0 * share));
+                    format!("{named} of {count}{joints}")
+                }
+            },
             format!("{} of {count}", of(Arm::Closed).filter(|run| is_other(run)).count()),
             last(Arm::Curriculum, |score| score.rmse_w),
             last(Arm::Closed, |score| score.rmse_w),
@@ -78,6 +84,16 @@ pub fn rows(results: &Results) -> Vec<[String; 10]> {
     kinds.into_iter().map(row).collect()
 }
 
+/// Share of a family's joints on which it was found, over all runs.
+fn share_of_joints<'a>(runs: impl Iterator<Item = &'a RunFile>) -> f64 {
+    let (mut named, mut all) = (0, 0);
+    for run in runs {
+        named += found(run).filter(|spec| is_secret(run, spec)).count();
+        all += run.secret_joints.len();
+    }
+    named as f64 / all.max(1) as f64
+}
+
 /// What a run found beside the declared effects.
 fn found(run: &RunFile) -> impl Iterator<Item = &EffectSpec> {
     let specs = run.run.model.effects.iter().map(|effect| &effect.spec);
@@ -85,12 +101,15 @@ fn found(run: &RunFile) -> impl Iterator<Item = &EffectSpec> {
     specs.filter(|spec| declared.iter().all(|declared| declared.spec != **spec))
 }
 
-/// Whether an effect is the run's secret: its kind on its joints. A tilt acts on the base, whatever joints
+/// Whether an effect is the run's secret: its kind on its joints, or on one joint of a family's. A tilt acts on the base, whatever joints
 /// feel it.
 pub fn is_secret(run: &RunFile, spec: &EffectSpec) -> bool {
     let joints: BTreeSet<&String> = spec.joints.iter().collect();
     let wanted: BTreeSet<&String> = run.secret_joints.iter().collect();
-    run.secret.is_some_and(|kind| kind.name() == spec.kind) && (wanted.is_empty() || joints == wanted)
+    run.secret.is_some_and(|kind| {
+        let on_them = if kind.is_family() { joints.is_subset(&wanted) } else { joints == wanted };
+        kind.effect_kind() == spec.kind && (wanted.is_empty() || on_them)
+    })
 }
 
 /// What a run found, in words: `coulomb_friction[elbow]`.

@@ -251,7 +251,7 @@ impl Setup {
             candidates,
             fourier: BTreeMap::new(),
         };
-        setup.validation = setup.validation(arguments.backend, None)?;
+        setup.validation = setup.validation(arguments.backend, &[])?;
         let models = [
             (Arm::FourierInitial, setup.initial_of_all_seeds()),
             (Arm::FourierTrue, Some(setup.truth.clone())),
@@ -272,7 +272,7 @@ impl Setup {
     ///
     /// # Errors
     /// The robot can not be run.
-    pub fn validation(&self, backend: Engine, secret: Option<&PlantEffect>) -> anyhow::Result<Validation> {
+    pub fn validation(&self, backend: Engine, secret: &[PlantEffect]) -> anyhow::Result<Validation> {
         let logs = self.validation_logs(backend, secret)?;
         let declared = self.validation_of(&self.truth, &logs)?;
         Ok(Validation { logs, declared })
@@ -306,7 +306,7 @@ impl Setup {
         backend: Engine,
         standing: bool,
         noise: f64,
-        secret: Option<&PlantEffect>,
+        secret: &[PlantEffect],
     ) -> Box<dyn Experiment> {
         let (in_motion, in_log) = self.settings.noise_in.shares(noise);
         let mut experiment = self.experiment(backend, standing, in_motion);
@@ -320,7 +320,7 @@ impl Setup {
             experiment.measuring.encoders =
                 method::encoders(self.settings.method, experiment.timing.control_period_s);
         }
-        experiment.effects.extend(secret.cloned());
+        experiment.effects.extend_from_slice(secret);
         match &self.subject.standing {
             Some(legs) => Box::new(self.subject.on_feet(legs, backend, noise, experiment.effects)),
             None => Box::new(experiment),
@@ -355,11 +355,7 @@ impl Setup {
     ///
     /// # Errors
     /// The robot can not be run.
-    pub fn validation_logs(
-        &self,
-        backend: Engine,
-        secret: Option<&PlantEffect>,
-    ) -> anyhow::Result<Vec<MotionLog>> {
+    pub fn validation_logs(&self, backend: Engine, secret: &[PlantEffect]) -> anyhow::Result<Vec<MotionLog>> {
         let experiment = self.trial_ground(backend, false, 0.0, secret);
         let measure = |(index, motion): (usize, &Motion)| -> anyhow::Result<MotionLog> {
             let mut rng = ChaCha8Rng::seed_from_u64(VALIDATION_SEED);
@@ -384,11 +380,11 @@ impl Setup {
         Ok((evidence.factor().combine(&self.subject.judged_rows())?, samples))
     }
 
-    /// The effect that a seed hides in its plant.
+    /// The effects that a seed hides in its plant: one, or of a family one for each joint.
     ///
     /// # Errors
     /// None that a robot that was read can cause.
-    pub fn secret(&self, kind: SecretKind, seed: u64) -> anyhow::Result<PlantEffect> {
+    pub fn secret(&self, kind: SecretKind, seed: u64) -> anyhow::Result<Vec<PlantEffect>> {
         let tree = &self.subject.tree;
         let joints = tree.joint_count();
         let world = World { rotor_inertia: vec![0.0; joints], ..World::default() };

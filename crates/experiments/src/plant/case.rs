@@ -160,8 +160,8 @@ impl Case {
             samples.extend(robot.samples(motion)?);
         }
         let secret = self.kind.draw(robot, &samples, &mut rng);
-        let secret_joints: Vec<String> =
-            secret.joints(&robot.tree).iter().map(|&joint| robot.tree.joint(joint).joint.clone()).collect();
+        let joints = secret.iter().flat_map(|effect| effect.joints(&robot.tree));
+        let secret_joints: Vec<String> = joints.map(|joint| robot.tree.joint(joint).joint.clone()).collect();
         if let Some(keep) = &arguments.keep {
             let path = keep.join(format!("{name}.truth.txt"));
             std::fs::write(&path, format!("{secret:#?}\n{secret_joints:?}\n"))
@@ -169,9 +169,10 @@ impl Case {
         }
         write(&folder, "robot.urdf", robot.urdf)?;
         let start = Instant::now();
-        let mut tracking = self.log(robot, Some(secret), &motions, &TRAINED, &folder, arguments, &mut rng)?;
+        let mut tracking = self.log(robot, secret, &motions, &TRAINED, &folder, arguments, &mut rng)?;
         if self.kind.needs_held_model() {
-            tracking = tracking.max(self.log(robot, None, &motions, &CLEAN, &folder, arguments, &mut rng)?);
+            tracking =
+                tracking.max(self.log(robot, Vec::new(), &motions, &CLEAN, &folder, arguments, &mut rng)?);
         }
         let simulated_s = start.elapsed().as_secs_f64();
         let start = Instant::now();
@@ -186,7 +187,7 @@ impl Case {
     fn log(
         &self,
         robot: &Robot,
-        secret: Option<PlantEffect>,
+        secret: Vec<PlantEffect>,
         motions: &[MultiSine],
         names: &[&str],
         folder: &Path,
@@ -195,7 +196,7 @@ impl Case {
     ) -> anyhow::Result<f64> {
         let joints = robot.tree.joint_count();
         // A kind that is sought is no joint's by nature, or it would not be one joint's secret.
-        let natural = |law: &Friction| law.kind() != self.kind.name();
+        let natural = |law: &Friction| law.kind() != self.kind.effect_kind();
         let mut effects: Vec<PlantEffect> = (0..joints)
             .flat_map(|joint| {
                 robot

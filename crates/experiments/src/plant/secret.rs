@@ -33,6 +33,8 @@ pub enum SecretKind {
     TimeDelay,
     Payload,
     GravityTilt,
+    /// Coulomb friction of every joint: a family.
+    FrictionFamily,
 }
 
 /// The experiment of the issue: twelve kinds that show in logs of one motion each, without a model from
@@ -56,7 +58,7 @@ pub const TWELVE: [SecretKind; 12] = [
 const SIZES: [f64; 2] = [0.12, 0.3];
 
 impl SecretKind {
-    /// All kinds.
+    /// All kinds of one effect.
     pub const ALL: [SecretKind; 18] = [
         SecretKind::CoulombFriction,
         SecretKind::AsymmetricFriction,
@@ -83,37 +85,61 @@ impl SecretKind {
         self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
+    /// The kind of its effects in `report.json`.
+    pub fn effect_kind(self) -> String {
+        match self {
+            SecretKind::FrictionFamily => SecretKind::CoulombFriction.name(),
+            _ => self.name(),
+        }
+    }
+
+    /// Whether it is one kind on each of several joints.
+    pub fn is_family(self) -> bool {
+        self == SecretKind::FrictionFamily
+    }
+
     /// Whether an identification of the rigid body swallows it, so that it shows against a held model only.
     pub fn needs_held_model(self) -> bool {
         matches!(self, SecretKind::Payload | SecretKind::GravityTilt)
     }
 
-    /// Draws an effect for motions that go through `samples` (`[q, v, a, torque]` of all joints, from the
-    /// references).
-    pub fn draw(self, robot: &Robot, samples: &[Sample], rng: &mut ChaCha8Rng) -> PlantEffect {
-        let place = Place::draw(robot, samples, rng);
+    /// Draws its effects for motions that go through `samples` (`[q, v, a, torque]` of all joints, from the
+    /// references): one, or of a family one for each joint.
+    pub fn draw(self, robot: &Robot, samples: &[Sample], rng: &mut ChaCha8Rng) -> Vec<PlantEffect> {
+        if !self.is_family() {
+            return vec![self.draw_one(&Place::draw(robot, samples, rng), rng)];
+        }
+        let on = |joint: usize| {
+            let place = Place { joint, ..Place::draw(robot, samples, rng) };
+            PlantEffect::Friction { joint, law: self.friction(&place, rng) }
+        };
+        (0..robot.tree.joint_count()).map(on).collect()
+    }
+
+    fn draw_one(self, place: &Place<'_>, rng: &mut ChaCha8Rng) -> PlantEffect {
         match self {
             SecretKind::CoulombFriction
             | SecretKind::AsymmetricFriction
             | SecretKind::StribeckFriction
             | SecretKind::QuadraticFriction
             | SecretKind::LoadDependentFriction
-            | SecretKind::ThermalDrift => {
-                PlantEffect::Friction { joint: place.joint, law: self.friction(&place, rng) }
+            | SecretKind::ThermalDrift
+            | SecretKind::FrictionFamily => {
+                PlantEffect::Friction { joint: place.joint, law: self.friction(place, rng) }
             }
             SecretKind::JointSpring
             | SecretKind::TorqueRipple
             | SecretKind::GravityBalancer
             | SecretKind::EndStop => {
-                PlantEffect::Mechanism { joint: place.joint, law: self.mechanism(&place, rng) }
+                PlantEffect::Mechanism { joint: place.joint, law: self.mechanism(place, rng) }
             }
             SecretKind::Hysteresis
             | SecretKind::RotorInertia
             | SecretKind::TransmissionCoupling
             | SecretKind::JointElasticity
-            | SecretKind::TimeDelay => self.drive(&place, rng),
+            | SecretKind::TimeDelay => self.drive(place, rng),
             SecretKind::ExternalForce | SecretKind::Payload | SecretKind::GravityTilt => {
-                self.load(&place, rng)
+                self.load(place, rng)
             }
         }
     }

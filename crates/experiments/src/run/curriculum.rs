@@ -36,7 +36,7 @@ pub struct Outcome {
     /// What the runs share.
     pub setup: Setup,
     /// What the plant has.
-    pub secret: PlantEffect,
+    pub secret: Vec<PlantEffect>,
     /// The runs: with the model as it was declared, and with the loop closed.
     pub runs: [RunFile; 2],
     /// Error of the initial model, and of both at the end, on the held-out motions.
@@ -84,7 +84,7 @@ pub fn run(out: &Path) -> anyhow::Result<(PathBuf, String)> {
     }
     let [open, closed]: [RunFile; 2] = runs.try_into().map_err(|_| anyhow::anyhow!("a run is missing"))?;
     let secret = setup.secret(SECRET, SEED)?;
-    let logs: Vec<MotionLog> = setup.validation_logs(engine, Some(&secret))?;
+    let logs: Vec<MotionLog> = setup.validation_logs(engine, &secret)?;
     let error = |model: &RobotModel| setup.torque_error(model, &logs);
     let errors = [error(&closed.run.initial)?, error(&open.run.model)?, error(&closed.run.model)?];
     let outcome = Outcome { setup, secret, runs: [open, closed], errors };

@@ -270,7 +270,12 @@ fn effect(outcome: &Outcome, found: &[String]) -> Section {
 }
 
 /// What the plant has, in words.
-fn truth(secret: &PlantEffect, tree: &Tree) -> String {
+fn truth(secret: &[PlantEffect], tree: &Tree) -> String {
+    let effects: Vec<String> = secret.iter().map(|effect| of_effect(effect, tree)).collect();
+    effects.join(", ")
+}
+
+fn of_effect(secret: &PlantEffect, tree: &Tree) -> String {
     let names: Vec<&str> = tree.joint_names().collect();
     let joints: Vec<&str> = secret.joints(tree).into_iter().map(|joint| names[joint]).collect();
     let size = match secret {
