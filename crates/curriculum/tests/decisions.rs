@@ -3,7 +3,7 @@
 use phiw_curriculum::IterationRecord;
 use phiw_curriculum::constraint::Safety;
 use phiw_curriculum::end::{Certain, Converged, EndCriterion, EndReason, FixedCount};
-use phiw_curriculum::growth::{rivals_to_separate, unconfirmed};
+use phiw_curriculum::growth::{rivals_to_separate, saved_by_family, unconfirmed};
 use phiw_curriculum::planner::{NoneAllowed, Permission, permission};
 use phiw_curriculum::relaxation::{
     ConditionRelaxation, ConstantReduction, Learnt, Maximum, Relaxation, Scale, UncertaintyRelaxation,
@@ -222,6 +222,25 @@ fn an_effect_that_the_likelihood_does_not_confirm_is_left_out() {
     for (gains, expected) in cases {
         assert_eq!(unconfirmed(gains, 20.0), *expected, "{gains:?}");
     }
+}
+
+/// What a family saves as one hypothesis, against the closed form of a normal distribution whose spread is
+/// fitted: the likelihood of n values of variance m over that of variance 1.
+#[test]
+fn a_family_saves_what_the_spread_of_its_members_explains() {
+    for (members, mean_square) in [(2, 1.5), (6, 6.25), (18, 6.25), (18, 100.0)] {
+        let n = f64::from(members);
+        let log_likelihood = |variance: f64| -0.5 * n * (variance.ln() + mean_square / variance);
+        let expected = log_likelihood(mean_square) - log_likelihood(1.0);
+        let saved = saved_by_family(0.5 * n * mean_square, members as usize);
+        assert!((saved - expected).abs() < 1e-9 * expected, "{members}, {mean_square}: {saved}");
+    }
+    // What noise makes is nothing, one effect saves what it saves, and what is no number stays so.
+    assert_eq!(saved_by_family(9.0, 18), 0.0);
+    assert_eq!(saved_by_family(3.0, 18), 0.0);
+    assert_eq!(saved_by_family(7.0, 1), 7.0);
+    assert_eq!(saved_by_family(f64::INFINITY, 18), f64::INFINITY);
+    assert!(saved_by_family(f64::NAN, 18).is_nan());
 }
 
 #[test]

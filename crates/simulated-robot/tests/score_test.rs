@@ -16,9 +16,9 @@ use rand_chacha::ChaCha8Rng;
 /// The paper's noise: more than the torque of any secret here.
 const NOISE: f64 = 0.05;
 
-fn logs(arm: &Arm, secret: Option<&PlantEffect>, seed: u64) -> Vec<MotionLog> {
+fn logs(arm: &Arm, secret: &[PlantEffect], seed: u64) -> Vec<MotionLog> {
     let mut experiment = arm.experiment();
-    experiment.effects.extend(secret.cloned());
+    experiment.effects.extend_from_slice(secret);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let trial = |motion| experiment.perform(&arm.robot, &arm.truth, motion, &mut rng).unwrap().measured;
     arm.dataset.motions().iter().map(trial).collect()
@@ -55,7 +55,7 @@ fn what_it_foretells_is_what_a_fit_saves() {
     let arm = Arm::new(NOISE);
     let test = test_of(&arm);
     for (index, (secret, kind, joint)) in secrets(&arm).into_iter().enumerate() {
-        let logs = logs(&arm, Some(&secret), index as u64);
+        let logs = logs(&arm, &[secret], index as u64);
         let name = arm.tree.joint_names().nth(joint).unwrap();
         let spec = EffectSpec::new(kind, &[name]);
         let declared = test.fitted(&arm.robot, &arm.truth, &[], &logs).unwrap();
@@ -81,7 +81,7 @@ fn an_effect_far_below_the_noise_of_a_row_is_found_in_many() {
     let arm = Arm::new(NOISE);
     let test = test_of(&arm);
     for (index, (secret, kind, joint)) in secrets(&arm).into_iter().enumerate() {
-        let logs = logs(&arm, Some(&secret), index as u64);
+        let logs = logs(&arm, &[secret], index as u64);
         let declared = test.fitted(&arm.robot, &arm.truth, &[], &logs).unwrap();
         let ranked = test.rank(&arm.robot, &declared, &logs).unwrap();
         let best: Vec<_> =
@@ -99,6 +99,26 @@ fn an_effect_far_below_the_noise_of_a_row_is_found_in_many() {
     }
 }
 
+/// Friction of all joints that no joint's score tells is one hypothesis; of a right model none is found.
+#[test]
+fn friction_of_all_joints_is_found_as_a_family() {
+    let arm = Arm::new(NOISE);
+    let test = test_of(&arm);
+    let frictions: Vec<PlantEffect> = (0..arm.tree.joint_count())
+        .map(|joint| PlantEffect::Friction {
+            joint,
+            law: Friction::Coulomb { torque: 0.03 * arm.tree.joint(joint).limits.effort, width: 0.01 },
+        })
+        .collect();
+    let logs = logs(&arm, &frictions, 7);
+    let declared = test.fitted(&arm.robot, &arm.truth, &[], &logs).unwrap();
+    let found = test.look(&arm.robot, &declared, &logs, false, &[]).unwrap();
+    let family = found.answers.iter().find(|answer| answer.len() > 1);
+    let family = family.unwrap_or_else(|| panic!("no family: {found:?}"));
+    assert!(family.iter().all(|effect| effect.kind == "coulomb_friction"), "{found:?}");
+    assert!(2 * family.len() > arm.tree.joint_count(), "{found:?}");
+}
+
 /// Twice the gain of a right model's missing effect is χ²: of all kinds on all joints none is worth its
 /// price, and of an effect of one parameter the gain is ½ on average.
 #[test]
@@ -107,7 +127,7 @@ fn a_right_model_lacks_nothing() {
     let test = test_of(&arm);
     let (mut sum, mut count) = (0.0, 0);
     for seed in 0..3 {
-        let logs = logs(&arm, None, 100 + seed);
+        let logs = logs(&arm, &[], 100 + seed);
         let model = test.fitted(&arm.robot, &arm.truth, &[], &logs).unwrap();
         let ranked = test.rank(&arm.robot, &model, &logs).unwrap();
         let best = &ranked[0];
