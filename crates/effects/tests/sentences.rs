@@ -20,7 +20,7 @@ const SENTENCES: &[(&str, &str)] = &[
     ("coulomb_friction", "shoulder has Coulomb friction of 0.500 N·m."),
     ("torque_offset", "The torque of shoulder is off by a constant 0.500 N·m."),
     ("rotor_inertia", "shoulder carries a rotor inertia of 0.500 kg·m² that the links do not account for."),
-    ("torque_gain", "The torque of shoulder is measured +50.0 % too large."),
+    ("torque_gain", "The torque of shoulder is measured 50.0 % too large."),
     (
         "asymmetric_friction",
         "shoulder rubs differently in its two directions: half the difference is 0.500 N·m·s/rad and 0.250 N·m.",

@@ -166,6 +166,40 @@ impl ScoreTest {
         Ok(all)
     }
 
+    /// The effects of the hypothesis that is believed of `all`, the best first, and pairs of them and what is
+    /// as likely; none where none is worth its price.
+    ///
+    /// Where those that promise most hold nothing once they are fitted, the next are: far from nothing, the
+    /// score may promise anything.
+    fn best(
+        &self,
+        robot: &Robot,
+        model: &RobotModel,
+        known: &[EffectSpec],
+        mut all: &[Hypothesis],
+        logs: &[MotionLog],
+    ) -> Result<Option<Answer>, CurriculumError> {
+        loop {
+            let merits: Vec<f64> = all.iter().map(|hypothesis| hypothesis.merit).collect();
+            let (near, others) = all.split_at(self.settings.shortlist(&merits));
+            if near.is_empty() {
+                return Ok(None);
+            }
+            let (mut answers, contenders) = self.contenders(robot, model, known, near, logs)?;
+            let Some(Winner { winner, rivals }) = self.settings.contest(&contenders) else {
+                all = others;
+                continue;
+            };
+            // A family has no rival that one motion could tell it from.
+            let pair = |rival: usize| match (answers[winner].as_slice(), answers[rival].as_slice()) {
+                ([own], [other]) => Some([own.clone(), other.clone()]),
+                _ => None,
+            };
+            let rivals = rivals.into_iter().filter_map(pair).collect();
+            return Ok(Some((answers.swap_remove(winner), rivals)));
+        }
+    }
+
     /// The effects of each of `near` once everything has been fitted again beside `known`, with their
     /// constants refined, and what it is then worth. The score predicts the gain of a large effect only
     /// roughly, and may predict as much for an effect that explains half of it.
@@ -219,6 +253,9 @@ impl ScoreTest {
     }
 }
 
+/// Effects, and pairs of them and their rivals.
+type Answer = (Vec<EffectSpec>, Vec<[EffectSpec; 2]>);
+
 impl Growth for ScoreTest {
     fn name(&self) -> &'static str {
         "score_test"
@@ -260,21 +297,10 @@ impl ScoreTest {
         };
         while found.answers.len() < self.settings.most_effects {
             let all = self.hypotheses(robot, &model, logs, refuted)?;
-            let merits: Vec<f64> = all.iter().map(|hypothesis| hypothesis.merit).collect();
-            let near = &all[..self.settings.shortlist(&merits)];
-            if near.is_empty() {
-                break;
-            }
             let known = found.effects();
-            let (mut answers, contenders) = self.contenders(robot, &model, &known, near, logs)?;
-            let Some(Winner { winner, rivals }) = self.settings.contest(&contenders) else { break };
-            for rival in rivals {
-                // A family has no rival that a motion could tell it from: each of its joints has.
-                if let ([own], [other]) = (answers[winner].as_slice(), answers[rival].as_slice()) {
-                    found.rivals.push([own.clone(), other.clone()]);
-                }
-            }
-            found.answers.push(answers.swap_remove(winner));
+            let Some((answer, rivals)) = self.best(robot, &model, &known, &all, logs)? else { break };
+            found.rivals.extend(rivals);
+            found.answers.push(answer);
             if found.answers.len() < self.settings.most_effects {
                 model = self.fitted(robot, &model, &found.effects(), logs)?;
             }

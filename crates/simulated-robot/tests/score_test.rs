@@ -102,12 +102,14 @@ fn an_effect_far_below_the_noise_of_a_row_is_found_in_many() {
 /// Friction of all joints that no joint's score tells is one hypothesis; of a right model none is found.
 #[test]
 fn friction_of_all_joints_is_found_as_a_family() {
-    let arm = Arm::new(NOISE);
+    // The paper's noise moves these joints so much that their friction is no sign of a speed any more; three
+    // times this friction holds them fast.
+    let arm = Arm::new(0.02);
     let test = test_of(&arm);
     let frictions: Vec<PlantEffect> = (0..arm.tree.joint_count())
         .map(|joint| PlantEffect::Friction {
             joint,
-            law: Friction::Coulomb { torque: 0.03 * arm.tree.joint(joint).limits.effort, width: 0.01 },
+            law: Friction::Coulomb { torque: 0.01 * arm.tree.joint(joint).limits.effort, width: 0.01 },
         })
         .collect();
     let logs = logs(&arm, &frictions, 7);
