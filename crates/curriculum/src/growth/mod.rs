@@ -74,8 +74,8 @@ pub fn saved_by_family(gain: f64, members: usize) -> f64 {
 /// The answer to be left out of those that were found, if the likelihood does not confirm all of them: the
 /// one that saves least, if that is less than `least_gain`.
 ///
-/// `gains` are what −log L of the model grows by without each of them, of a family as [`saved_by_family`]. What is not a number confirms nothing.
-/// Of equals the first is left out.
+/// `gains` are what −log L of the model grows by without each of them, of a family as [`saved_by_family`]. What
+/// is not a number confirms nothing. Of equals the first is left out.
 pub fn unconfirmed(gains: &[f64], least_gain: f64) -> Option<usize> {
     let gain = |index: &usize| if gains[*index].is_nan() { f64::NEG_INFINITY } else { gains[*index] };
     let least = (0..gains.len()).min_by(|a, b| gain(a).total_cmp(&gain(b)))?;

@@ -164,8 +164,7 @@ impl<'a> Plant<'a> {
             effects.add_other(t, [q, v, before], &scratch.rigid, &mut scratch.bias)?;
         }
         for (joint, acceleration) in acceleration.iter_mut().enumerate() {
-            let factor = effects.as_ref().map_or(1.0, |effects| effects.design.logged_factors()[joint]);
-            *acceleration = torque[joint] / factor - scratch.bias[joint];
+            *acceleration = torque[joint] - scratch.bias[joint];
         }
         scratch.factorise()?;
         scratch.solve(acceleration);
@@ -285,10 +284,8 @@ impl Effects<'_> {
     }
 
     fn add(&self, parameters: &[f64], torque: &mut [f64]) {
-        // What the log says of a torque is not what moves the robot.
-        let rows = self.design.rows().iter().zip(self.design.logged_factors());
-        for (torque, (layout, factor)) in torque.iter_mut().zip(rows) {
-            *torque += layout.torque(&self.evaluation, parameters) / factor;
+        for (torque, layout) in torque.iter_mut().zip(self.design.rows()) {
+            *torque += layout.torque(&self.evaluation, parameters);
         }
     }
 }

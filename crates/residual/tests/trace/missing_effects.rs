@@ -7,7 +7,7 @@ use phiw_effects::Catalogue;
 use phiw_identification::fitting::accumulate;
 use phiw_identification::{Design, EffectCatalogue, EffectSpec, Fold};
 use phiw_regressor::BaseParameters;
-use phiw_residual::trace::{Tracing, Verdict};
+use phiw_residual::trace::Verdict;
 use phiw_telemetry::{Conditioning, ConditioningOptions};
 use std::cell::RefCell;
 
@@ -172,52 +172,6 @@ fn a_gain_is_no_rival_of_an_effect_that_it_contains() {
     assert_eq!(named(&tracing), [("thermal_drift".to_owned(), vec!["elbow".to_owned()])]);
     let rivals: Vec<&str> = tracing.effects[0].rivals.iter().map(|rival| rival.spec.kind.as_str()).collect();
     assert!(!rivals.contains(&"torque_gain"), "{rivals:?}");
-}
-
-/// The error of a joint's torque factor: what is in force and what is left of it.
-fn gain_error(tracing: &Tracing, joint: &str) -> Option<f64> {
-    let design = &tracing.model.design;
-    let is_it = |spec: &EffectSpec| spec.kind == "torque_gain" && spec.joints == [joint];
-    let place = design.effects().iter().position(|effect| is_it(&effect.spec()))?;
-    let in_force = design.effects()[place].spec().constants.get("gain_error").copied().unwrap_or_default();
-    let left = tracing.model.fit.parameters[design.effect_parameters(place).start];
-    Some(in_force + left)
-}
-
-/// A torque that is logged with another factor, and what the factor of the one joint, or that of the other,
-/// is then. From one and a half on another effect had the name and half of the error stayed: what is linear in
-/// the factor about one is not about the model that a wrong factor has bent.
-#[test]
-fn a_torque_of_a_third_or_of_three_times_is_a_gain() {
-    for factor in [0.3, 0.6, 1.5, 2.0, 3.0] {
-        let tracing = traced(11, &|_, torque| torque[1] *= factor);
-        let [found] = tracing.effects.as_slice() else { panic!("{factor}: {:?}", named(&tracing)) };
-        assert_eq!(found.spec.kind, "torque_gain", "{factor}");
-        let joint = found.spec.joints[0].as_str();
-        let expected = if joint == "elbow" { factor } else { 1.0 / factor };
-        let fitted = 1.0 + gain_error(&tracing, joint).unwrap();
-        assert!((fitted / expected - 1.0).abs() < 0.03, "{factor}: {joint} {fitted}");
-        assert!(tracing.model.held_out.relative < 0.5 * tracing.before.1.relative, "{factor}");
-    }
-}
-
-/// With a gain of two declared, each fit was to a torque farther away: 760 % of the torque held out.
-#[test]
-fn a_declared_gain_of_two_or_more_is_fitted() {
-    for factor in [0.3, 2.0, 3.0] {
-        let declared = ["viscous_friction", "coulomb_friction", "torque_gain:elbow"];
-        let doubled = |_: &State<'_>, torque: &mut [f64]| torque[1] *= factor;
-        let tracing = traced_on(folds().0, &declared, 11, &doubled, false);
-        let right = traced(11, &|_, _| ());
-        assert!(
-            tracing.before.1.relative < 1.2 * right.before.1.relative,
-            "{factor}: {:?}",
-            tracing.before.1
-        );
-        let fitted = 1.0 + gain_error(&tracing, "elbow").unwrap();
-        assert!((fitted / factor - 1.0).abs() < 0.03, "{factor}: {fitted}");
-        assert!(named(&tracing).is_empty(), "{factor}: {:?}", named(&tracing));
-    }
 }
 
 /// A candidate whose columns were not finite ended the whole trace: a Stribeck velocity of zero, where steps
