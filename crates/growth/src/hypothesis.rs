@@ -3,8 +3,8 @@
 use phiw_curriculum::growth::saved_by_family;
 use phiw_estimation::Gain;
 
-/// A member of a family that saves less of −log L makes the torques worse, since its own uncertainty is larger
-/// than its value: one standard deviation (AIC, Akaike 1974).
+/// A member of a family that saves less of −log L makes the torques worse, since its own uncertainty is
+/// larger than its value: one standard deviation (AIC, Akaike 1974).
 const LEAST_OF_MEMBER: f64 = 0.5;
 
 /// An effect, or a family: one kind on several joints, with one parameter each.
@@ -67,8 +67,8 @@ mod tests {
         deviations.iter().map(gain).collect()
     }
 
-    /// Deviations of the members, joints that are asked of; whether the family is worth more than 5 beyond its
-    /// price, and more than its best member by itself.
+    /// Deviations of the members, joints that are asked of; whether the family is worth more than 5 beyond
+    /// its price, and more than its best member by itself.
     #[test]
     fn small_frictions_on_all_joints_are_plain_together() {
         let cases: &[(&[f64], usize, bool, bool)] = &[

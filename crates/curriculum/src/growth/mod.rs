@@ -57,7 +57,7 @@ pub trait Growth: Send + Sync {
 /// fit saves `gain`.
 ///
 /// The members' values, each over its standard deviation, are taken for draws of one normal distribution,
-/// whose spread is fitted to them (empirical Bayes, Efron & Morris 1973). Against nothing but noise that saves
+/// whose spread is fitted to them (empirical Bayes, Efron & Morris 1973). Against noise alone that saves
 /// ½n·(m − 1 − ln m), m = 2·gain/n being their mean square; m ≤ 1 is what noise makes. So eighteen frictions
 /// of two standard deviations each are plain together, though none is by itself. One parameter alone saves
 /// what it saves.
@@ -74,8 +74,8 @@ pub fn saved_by_family(gain: f64, members: usize) -> f64 {
 /// The answer to be left out of those that were found, if the likelihood does not confirm all of them: the
 /// one that saves least, if that is less than `least_gain`.
 ///
-/// `gains` are what −log L of the model grows by without each of them, of a family as [`saved_by_family`]. What
-/// is not a number confirms nothing. Of equals the first is left out.
+/// `gains` are what −log L of the model grows by without each of them, of a family as [`saved_by_family`].
+/// What is not a number confirms nothing. Of equals the first is left out.
 pub fn unconfirmed(gains: &[f64], least_gain: f64) -> Option<usize> {
     let gain = |index: &usize| if gains[*index].is_nan() { f64::NEG_INFINITY } else { gains[*index] };
     let least = (0..gains.len()).min_by(|a, b| gain(a).total_cmp(&gain(b)))?;

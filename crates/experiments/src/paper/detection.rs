@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 /// What the score test says of all logs of a run beside the declared model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Detection {
-    /// −log L that the secret's own kind saves on its own joints, with the best constants of the catalogue; of
-    /// a family, in the mean of its joints. None where the catalogue can not ask for it.
+    /// −log L that the secret's own kind saves on its own joints, with the best constants of the catalogue;
+    /// of a family, in the mean of its joints. None where the catalogue can not ask for it.
     pub secret: Option<f64>,
     /// Of all other effects the one with the most merit: its name, the −log L that it saves, and its merit.
     pub other: Option<(String, f64, f64)>,

@@ -101,8 +101,8 @@ fn found(run: &RunFile) -> impl Iterator<Item = &EffectSpec> {
     specs.filter(|spec| declared.iter().all(|declared| declared.spec != **spec))
 }
 
-/// Whether an effect is the run's secret: its kind on its joints, or on one joint of a family's. A tilt acts on the base, whatever joints
-/// feel it.
+/// Whether an effect is the run's secret: its kind on its joints, or on one joint of a family's. A tilt acts
+/// on the base, whatever joints feel it.
 pub fn is_secret(run: &RunFile, spec: &EffectSpec) -> bool {
     let joints: BTreeSet<&String> = spec.joints.iter().collect();
     let wanted: BTreeSet<&String> = run.secret_joints.iter().collect();

@@ -11,8 +11,8 @@ pub(super) enum Harm {
     /// That the logarithms of the torques' foretold errors grow.
     EachTorque,
     /// That the logarithms of the errors on motion held out grow, or that the error of all torques together
-    /// is there larger than `most_relative` of the torques (RMS); of each torque what is as good as none counts
-    /// as the largest such.
+    /// is there larger than `most_relative` of the torques (RMS); of each torque what is as good as none
+    /// counts as the largest such.
     HeldOut { most_relative: f64 },
 }
 
