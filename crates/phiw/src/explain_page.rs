@@ -99,14 +99,11 @@ pub fn headline(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<String> {
     lines
 }
 
-/// The error before and after. Where that of all torques together has grown, by less than what counts, also
-/// of the joints that have gained most.
+/// The error before and after. Where that of all torques together has grown, which it may by the noise of a
+/// large torque, also of the joints that have gained most.
 fn errors_held_out(analysis: &Analysis<'_>, tracing: &Tracing) -> String {
     let (before, after) = (&tracing.before.1, &tracing.model.held_out);
     let all = format!("Held-out error {} % → {} %", percent(before.relative), percent(after.relative));
-    if after.relative <= before.relative {
-        return format!("{all}.");
-    }
     let ratio = |joint: &usize| after.rmse[*joint] / before.rmse[*joint];
     let mut gained: Vec<usize> = (0..before.rmse.len()).filter(|joint| ratio(joint) < 1.0).collect();
     gained.sort_by(|a, b| ratio(a).total_cmp(&ratio(b)));
@@ -115,11 +112,11 @@ fn errors_held_out(analysis: &Analysis<'_>, tracing: &Tracing) -> String {
         let share = |error: &TorqueError| percent(error.rmse[*joint] / error.rms_torque[*joint]);
         format!("{} {} % → {} %", names[*joint], share(before), share(after))
     };
+    if after.relative <= before.relative || gained.is_empty() {
+        return format!("{all}.");
+    }
     let gained: Vec<String> = gained.iter().take(SAID_TO_HAVE_GAINED).map(of_joint).collect();
-    format!(
-        "{all} of all torques together, as good as nothing on the joints where it has grown; of single joints' torques: {}.",
-        gained.join(", ")
-    )
+    format!("{all} of all torques together; of single joints' torques: {}.", gained.join(", "))
 }
 
 /// A sentence on what is larger than noise and follows nothing.
