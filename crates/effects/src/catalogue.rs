@@ -3,7 +3,7 @@
 use crate::declaration::{cannot_act, joint_indices, nearest};
 use crate::{EffectKind, FittedEffect, Mechanisms, ServoFriction};
 use crate::{coupling, drift, drive, efficiency, elasticity, external, friction, hysteresis};
-use crate::{logged_torque, position, position_map, sensing, torque_zero};
+use crate::{logged_torque, position, position_map, sensing, torque_gain, torque_zero};
 use phiw_codegen::JointTorque;
 use phiw_dynamics::Tree;
 use phiw_identification::effect::{EffectError, EffectParameter, JointProperty};
@@ -23,7 +23,7 @@ impl Default for Catalogue {
                 Box::new(friction::Coulomb),
                 Box::new(drive::TorqueOffset),
                 Box::new(drive::RotorInertia),
-                Box::new(drive::TorqueGain),
+                Box::new(torque_gain::TorqueGain),
                 Box::new(friction::Asymmetric),
                 Box::new(friction::Quadratic),
                 Box::new(friction::Stribeck),

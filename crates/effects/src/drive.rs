@@ -1,4 +1,4 @@
-//! Effects of the motor and its torque measurement: rotor inertia, offset, gain.
+//! Effects of the motor and its torque measurement: rotor inertia, offset.
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
@@ -7,7 +7,7 @@ use crate::mechanism::{Mechanism, Mechanisms};
 use phiw_codegen::{Expression, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
-use phiw_identification::effect::{JointProperty, Needs, QuadraticForm, Sample};
+use phiw_identification::effect::{JointProperty, QuadraticForm, Sample};
 
 /// Ia·q̈.
 pub struct RotorInertia;
@@ -74,49 +74,8 @@ impl EffectKind for TorqueOffset {
     }
 }
 
-/// A sensor that is further off measures in another unit.
-const LARGEST_GAIN_ERROR: f64 = 0.5;
-
-/// (1 + ε) on the measured torque: the column is all torque that the model knows of, friction included. Where
-/// the friction is fitted its own columns take up that part of the change; where it is held nothing else
-/// would.
-pub struct TorqueGain;
-
-impl EffectKind for TorqueGain {
-    fn name(&self) -> &str {
-        "torque_gain"
-    }
-    fn telling_motion(&self) -> &'static str {
-        "a known load on the joint"
-    }
-    fn sentence(&self, found: &FittedEffect<'_>) -> String {
-        let (percent, way) =
-            (100.0 * found.value(0).abs(), if found.value(0) < 0.0 { "small" } else { "large" });
-        format!("The torque of {} is measured {percent:.1} % too {way}.", found.joints())
-    }
-    fn mechanisms(&self, found: &FittedEffect<'_>) -> Mechanisms {
-        motor(found, 1.0 / (1.0 + found.value(0)), 0.0)
-    }
-    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
-        found.own_torque(|joint| found.value(0) * Expression::MotionTorque(joint.to_owned()))
-    }
-    fn seen_against(&self) -> Signal {
-        Signal::Torque
-    }
-    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
-        let joint = site[0];
-        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
-            out[0] = sample.total_torque().get(joint).copied().unwrap_or_default();
-        };
-        let parameters = [("gain_error", ParameterKind::Ratio, -LARGEST_GAIN_ERROR)];
-        let needs = Needs { total_torque: true, ..Needs::default() };
-        let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
-        Box::new(effect.needing(needs).at_most(LARGEST_GAIN_ERROR))
-    }
-}
-
 /// A motor of this gain and bias at the effect's joint.
-fn motor(found: &FittedEffect<'_>, gain: f64, bias: f64) -> Mechanisms {
+pub(crate) fn motor(found: &FittedEffect<'_>, gain: f64, bias: f64) -> Mechanisms {
     let joint = found.joint_names().first().cloned().unwrap_or_default();
     Mechanisms::of(Mechanism::Motor { joint, gain, bias })
 }

@@ -19,6 +19,7 @@ mod position;
 mod position_map;
 mod sensing;
 mod sign;
+mod torque_gain;
 mod torque_zero;
 mod trigonometric_spline;
 

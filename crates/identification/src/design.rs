@@ -60,6 +60,8 @@ pub struct Design {
     needs: Needs,
     reference: Option<ReferenceModel>,
     rest_speeds: Vec<f64>,
+    /// What each torque is multiplied by in the log.
+    logged_factors: Vec<f64>,
     /// Effects from this one on are candidates.
     candidates_from: usize,
     /// Whether a candidate's columns held a number that is not finite. Set while blocks are evaluated, in
@@ -129,6 +131,10 @@ impl Design {
             start = layout.range.end;
             rows.push(layout);
         }
+        let mut logged_factors = vec![1.0; rows.len()];
+        for (row, factor) in effects.iter().filter_map(|effect| effect.logged_factor()) {
+            logged_factors[row] *= factor;
+        }
         let needs = effects.iter().fold(Needs::default(), |needs, effect| needs.union(effect.needs()));
         Design {
             candidates_from: effects.len(),
@@ -142,6 +148,7 @@ impl Design {
             rows,
             width: start,
             needs,
+            logged_factors,
             reference: None,
             rest_speeds: Vec::new(),
         }
@@ -187,6 +194,11 @@ impl Design {
         moves(evaluation[self.width + row])
     }
 
+    /// What each torque is multiplied by in the log, by the effects in force ([`Effect::logged_factor`]).
+    pub fn logged_factors(&self) -> &[f64] {
+        &self.logged_factors
+    }
+
     /// What the effects' columns need beside the signals.
     pub fn needs(&self) -> Needs {
         self.needs
@@ -223,6 +235,37 @@ impl Design {
             (Arc::clone(&self.effects[effect]), parameters[self.effect_parameters(effect)].to_vec())
         };
         Ok(ReferenceModel::new(tree).with_shared_effects(effects.iter().map(with_values).collect()))
+    }
+
+    /// The same with the factors of logged torques that `parameters` say in force
+    /// ([`Effect::logged_factor`]), and the parameters that are left; `None` where no effect has one that is
+    /// `least` away from what is in force.
+    ///
+    /// # Errors
+    /// The parameters are not this design's.
+    pub(crate) fn with_factors_in_force(
+        &self,
+        parameters: &[f64],
+        least: f64,
+    ) -> Result<Option<(Self, Vec<f64>)>, DimensionError> {
+        check_size("parameters", parameters.len(), self.parameter_count())?;
+        let (mut effects, mut left, mut any) = (self.effects.clone(), parameters.to_vec(), false);
+        for (index, effect) in effects.iter_mut().enumerate() {
+            let own = self.effect_parameters(index);
+            if parameters[own.clone()].iter().all(|value| value.abs() < least) {
+                continue;
+            }
+            if let Some(moved) = effect.with_logged_factor(&parameters[own.clone()]) {
+                *effect = Arc::from(moved);
+                left[own].fill(0.0);
+                any = true;
+            }
+        }
+        let moved = || Design {
+            rest_speeds: self.rest_speeds.clone(),
+            ..Design::of_shared(self.tree.clone(), self.base.clone(), effects)
+        };
+        Ok(any.then(|| (moved(), left)))
     }
 
     /// The design with only the `chosen` effects, in that order.
@@ -346,8 +389,12 @@ impl DesignScratch<'_> {
         for (joint, layout) in design.rows.iter().enumerate() {
             let out = &mut out[layout.range.clone()];
             let (inertial, rest) = out.split_at_mut(layout.gather.len());
-            inertial.iter_mut().zip(&layout.gather).for_each(|(value, &place)| *value = self.pairs[place]);
-            rest.iter_mut().zip(&layout.effects).for_each(|(value, &place)| *value = self.columns[place]);
+            let factor = design.logged_factors[joint];
+            let fill = |out: &mut [f64], places: &[usize], columns: &[f64]| {
+                out.iter_mut().zip(places).for_each(|(value, &place)| *value = factor * columns[place]);
+            };
+            fill(inertial, &layout.gather, &self.pairs);
+            fill(rest, &layout.effects, &self.columns);
             if let Some(last) = rest.last_mut() {
                 *last = block.tau.get(row.start + joint).copied().unwrap_or_default();
             }

@@ -126,6 +126,16 @@ pub trait Effect: Send + Sync {
     fn compliance(&self) -> Option<(usize, f64)> {
         None
     }
+    /// The torque that is logged as a multiple of what it is, and the factor: all columns of that torque are
+    /// multiplied by it, so that the model says what the log does.
+    fn logged_factor(&self) -> Option<(usize, f64)> {
+        None
+    }
+    /// The effect with what was fitted as its [`logged_factor`](Self::logged_factor); `None` where it has
+    /// none.
+    fn with_logged_factor(&self, _fitted: &[f64]) -> Option<Box<dyn Effect>> {
+        None
+    }
     /// The effect linearised anew at fitted parameters; `None` where it is linear anyway.
     fn relinearised(&self, _fitted: &[f64]) -> Option<Box<dyn Effect>> {
         None

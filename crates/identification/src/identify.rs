@@ -201,13 +201,26 @@ struct Fitted {
 
 impl Fitted {
     /// Fitted to its own torque, where columns are made of it.
+    ///
+    /// Factors of logged torques are put in force first: taken to first order, a factor of two or more would
+    /// be fitted to a torque that moves away from the model's with each fit.
     fn with_own_torque(
         self,
-        folds: FoldFactors,
+        mut folds: FoldFactors,
         read: impl Fn(&Design) -> Result<FoldFactors, IdentificationError>,
     ) -> Result<(Self, FoldFactors), IdentificationError> {
-        let Fitted { design, fit, train, rivals } = self;
+        let Fitted { mut design, mut fit, train, rivals } = self;
         let again = |design: &Design, folds: &[GroupedFactor]| fit_beside(design, folds, rivals.as_ref());
+        for _ in 0..FACTOR_PASSES {
+            let Some((moved, parameters)) =
+                design.with_factors_in_force(&fit.parameters, LEAST_FACTOR_STEP)?
+            else {
+                break;
+            };
+            design = moved.with_own_reference(&parameters)?;
+            folds = read(&design)?;
+            fit = again(&design, &folds.moving[..train])?;
+        }
         let OwnTorqueFit { design, fit, folds } =
             fit_with_own_torque(design, fit, folds, train, read, again)?;
         Ok((Fitted { design, fit, train, rivals }, folds))
@@ -275,6 +288,11 @@ fn relative_error<'a>(
 /// Passes over the logs that bring the model's torque into the columns that need it; a third changes nothing
 /// that the logs can tell.
 const REFERENCE_PASSES: usize = 2;
+
+/// Times that factors of logged torques are put in force, at most.
+const FACTOR_PASSES: usize = 5;
+/// What is left of a factor is exact enough to first order.
+const LEAST_FACTOR_STEP: f64 = 1e-3;
 
 /// The model that the training folds tell with the columns as they are.
 fn fitted_reference(

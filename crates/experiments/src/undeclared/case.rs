@@ -18,6 +18,8 @@ pub const DURATION: f64 = 20.0;
 pub const STARTS: [f64; 3] = [0.0, 25.0, 50.0];
 /// Smallest and largest size of an effect.
 pub const SIZES: [f64; 2] = [0.05, 0.3];
+/// Factors of a torque in [`Suite::LargeGains`], and as often one over them.
+const LARGE_FACTORS: [f64; 2] = [1.6, 3.0];
 /// How much of an effect the declared model must leave over, in units of the torque noise.
 pub const VISIBLE: f64 = 0.5;
 /// The same for what the tracer must not call explained.
@@ -143,13 +145,19 @@ impl<'a> Case<'a> {
         let wanted = rng.log_uniform(SIZES[0], SIZES[1]);
         let mut secret = Secret { name, joints, form, scale };
         let (tree, ordinary) = (&self.robot.tree, &self.ordinary);
+        let is_large_gain = self.spec.suite == Suite::LargeGains && name == Name::Catalogue(Kind::TorqueGain);
         let size = match secret.form {
+            _ if is_large_gain => {
+                let factor = rng.log_uniform(LARGE_FACTORS[0], LARGE_FACTORS[1]);
+                secret.scale = if rng.chance(0.5) { factor } else { 1.0 / factor } - 1.0;
+                secret.size(tree, ordinary, &self.motions, times)
+            }
             Form::Saturation => {
                 super::saturation::install(&mut secret, wanted, tree, ordinary, &mut self.motions, rng)?
             }
             _ => secret.calibrate(wanted, tree, ordinary, &self.motions, times),
         };
-        if !(0.98 * SIZES[0]..=1.02 * SIZES[1]).contains(&size) {
+        if !is_large_gain && !(0.98 * SIZES[0]..=1.02 * SIZES[1]).contains(&size) {
             return None;
         }
         let noise = &self.sensors.torque_noise;

@@ -12,8 +12,8 @@
 //! from white noise to joints that are mostly noise, filters in drives, late velocities, dead bands, logs
 //! of a few seconds, rough clocks, and held-out motion that is faster than all that was trained on.
 //! `new_kinds` has the kinds that came to the catalogue last, so that the cases of the other suites stay
-//! what they were. A case follows from its seed alone. Seeds for developing the tracer and seeds for
-//! reporting are disjoint.
+//! what they were, and `large_gains` torques that are logged at a third to three times what they are. A case
+//! follows from its seed alone. Seeds for developing the tracer and seeds for reporting are disjoint.
 //!
 //! The tracer is a separate program that sees files only. What is true stays here, or in a `truth.json`
 //! beside the folder that it sees. All forms of effects are written from the literature and not from the
@@ -98,7 +98,7 @@ pub struct Arguments {
     #[arg(long)]
     all: bool,
     /// Suites, separated by commas: one, two, three, control, outside (together: old), wide_right,
-    /// wide_effects, wide_outside (together: wide), new_kinds.
+    /// wide_effects, wide_outside (together: wide), new_kinds, large_gains.
     #[arg(long, value_name = "SUITE", default_value = "old", value_parser = suites)]
     suite: std::sync::Arc<Suites>,
     /// Only cases in this situation (wide suites).
@@ -170,7 +170,8 @@ fn suites(text: &str) -> Result<std::sync::Arc<Suites>, String> {
             name => suites.push(<Suite as clap::ValueEnum>::from_str(name, false).map_err(|_| {
                 format!(
                     "no suite {name:?}; there are old and wide, or single ones of them: one, two, \
-                     three, control, outside, wide_right, wide_effects, wide_outside, new_kinds"
+                     three, control, outside, wide_right, wide_effects, wide_outside, new_kinds, \
+                     large_gains"
                 )
             })?),
         }

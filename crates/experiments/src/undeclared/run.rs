@@ -110,7 +110,8 @@ fn run_one(spec: &Spec, robots: &[Robot], tracer: &Tracer, options: &Options) ->
         | Suite::Three
         | Suite::WideEffects
         | Suite::WideOutside
-        | Suite::NewKinds => tracer
+        | Suite::NewKinds
+        | Suite::LargeGains => tracer
             .remainder(&case.without_secrets(), &temporary.path().join("twin"))
             .inspect_err(|error| eprintln!("{}: no noise floor: {error:#}", spec.seed))
             .ok(),

@@ -29,6 +29,9 @@ pub enum Suite {
     WideOutside,
     /// One of [`Kind::NEW`], which came to the catalogue last, in one case of three beside another effect.
     NewKinds,
+    /// A torque that is logged at 0.3 to 0.6 or 1.6 to 3 times what it is, in one case of three beside another
+    /// effect.
+    LargeGains,
 }
 
 /// Development seeds are for looking at; reporting seeds only for reporting.
@@ -43,7 +46,7 @@ pub enum Seeds {
 
 impl Suite {
     /// All suites.
-    pub const ALL: [Suite; 9] = [
+    pub const ALL: [Suite; 10] = [
         Suite::One,
         Suite::Two,
         Suite::Three,
@@ -53,6 +56,7 @@ impl Suite {
         Suite::WideEffects,
         Suite::WideOutside,
         Suite::NewKinds,
+        Suite::LargeGains,
     ];
     /// One to three effects on an otherwise right model, well excited.
     pub const OLD: [Suite; 5] = [Suite::One, Suite::Two, Suite::Three, Suite::Control, Suite::Outside];
@@ -76,6 +80,7 @@ impl Suite {
             Suite::WideEffects => 300,
             Suite::WideOutside => 120,
             Suite::NewKinds => 120,
+            Suite::LargeGains => 120,
         }
     }
 
@@ -154,11 +159,11 @@ impl Spec {
             Suite::NewKinds => {
                 let turns = Kind::NEW.len();
                 spec.robot = index / turns % robots;
-                let mut kinds = vec![Kind::NEW[index % turns]];
-                if index / turns % 3 == 2 {
-                    spec.join(&mut kinds, 2, rng);
-                }
-                spec.secrets = kinds.into_iter().map(Name::Catalogue).collect();
+                spec.draw_first(Kind::NEW[index % turns], index / turns, rng);
+            }
+            Suite::LargeGains => {
+                // The second effect comes with every third case of each robot.
+                spec.draw_first(Kind::TorqueGain, index / robots, rng);
             }
         }
         Some(spec)
@@ -203,6 +208,15 @@ impl Spec {
             let kind = choices.swap_remove(rng.index(choices.len()));
             self.secrets.push(Name::Catalogue(kind));
         }
+    }
+
+    /// One effect, with another beside it in every third turn.
+    fn draw_first(&mut self, first: Kind, turn: usize, rng: &mut CaseRng) {
+        let mut kinds = vec![first];
+        if turn % 3 == 2 {
+            self.join(&mut kinds, 2, rng);
+        }
+        self.secrets = kinds.into_iter().map(Name::Catalogue).collect();
     }
 
     fn draw_several(&mut self, count: usize, rng: &mut CaseRng) {

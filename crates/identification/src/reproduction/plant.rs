@@ -164,7 +164,8 @@ impl<'a> Plant<'a> {
             effects.add_other(t, [q, v, before], &scratch.rigid, &mut scratch.bias)?;
         }
         for (joint, acceleration) in acceleration.iter_mut().enumerate() {
-            *acceleration = torque[joint] - scratch.bias[joint];
+            let factor = effects.as_ref().map_or(1.0, |effects| effects.design.logged_factors()[joint]);
+            *acceleration = torque[joint] / factor - scratch.bias[joint];
         }
         scratch.factorise()?;
         scratch.solve(acceleration);
@@ -284,8 +285,10 @@ impl Effects<'_> {
     }
 
     fn add(&self, parameters: &[f64], torque: &mut [f64]) {
-        for (torque, layout) in torque.iter_mut().zip(self.design.rows()) {
-            *torque += layout.torque(&self.evaluation, parameters);
+        // What the log says of a torque is not what moves the robot.
+        let rows = self.design.rows().iter().zip(self.design.logged_factors());
+        for (torque, (layout, factor)) in torque.iter_mut().zip(rows) {
+            *torque += layout.torque(&self.evaluation, parameters) / factor;
         }
     }
 }

@@ -150,11 +150,12 @@ impl Search<'_> {
     }
 
     /// What is known to first order only must not be larger than the torque itself: there the first order
-    /// says nothing.
+    /// says nothing. A multiple of the model's torque is exact, however large.
     fn is_small_enough(&self, fit: &Fit, member: &Member) -> bool {
         let hypothesis = &self.problem.hypotheses[member.hypothesis];
         let parameters = &self.problem.variant(*member).parameters;
         !hypothesis.linearised
+            || hypothesis.made_of_model
             || hypothesis.torques.iter().all(|&torque| {
                 let rows = &self.problem.torques[torque];
                 let values: Vec<(usize, f64)> = parameters

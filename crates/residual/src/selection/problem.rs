@@ -24,6 +24,26 @@ impl Torque {
         Torque { parameters, folds, whole, least }
     }
 
+    /// The same with all columns of the model multiplied by a factor.
+    pub fn times(&self, factor: f64) -> Self {
+        Torque {
+            parameters: self.parameters.clone(),
+            folds: self.folds.iter().map(|fold| fold.times(factor)).collect(),
+            whole: self.whole.times(factor),
+            least: self.least,
+        }
+    }
+
+    /// The same as one fold.
+    pub fn without_folds(&self) -> Self {
+        Torque {
+            parameters: self.parameters.clone(),
+            folds: Vec::new(),
+            whole: self.whole.clone(),
+            least: self.least,
+        }
+    }
+
     /// Mean square of a residual as it enters the criterion: what is as good as none is added, so that the
     /// smaller a residual is the less it counts, but is never given away.
     pub fn variance(&self, rss: f64) -> f64 {

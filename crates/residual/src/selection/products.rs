@@ -31,6 +31,14 @@ impl Products {
         Products { size, values, rows: factor.rows() as f64 }
     }
 
+    /// The same with all columns but the right-hand side multiplied by a factor.
+    pub fn times(&self, factor: f64) -> Self {
+        let last = self.size - 1;
+        let of = |column: usize| if column == last { 1.0 } else { factor };
+        let value = |(at, value): (usize, &f64)| of(at / self.size) * of(at % self.size) * value;
+        Products { values: self.values.iter().enumerate().map(value).collect(), ..*self }
+    }
+
     /// Adds the rows of another.
     pub fn add(&mut self, other: &Products) {
         self.values.iter_mut().zip(&other.values).for_each(|(sum, value)| *sum += value);

@@ -1,6 +1,8 @@
 //! Tables of small cases.
 
-use super::{Hypothesis, Member, Policy, Problem, Products, Torque, Variant, certainty, select};
+use super::{
+    Hypothesis, Member, Multiple, Policy, Problem, Products, Torque, Variant, certainty, multiples, select,
+};
 use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_regressor::factor::Factor;
 
@@ -217,4 +219,65 @@ fn a_gain_of_one_torque_is_not_named_as_the_opposite_gain_of_all_others() {
         let start = start.into_iter().map(|hypothesis| Member { hypothesis, variant: 0 }).collect();
         assert_eq!(chosen(&problem, start), [(1, 0)]);
     }
+}
+
+/// Four torques of 400 rows in 10 folds, of the same three parameters but for one of each by itself; torques
+/// are logged as `factors` of what they are.
+fn of_the_same_bodies(seed: u64, factors: [f64; 4]) -> Problem {
+    let mut random = RandomNumbers::new(seed);
+    let mut noise = || (0..4).map(|_| random.uniform(-1.0, 1.0)).sum::<f64>() * 0.866;
+    let mut of_torque = |torque: usize| {
+        let fold = |_| {
+            let mut rows = Vec::new();
+            for _ in 0..40 {
+                let columns = [noise(), noise(), noise(), noise()];
+                let known = 2.0 * columns[0] - 1.5 * columns[1] + columns[2] + 0.7 * columns[3];
+                rows.extend(columns);
+                rows.push(factors[torque] * known + 0.1 * noise());
+            }
+            Products::of_factor(&Factor::of_rows(5, &rows).unwrap())
+        };
+        Torque::new(vec![0, 1, 2, 3 + torque], (0..10).map(fold).collect(), 1e-6)
+    };
+    Problem {
+        parameters: 7,
+        model: (0..7).collect(),
+        absent: vec![0.0; 7],
+        torques: (0..4).map(&mut of_torque).collect(),
+        hypotheses: Vec::new(),
+        prior: None,
+        rows_per_independent: 1.0,
+    }
+}
+
+#[test]
+fn torques_that_are_multiples_of_what_they_are_are_found_and_no_others() {
+    type Case = ([f64; 4], &'static [(usize, f64)]);
+    let table: [Case; 6] = [
+        ([1.0, 1.0, 1.0, 1.0], &[]),
+        // Within one step of nothing: told to first order, like any effect.
+        ([1.0, 1.2, 1.0, 1.0], &[]),
+        ([1.0, 2.0, 1.0, 1.0], &[(1, 2.0)]),
+        ([1.0, 1.0, 1.0, 0.35], &[(3, 0.35)]),
+        ([1.0, 1.5, 0.5, 1.0], &[(1, 1.5), (2, 0.5)]),
+        // Beyond what is looked at: another unit.
+        ([40.0, 1.0, 1.0, 1.0], &[]),
+    ];
+    for (seed, (factors, expected)) in table.into_iter().enumerate() {
+        let problem = of_the_same_bodies(seed as u64 + 1, factors);
+        let mut found = multiples(problem, &[], &[400.0; 4], 0.1, vec![0, 1, 2, 3]);
+        found.sort_by_key(|multiple| multiple.torque);
+        assert_eq!(found.len(), expected.len(), "{factors:?}: {found:?}");
+        for (Multiple { torque, factor }, &(of, true_factor)) in found.iter().zip(expected) {
+            assert_eq!(*torque, of, "{factors:?}");
+            assert!((factor / true_factor - 1.0).abs() < 0.03, "{factors:?}: {factor}");
+        }
+    }
+}
+
+#[test]
+fn a_torque_that_is_not_open_is_given_no_factor() {
+    let problem = of_the_same_bodies(3, [1.0, 2.0, 1.0, 1.0]);
+    let found = multiples(problem, &[], &[400.0; 4], 0.1, vec![0]);
+    assert!(found.iter().all(|multiple| multiple.torque == 0), "{found:?}");
 }

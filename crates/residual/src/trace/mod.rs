@@ -13,6 +13,7 @@ mod harm;
 mod hypotheses;
 mod impossible;
 mod input;
+mod multiples;
 mod naming;
 mod of_training_logs;
 mod probe;

@@ -108,8 +108,22 @@ pub(super) struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The search from where it starts to its end.
-    fn run(mut self) -> Result<Tracing, IdentificationError> {
+    /// The search from where it starts to its end. Where the torques agree better once one of them is a
+    /// multiple of what is logged, it also starts with that in force, and the better end is taken: to first
+    /// order a factor of two is no factor, and other effects would stand for it.
+    fn run(self) -> Result<Tracing, IdentificationError> {
+        let Some(with_multiples) = self.with_multiples()? else { return self.searched()?.finish() };
+        let (plain, with_multiples) = (self.searched()?, with_multiples.searched()?);
+        let rows = plain.chosen.rows.clone();
+        let better = match with_multiples.value(&rows)? < plain.value(&rows)? {
+            true => with_multiples,
+            false => plain,
+        };
+        better.finish()
+    }
+
+    /// The model at the end, with nothing yet left out for what it does on motion that it is not fitted to.
+    fn searched(mut self) -> Result<Self, IdentificationError> {
         // A width that is wrong is a friction that is missing.
         self.refine()?;
         loop {
@@ -122,7 +136,7 @@ impl Search<'_> {
         self.ask_of_logs()?;
         self.take_back()?;
         self.prefer_simpler_forms()?;
-        self.finish()
+        Ok(self)
     }
 
     /// Chooses and refines until nothing changes.
@@ -214,15 +228,15 @@ impl Search<'_> {
             }
             let value = match own {
                 Some(own) => own,
-                None => *own.insert(self.value()?),
+                None => *own.insert(self.value(&self.chosen.rows)?),
             };
             let mut branch = self.clone();
             branch.remove(place)?;
-            if branch.value()? > value + MADE_UP_BY_CONSTANTS {
+            if branch.value(&branch.chosen.rows)? > value + MADE_UP_BY_CONSTANTS {
                 continue;
             }
             branch.refine()?;
-            if branch.value()? <= value {
+            if branch.value(&branch.chosen.rows)? <= value {
                 branch.refuted.push(EffectSpec { constants: Constants::new(), ..self.specs[place].clone() });
                 *self = branch;
                 own = None;
@@ -244,12 +258,12 @@ impl Search<'_> {
                 tried += 1;
                 let own = match own {
                     Some(own) => own,
-                    None => *own.insert(self.value()?),
+                    None => *own.insert(self.value(&self.chosen.rows)?),
                 };
                 let mut branch = self.clone();
                 branch.replace(self.declared + index, spec)?;
                 branch.refine()?;
-                if branch.value()? < own {
+                if branch.value(&branch.chosen.rows)? < own {
                     *self = branch;
                     return Ok(true);
                 }
@@ -258,13 +272,13 @@ impl Search<'_> {
         Ok(false)
     }
 
-    /// The criterion of the model as it is.
-    fn value(&self) -> Result<f64, IdentificationError> {
+    /// The criterion of the model as it is, with these effective rows of each torque.
+    fn value(&self, rows: &[f64]) -> Result<f64, IdentificationError> {
         let mut candidates =
             Candidates::of_model(self.fixed, Present { specs: &self.specs, declared: self.declared });
         let stage = self.pass(Vec::new())?;
         let problem = self.fixed.problem(&stage, &mut candidates)?;
-        Ok(value(&problem, &candidates.present, &self.chosen.rows))
+        Ok(value(&problem, &candidates.present, rows))
     }
 
     /// Puts another effect, with its parameters at nothing, in the place of one.

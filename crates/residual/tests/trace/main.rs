@@ -6,3 +6,4 @@ mod held_model;
 mod missing_effects;
 mod robot;
 mod structure;
+mod torque_factors;
