@@ -29,8 +29,8 @@ pub enum Suite {
     WideOutside,
     /// One of [`Kind::NEW`], which came to the catalogue last, in one case of three beside another effect.
     NewKinds,
-    /// A torque that is logged at 0.3 to 0.6 or 1.6 to 3 times what it is, in one case of three beside another
-    /// effect.
+    /// A torque that is logged at a third to 0.6 or 1.6 to 3 times what it is, in one case of three beside
+    /// another effect.
     LargeGains,
 }
 

@@ -5,8 +5,8 @@ use super::fit::Fit;
 use super::problem::{Member, Problem, Torque};
 use rayon::prelude::*;
 
-/// Factor between two multiples that are looked at first, and how many there are of it upwards and downwards.
-/// What lies beyond is another unit or says nothing of the torque: no factor.
+/// Factor between two multiples that are looked at first, and how many there are of it upwards and
+/// downwards. What lies beyond is another unit or says nothing of the torque: no factor.
 const STEP: f64 = 1.25;
 const STEPS: i32 = 8;
 /// Times that the step is halved about the best multiple.
@@ -26,7 +26,8 @@ pub(crate) struct Multiple {
 /// A torque by itself says nothing of its factor. What tells is that all torques are of the same bodies: a
 /// factor multiplies one triangle, so that no pass over the rows is needed. Factors within one step are left
 /// out, since they are told to first order like any effect; of n torques n − 1 can have one, since the masses
-/// take up what they have in common.
+/// take up what they have in common. Of two, a factor on the one is one over it on the other: the torque of
+/// which a larger share is left then has it, since what the other says of the bodies tells it.
 pub(crate) fn multiples(
     mut problem: Problem,
     members: &[Member],
@@ -38,10 +39,16 @@ pub(crate) fn multiples(
     let mut found: Vec<Multiple> = Vec::new();
     let mut fit = Fit::new(&problem, active.clone(), rows, None);
     let mut left = foretold(&problem, &fit);
-    while found.len() + 1 < problem.torques.len() {
+    let moving = problem.torques.iter().filter(|torque| torque.whole.rows() > 0.0).count();
+    while found.len() + 1 < moving {
         let best = open.par_iter().map(|&torque| best_factor(&problem, torque, &active, rows));
-        let best = best.collect::<Vec<_>>().into_iter().zip(&open).min_by(|a, b| a.0.1.total_cmp(&b.0.1));
-        let Some(((log_factor, _), &torque)) = best else { break };
+        let mut best: Vec<Best> = best.collect();
+        best.sort_by(|a, b| a.value.total_cmp(&b.value));
+        let Some(likeliest) = best.first() else { break };
+        let share_left = |of: usize| likeliest.rss[of] / problem.torques[of].whole.right_hand_side();
+        let told_worst = best.iter().max_by(|a, b| share_left(a.torque).total_cmp(&share_left(b.torque)));
+        let &Best { torque, log_factor, .. } =
+            if moving == 2 { told_worst.unwrap_or(likeliest) } else { likeliest };
         if log_factor.abs() < STEP.ln() || log_factor.abs() >= f64::from(STEPS) * STEP.ln() {
             break;
         }
@@ -62,8 +69,18 @@ pub(crate) fn multiples(
     found
 }
 
-/// The logarithm of the factor of a torque at which the likelihood is largest, and −2·log of that.
-fn best_factor(problem: &Problem, torque: usize, active: &[usize], rows: &[f64]) -> (f64, f64) {
+/// A factor of a torque, and what the fit with it leaves.
+struct Best {
+    torque: usize,
+    log_factor: f64,
+    /// −2·log of the likelihood.
+    value: f64,
+    /// What is left of each torque.
+    rss: Vec<f64>,
+}
+
+/// The factor of a torque at which the likelihood is largest.
+fn best_factor(problem: &Problem, torque: usize, active: &[usize], rows: &[f64]) -> Best {
     let mut torques: Vec<Torque> = problem.torques.iter().map(Torque::without_folds).collect();
     let own = torques[torque].without_folds();
     let mut scaled = Problem {
@@ -80,14 +97,14 @@ fn best_factor(problem: &Problem, torque: usize, active: &[usize], rows: &[f64])
         let fit = Fit::new(&scaled, active.to_vec(), rows, None);
         let value = likelihood(&scaled, &fit.rss, rows);
         torques = std::mem::take(&mut scaled.torques);
-        (log_factor, value)
+        Best { torque, log_factor, value, rss: fit.rss }
     };
     let mut step = STEP.ln();
-    let mut best = (0.0, f64::INFINITY);
-    let mut look = |log_factors: Vec<f64>, best: &mut (f64, f64)| {
+    let mut best = Best { torque, log_factor: 0.0, value: f64::INFINITY, rss: Vec::new() };
+    let mut look = |log_factors: Vec<f64>, best: &mut Best| {
         for log_factor in log_factors {
             let other = value(log_factor);
-            if other.1 < best.1 {
+            if other.value < best.value {
                 *best = other;
             }
         }
@@ -95,7 +112,7 @@ fn best_factor(problem: &Problem, torque: usize, active: &[usize], rows: &[f64])
     look((-STEPS..=STEPS).map(|power| f64::from(power) * step).collect(), &mut best);
     for _ in 0..HALVINGS {
         step *= 0.5;
-        look(vec![best.0 - step, best.0 + step], &mut best);
+        look(vec![best.log_factor - step, best.log_factor + step], &mut best);
     }
     best
 }

@@ -35,12 +35,17 @@ impl Search<'_> {
                     continue;
                 };
                 let effect = kind.build(self.fixed.tree, &site, &constants);
+                // What is any multiple but one has a torque whose multiple it is.
+                let Some((torque, _)) = effect.with_logged_factor(&[1.0]).and_then(|own| own.logged_factor())
+                else {
+                    continue;
+                };
                 let EffectSpec { kind, joints, .. } = effect.spec();
                 let is_it = |spec: &EffectSpec| spec.kind == kind && spec.joints == joints;
                 let may_be = !self.specs.iter().chain(&self.options.excluded).any(is_it);
-                let asked = self.options.torques.as_ref().is_none_or(|torques| torques.contains(&site[0]));
-                if may_be && asked && effect.with_logged_factor(&[0.0]).is_some() {
-                    gains.insert(site[0], effect);
+                let asked = self.options.torques.as_ref().is_none_or(|torques| torques.contains(&torque));
+                if may_be && asked {
+                    gains.insert(torque, effect);
                 }
             }
         }
