@@ -27,7 +27,8 @@ pub(crate) struct Multiple {
 /// factor multiplies one triangle, so that no pass over the rows is needed. Factors within one step are left
 /// out, since they are told to first order like any effect; of n torques n − 1 can have one, since the masses
 /// take up what they have in common. Of two, a factor on the one is one over it on the other: the torque of
-/// which a larger share is left then has it, since what the other says of the bodies tells it.
+/// which a larger share is left with a factor in force has it, since what the other says of the bodies tells
+/// it.
 pub(crate) fn multiples(
     mut problem: Problem,
     members: &[Member],
