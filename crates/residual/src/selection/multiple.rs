@@ -21,14 +21,13 @@ pub(crate) struct Multiple {
 
 /// The torques, of those `open`, whose multiples make all agree better: the best, then the best beside it,
 /// while the likelihood of what the model foretells of other motion than it is fitted to grows, and a torque
-/// loses there `least_share` of the squares that are left of it. `rows` are the effective rows of each torque.
+/// loses there `least_share` of the squares that are left of it. `rows` are the effective rows of each.
 ///
 /// A torque by itself says nothing of its factor. What tells is that all torques are of the same bodies: a
 /// factor multiplies one triangle, so that no pass over the rows is needed. Factors within one step are left
 /// out, since they are told to first order like any effect; of n torques n − 1 can have one, since the masses
-/// take up what they have in common. Of two, a factor on the one is one over it on the other: the torque of
-/// which a larger share is left with a factor in force has it, since what the other says of the bodies tells
-/// it.
+/// take up what they have in common. Of two, a factor on the one is one over it on the other. The torque of
+/// which a larger share is left with a factor in force has it, since the other tells the bodies better.
 pub(crate) fn multiples(
     mut problem: Problem,
     members: &[Member],

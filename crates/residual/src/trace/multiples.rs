@@ -35,7 +35,7 @@ impl Search<'_> {
                     continue;
                 };
                 let effect = kind.build(self.fixed.tree, &site, &constants);
-                // Other effects multiply no torque; with a factor of two in force it is seen which torque it is.
+                // Other effects multiply no torque; a factor of two in force shows which torque it is.
                 let Some((torque, _)) = effect.with_logged_factor(&[1.0]).and_then(|own| own.logged_factor())
                 else {
                     continue;
