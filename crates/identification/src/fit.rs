@@ -6,7 +6,7 @@ use crate::jackknife::Jackknife;
 use crate::{Design, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::Factor;
-use phiw_regressor::least_squares::{GroupedFactor, weighted_least_squares};
+use phiw_regressor::least_squares::{GroupedFactor, WeightedSolution, weighted_least_squares};
 
 /// A fitted design.
 #[derive(Clone, Debug)]
@@ -82,6 +82,13 @@ impl TorqueError {
         let counted = self.rmse.iter().zip(&self.rms_torque).map(|(rmse, torque)| rmse.max(share * torque));
         (squares(&counted.collect::<Vec<f64>>()) / squares(&self.rms_torque)).sqrt()
     }
+
+    /// Where the error of all torques together is larger than they are, those torques whose error is larger
+    /// than themselves: no model at all would be a better one.
+    pub fn torques_worse_than_none(&self) -> impl Iterator<Item = usize> {
+        let is_worse = |&torque: &usize| self.relative > 1.0 && self.rmse[torque] > self.rms_torque[torque];
+        (0..self.rmse.len()).filter(is_worse)
+    }
 }
 
 /// Fits a design to the rows of all `folds`, each torque weighted by its own residual.
@@ -94,10 +101,10 @@ pub fn fit(design: &Design, folds: &[GroupedFactor]) -> Result<Fit, Identificati
     // Columns that are equal in theory differ by the logs' rounding; the difference must not determine
     // parameters.
     let undetermined = undetermined(&all)?;
-    let determined: Vec<usize> =
-        (0..design.parameter_count()).filter(|parameter| !undetermined.contains(parameter)).collect();
+    let (determined, solution) = solve_determined(&all, &undetermined)?;
+    let undetermined: Vec<usize> =
+        (0..design.parameter_count()).filter(|parameter| !determined.contains(parameter)).collect();
     let kept = all.select(&determined)?;
-    let solution = weighted_least_squares(&kept)?;
     let weights: Vec<f64> = solution.group_std.iter().map(|std| 1.0 / std).collect();
     let factor = kept.combine(&weights)?;
     let selected: Vec<GroupedFactor> =
@@ -192,6 +199,26 @@ pub(crate) fn undetermined(all: &GroupedFactor) -> Result<Vec<usize>, RegressorE
         })
         .collect();
     Ok(all.combine(&weights)?.undetermined_columns())
+}
+
+/// A weighted fit of what the rows determine, and the columns that it has: all but those that are known to be
+/// `undetermined`, and those that are once each torque has its weight. What a torque of large noise alone
+/// tells is not told beside one of small noise.
+pub(crate) fn solve_determined(
+    all: &GroupedFactor,
+    undetermined: &[usize],
+) -> Result<(Vec<usize>, WeightedSolution), RegressorError> {
+    let mut determined: Vec<usize> =
+        (0..all.parameter_count()).filter(|parameter| !undetermined.contains(parameter)).collect();
+    loop {
+        match weighted_least_squares(&all.select(&determined)?) {
+            Err(RegressorError::RankDeficient { undetermined, .. }) if !undetermined.is_empty() => {
+                let mut place = 0..;
+                determined.retain(|_| place.next().is_none_or(|place| !undetermined.contains(&place)));
+            }
+            other => return Ok((determined, other?)),
+        }
+    }
 }
 
 /// The solutions that leave out one fold each; `None` where there are too few folds.

@@ -1,15 +1,15 @@
 //! The declared model, identified: constants chosen, parameters fitted, error held out.
 
 use crate::accumulate::{FoldFactors, Rests, accumulate_folds};
-use crate::fit::{Fit, TorqueError, fit, merge, torque_error};
+use crate::fit::{Fit, TorqueError, fit, merge, solve_determined, torque_error, undetermined};
 use crate::own_torque::{OwnTorqueFit, fit_with_own_torque};
 use crate::reference::ReferenceModel;
-use crate::variants::{Choice, Rivals, choose, undetermined_with};
+use crate::variants::{Choice, Rivals, choose};
 use crate::{BlockSource, Design, Effect, Fold, IdentificationError};
 use phiw_dynamics::Tree;
 use phiw_dynamics::check::check_size;
 use phiw_limits::Limits;
-use phiw_regressor::least_squares::{Group, GroupedFactor, weighted_least_squares};
+use phiw_regressor::least_squares::{Group, GroupedFactor};
 use phiw_regressor::{BaseParameters, BaseParametersOptions, RegressorError};
 use std::ops::Range;
 
@@ -302,14 +302,15 @@ fn fitted_reference(
 ) -> Result<ReferenceModel, IdentificationError> {
     let factors = merge(train)?;
     let Choice { chosen, .. } = choose(design, slots, &factors)?;
-    let undetermined = undetermined_with(design, &chosen, &factors)?;
-    let base = design.base();
-    let determined: Vec<usize> = (0..base.count())
+    let columns: Vec<usize> = (0..design.base().count())
         .chain(chosen.iter().flat_map(|&effect| design.effect_parameters(effect)))
-        .filter(|parameter| !undetermined.contains(parameter))
         .collect();
-    let solution = weighted_least_squares(&factors.select(&determined)?)?;
+    let own = factors.select(&columns)?;
+    let (determined, solution) = solve_determined(&own, &undetermined(&own)?)?;
     let mut parameters = vec![0.0; design.parameter_count()];
-    determined.iter().zip(&solution.parameters).for_each(|(&column, value)| parameters[column] = *value);
+    determined
+        .iter()
+        .zip(&solution.parameters)
+        .for_each(|(&place, value)| parameters[columns[place]] = *value);
     Ok(design.reference_of(&parameters, &chosen)?)
 }

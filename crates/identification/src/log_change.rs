@@ -62,7 +62,12 @@ pub fn log_changes(
         let of_all: Vec<f64> = determined.iter().map(|&parameter| common.parameters[parameter]).collect();
         let mut squares = vec![(0.0, 0.0); weights.len()];
         for (fold, others) in own.iter().zip(leave_one_out(&weighted)?) {
-            let alone = others.merge(&all)?.solve()?.parameters;
+            let alone = match others.merge(&all)?.solve() {
+                Ok(solution) => solution.parameters,
+                // Beside what the log tells of other parameters, what all logs tell of one is lost in rounding.
+                Err(RegressorError::RankDeficient { .. }) => of_all.clone(),
+                Err(error) => return Err(error.into()),
+            };
             let left = fold.residual_sums_of_squares(&of_all)?;
             let left_alone = fold.residual_sums_of_squares(&alone)?;
             squares.iter_mut().zip(left.iter().zip(&left_alone)).for_each(|(sums, (all, alone))| {

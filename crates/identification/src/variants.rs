@@ -1,9 +1,10 @@
 //! Which variant of each declared effect the factors choose, and which comes next to it.
 
 use crate::Design;
+use crate::fit::solve_determined;
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, FactorBuilder};
-use phiw_regressor::least_squares::{GroupedFactor, WeightedSolution, weighted_least_squares};
+use phiw_regressor::least_squares::{GroupedFactor, WeightedSolution};
 use std::collections::BTreeSet;
 use std::ops::Range;
 
@@ -39,7 +40,7 @@ pub(crate) fn choose(
     };
     for _ in 0..SWEEPS {
         let before = chosen.clone();
-        let solution = solve_determined(&factors.select(&columns(&chosen, None))?)?;
+        let (_, solution) = solve_determined(&factors.select(&columns(&chosen, None))?, &[])?;
         for (slot, variants) in slots.iter().enumerate() {
             if variants.len() <= 1 {
                 continue;
@@ -119,7 +120,7 @@ impl Rivals {
 }
 
 /// Parameters that the rows do not determine with the `chosen` effects.
-pub(crate) fn undetermined_with(
+fn undetermined_with(
     design: &Design,
     chosen: &[usize],
     factors: &GroupedFactor,
@@ -129,19 +130,6 @@ pub(crate) fn undetermined_with(
         .collect();
     let undetermined = crate::fit::undetermined(&factors.select(&all)?)?;
     Ok(undetermined.into_iter().map(|place| all[place]).collect())
-}
-
-/// A weighted fit of what the rows determine; the rest is zero.
-fn solve_determined(factors: &GroupedFactor) -> Result<WeightedSolution, RegressorError> {
-    match weighted_least_squares(factors) {
-        Err(RegressorError::RankDeficient { undetermined, .. }) => {
-            let kept: Vec<usize> = (0..factors.parameter_count())
-                .filter(|parameter| !undetermined.contains(parameter))
-                .collect();
-            weighted_least_squares(&factors.select(&kept)?)
-        }
-        other => other,
-    }
 }
 
 /// The columns of a fit, and which of them are those of the variant that is on trial.

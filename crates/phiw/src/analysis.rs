@@ -227,7 +227,9 @@ pub enum Rows<'a> {
     },
 }
 
-/// What the sensors' noise alone would leave under the model's inertia \[N·m, N\].
+/// What the sensors' noise alone would leave under the model's inertia \[N·m, N\]; no more than what the model
+/// left of the motion that it was identified from: inertias that few rows tell make any noise of the positions
+/// a large one.
 ///
 /// # Errors
 /// A log cannot be read any more.
@@ -243,8 +245,9 @@ pub fn noise_floor(session: &Session, rows: Rows<'_>, model: &Model) -> Result<V
         }
     }
     let (surveys, conditioning) = (session.logs.surveys(), session.logs.conditioning());
-    Ok(match rows {
+    let floor = match rows {
         Rows::Logs(data) => trace::noise_floor(&tree, &rotor, surveys, conditioning, &data.sources)?,
         Rows::Reduced { poses, .. } => trace::noise_floor_at(&tree, &rotor, surveys, conditioning, poses)?,
-    })
+    };
+    Ok(floor.iter().zip(&model.residual_std).map(|(floor, left)| floor.min(*left)).collect())
 }

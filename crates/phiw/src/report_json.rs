@@ -28,6 +28,7 @@ pub fn report_json(analysis: &Analysis<'_>) -> ReportJson {
         refinements: Vec::new(),
         after: errors,
         remaining: RemainingJson { structured: !above.is_empty(), joints: above, depends_on: Vec::new() },
+        warnings: analysis.warnings.clone(),
         phiw: Some(program(analysis)),
         joints,
     }

@@ -34,7 +34,26 @@ pub fn all(session: &Session, identified: &Identified) -> Vec<String> {
                 .to_owned(),
         );
     }
+    warnings.extend(worse_than_none(session, identified));
     warnings
+}
+
+/// Where the motion held out asks for parameters that the training motion does not tell.
+fn worse_than_none(session: &Session, identified: &Identified) -> Option<String> {
+    let error = &identified.held_out;
+    let ratio = |joint: usize| error.rmse[joint] / error.rms_torque[joint];
+    let joints: Vec<String> = error
+        .torques_worse_than_none()
+        .map(|joint| {
+            format!("{} {} times its torque", session.tree.joint(joint).joint, significant(ratio(joint), 2))
+        })
+        .collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "on the motion held out the model is worse than none (error: {}): that motion asks for parameters that the training motion does not tell; move each joint more often in training, and several together",
+            joints.join(", ")
+        )
+    })
 }
 
 /// The number of angles and axes of a URDF that were made exact, if there were any.

@@ -36,7 +36,8 @@ fn check(train: &str, validate: &str, warnings: &[&str]) {
     assert_eq!(output.status.code(), Some(0), "{stderr}");
     let report = ReportJson::from_json(&std::fs::read_to_string(path("out/report.json")).unwrap()).unwrap();
     let page = std::fs::read_to_string(path("out/report.html")).unwrap();
-    let told = report.phiw.unwrap().warnings;
+    assert_eq!(report.warnings, report.phiw.unwrap().warnings);
+    let told = report.warnings;
     assert_eq!(told.len(), warnings.len(), "{told:?}");
     for warning in warnings {
         assert!(stderr.contains(warning), "no `{warning}` in {stderr}");

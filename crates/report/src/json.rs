@@ -32,12 +32,16 @@ pub struct ReportJson {
     /// The effects in the order in which they were added.
     pub effects: Vec<EffectJson>,
     /// Effects that are certain, but only polish the form of those before; `after` counts them.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default)]
     pub refinements: Vec<EffectJson>,
     /// The errors once all effects are in.
     pub after: TorqueErrors,
     /// What is left.
     pub remaining: RemainingJson,
+    /// Everything that a reader should know before trusting a number: the sentences of the terminal and the
+    /// page.
+    #[serde(default)]
+    pub warnings: Vec<String>,
     /// What only this program writes; a reader may ignore it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub phiw: Option<ProgramJson>,
@@ -158,7 +162,7 @@ pub struct RemainingJson {
 pub struct ProgramJson {
     /// Version of the program that wrote the file.
     pub version: String,
-    /// Everything that a reader should know before trusting a number.
+    /// The report's `warnings` again, where they were before it had them.
     #[serde(default)]
     pub warnings: Vec<String>,
     /// How the logs were conditioned: cut-off, decimation, segments, samples skipped.

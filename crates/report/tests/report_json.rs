@@ -21,8 +21,10 @@ const EXAMPLE: &str = r#"{
      "confidence": 0.98,
      "rivals": [{"kind": "stribeck_friction", "joints": ["joint_1"], "confidence": 0.02}]}
   ],
+  "refinements": [],
   "after": {"train": {}, "validate": {}},
-  "remaining": {"structured": false, "joints": [], "depends_on": []}
+  "remaining": {"structured": false, "joints": [], "depends_on": []},
+  "warnings": []
 }"#;
 
 fn example() -> ReportJson {

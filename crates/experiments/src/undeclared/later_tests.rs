@@ -53,6 +53,24 @@ fn strokes_have_a_constant_speed_most_of_their_time() {
 }
 
 #[test]
+fn in_turn_one_joint_moves_at_a_time() {
+    check(Situation::InTurn, |case, log| {
+        let stamps = column(log, "t");
+        let motion = &case.motions[0];
+        let moves: Vec<Vec<bool>> = (0..case.robot.joints())
+            .map(|joint| stamps.iter().map(|t| motion.state(joint, *t)[1].abs() > 1e-9).collect())
+            .collect();
+        for row in 0..stamps.len() {
+            assert!(moves.iter().filter(|of_joint| of_joint[row]).count() < 2, "{}", stamps[row]);
+        }
+        for of_joint in &moves {
+            let begins = of_joint.windows(2).filter(|pair| !pair[0] && pair[1]).count();
+            assert!((2..=4).contains(&begins), "{begins}");
+        }
+    });
+}
+
+#[test]
 fn a_held_torque_changes_every_so_many_samples() {
     check(Situation::HeldTorque, |case, log| {
         let held = case.sensors.logging.as_ref().expect("a wide case").held_samples;

@@ -61,11 +61,13 @@ pub enum Situation {
     /// The zeros of some torques are others in each log: sensors that are zeroed anew, or drift overnight.
     /// What they have in common is an offset, so that is no false name.
     ShiftingZeros,
+    /// Joints move one after the other, each two to four times in a log, while all others rest.
+    InTurn,
 }
 
 impl Situation {
     /// All situations.
-    pub const ALL: [Situation; 24] = [
+    pub const ALL: [Situation; 25] = [
         Situation::White,
         Situation::ShortColour,
         Situation::Colour,
@@ -90,11 +92,12 @@ impl Situation {
         Situation::NoisyPositions,
         Situation::SmoothedTorque,
         Situation::ShiftingZeros,
+        Situation::InTurn,
     ];
     /// Those of the first cases of each suite: so many there were when these were drawn first.
     pub const FIRST: usize = Situation::BLOCKS[0].1;
     /// Situations that came together: the index of their first case, and how many they are.
-    const BLOCKS: [(usize, usize); 4] = [(0, 15), (50_000, 7), (60_000, 1), (70_000, 1)];
+    const BLOCKS: [(usize, usize); 5] = [(0, 15), (50_000, 7), (60_000, 1), (70_000, 1), (80_000, 1)];
 
     /// The situation of the case of this index: those of its block in turn.
     pub fn of_index(index: usize) -> Self {

@@ -13,6 +13,8 @@ const FASTEST: f64 = 3.0;
 const SHORT_RESTS: [f64; 2] = [0.1, 0.7];
 /// The same where joints rest for long.
 const LONG_RESTS: [f64; 2] = [0.8, 3.0];
+/// No move with its rest takes longer \[s\].
+const LONGEST_MOVE: f64 = 12.0;
 
 /// Shortest and longest ramp of a stroke, as a share of its time. With 0.3 its constant speed is three
 /// quarters of the highest of a minimum-jerk move that takes as long; longer ramps would need more.
@@ -135,6 +137,28 @@ impl Trajectory {
             }
         }
         motion
+    }
+
+    /// Moves of one joint after the other in the robot's order, so many of each, while all others rest; as
+    /// long as that takes.
+    pub fn in_turn(tree: &Tree, rng: &mut CaseRng, start: f64, moves: usize, reach: Option<Reach>) -> Self {
+        let plenty = LONGEST_MOVE * moves as f64;
+        let mut joints: Vec<JointMotion> = Self::moves(tree, rng, start, plenty, reach, SHORT_RESTS).joints;
+        let mut clock = 0.3;
+        for number in 0..moves {
+            for joint in &mut joints {
+                let JointMotion::PointToPoint { moves, .. } = joint else { continue };
+                let Some([begin, end, ..]) = moves.get_mut(number) else { continue };
+                (*begin, *end) = (clock, clock + (*end - *begin));
+                clock = *end + rng.uniform(SHORT_RESTS[0], SHORT_RESTS[1]);
+            }
+        }
+        for joint in &mut joints {
+            if let JointMotion::PointToPoint { moves: all, .. } = joint {
+                all.truncate(moves);
+            }
+        }
+        Trajectory { start, duration: clock + 0.3, joints, excess: None }
     }
 
     /// Strokes of constant speed from pose to pose, all joints together, with short rests.

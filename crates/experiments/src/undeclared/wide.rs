@@ -35,6 +35,8 @@ const FASTER: [f64; 2] = [3.0, 5.0];
 
 /// Shortest and longest of short logs \[s\].
 const SHORT: [f64; 2] = [4.0, 8.0];
+/// Moves of each joint in a log, fewest and most, where joints move in turn.
+const MOVES_IN_TURN: [usize; 2] = [2, 4];
 
 /// One attempt at the case of a spec. `None` if its stranger can't be seen.
 pub fn draw<'a>(spec: &Spec, situation: Situation, robot: &'a Robot, attempt: u64) -> Option<Case<'a>> {
@@ -154,6 +156,16 @@ fn motions(
         Situation::Strokes => {
             let draw = |start| tamed(robot, Trajectory::strokes(tree, rng, start, DURATION, reach), reach);
             STARTS.into_iter().map(draw).collect()
+        }
+        Situation::InTurn => {
+            let moves = MOVES_IN_TURN[0] + rng.index(MOVES_IN_TURN[1] - MOVES_IN_TURN[0] + 1);
+            let mut start = 0.0;
+            let draw = |_| {
+                let motion = tamed(robot, Trajectory::in_turn(tree, rng, start, moves, reach), reach);
+                start += motion.duration + 5.0;
+                motion
+            };
+            STARTS.iter().map(draw).collect()
         }
         Situation::ShortLogs => {
             let duration = rng.uniform(SHORT[0], SHORT[1]);

@@ -7,6 +7,8 @@ use rayon::prelude::*;
 
 /// Folds below which nothing can be said of the residual's correlation.
 const LEAST_FOLDS: usize = 4;
+/// Effective rows of a torque that has as many, at least: a tenth of a second of each of twenty folds.
+const LEAST_ROWS: f64 = 20.0;
 /// Squared share of a column that must be left beside the model for it to be asked.
 const DETERMINED: f64 = 1e-3;
 
@@ -19,8 +21,7 @@ pub(super) fn effective_rows(problem: &Problem, fit: &Fit) -> Vec<f64> {
     let of_torque = |torque: usize| {
         let rows = problem.torques[torque].whole.rows();
         let effect = design_effect(problem, fit, torque).max(problem.rows_per_independent).max(1.0);
-        // Each fold says something by itself.
-        (rows / effect).max(problem.torques[torque].folds.len().min(rows as usize) as f64).max(2.0)
+        (rows / effect).max(rows.min(LEAST_ROWS)).max(2.0)
     };
     (0..problem.torques.len()).into_par_iter().map(of_torque).collect()
 }

@@ -15,6 +15,7 @@ mod criterion;
 mod cross_validation;
 mod design_effect;
 mod distribution;
+mod families;
 mod fit;
 mod moves;
 mod multiple;
@@ -30,6 +31,7 @@ mod tests;
 
 pub(crate) use cross_validation::{Foretelling, Parts};
 pub(crate) use distribution::students_tail;
+pub(crate) use families::Families;
 pub(crate) use fit::Fit;
 pub(crate) use multiple::{Multiple, multiples};
 pub(crate) use problem::{Hypothesis, Member, Prior, Problem, Torque, Variant};

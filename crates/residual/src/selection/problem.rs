@@ -132,6 +132,17 @@ impl Problem {
         &self.hypotheses[member.hypothesis].variants[member.variant]
     }
 
+    /// For each parameter whether it is in every model, or a declared hypothesis's.
+    pub fn given(&self) -> Vec<bool> {
+        let mut given = vec![false; self.parameters];
+        self.model.iter().for_each(|&parameter| given[parameter] = true);
+        for hypothesis in self.hypotheses.iter().filter(|hypothesis| hypothesis.declared) {
+            let parameters = hypothesis.variants.iter().flat_map(|variant| &variant.parameters);
+            parameters.for_each(|&parameter| given[parameter] = true);
+        }
+        given
+    }
+
     /// The parameters of a model: those that are always in it, then its members'.
     pub fn active(&self, members: &[Member]) -> Vec<usize> {
         let of_members = members.iter().flat_map(|&member| self.variant(member).parameters.iter().copied());

@@ -8,6 +8,7 @@
 
 mod constants;
 mod floor;
+mod folds;
 mod general_forms;
 mod harm;
 mod hypotheses;
@@ -24,6 +25,7 @@ mod scanned;
 mod search;
 mod signal_shapes;
 mod stage;
+mod textbook;
 mod thresholds;
 mod tracing;
 mod trial;

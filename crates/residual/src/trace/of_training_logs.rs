@@ -1,7 +1,8 @@
 //! What training logs have of their own, and the robot has not: sought last, beside all that the robot could
 //! have.
 
-use super::search::{Search, split};
+use super::folds::{split, split_by_motion};
+use super::search::Search;
 use crate::selection::certainty;
 use phiw_effects::EffectKind;
 use phiw_identification::IdentificationError;
@@ -16,7 +17,7 @@ impl Search<'_> {
         if self.input.ranges.logs < 2 {
             return Ok(());
         }
-        let folds = split(&self.fixed.data.train, PARTS_OF_LOG);
+        let folds = split_by_motion(self.fixed, split(&self.fixed.data.train, PARTS_OF_LOG))?;
         let mut asked = Search { asks_of_logs: true, folds, ..self.clone() };
         asked.choose()?;
         if asked.has_something_of_training_logs() {

@@ -1,6 +1,7 @@
 //! What a residual follows, without a name: shapes over each signal, fitted on some folds, judged on the
 //! others.
 
+use super::folds::split_by_motion;
 use super::signal_shapes::{SWINGS, Shape, neighbours, other_shapes, own_shapes};
 use super::stage::{Fixed, Stage};
 use crate::selection::students_tail;
@@ -35,8 +36,11 @@ const PARTS: usize = 5;
 /// A shape's height is drawn to nothing as if this share of all rows had said so: where few rows are, it does
 /// not swing out.
 const DRAWN: f64 = 0.01;
-/// The same for the model's parameters: enough for those that the rows do not determine.
+/// The same for a parameter of the model that no rows determine.
 const DRAWN_MODEL: f64 = 1e-6;
+/// Share of all rows that say what the model's parameters are, where folds are left out: a joint that moves in
+/// few of them moves in none of the others, and what these make of its parameters would hide all shapes.
+const KNOWN: f64 = 0.01;
 
 /// A fitted model whose residual is looked at.
 #[derive(Clone, Copy)]
@@ -106,6 +110,7 @@ fn probes(
     }
     let Fit { fixed, specs, parameters, .. } = fit;
     let folds = [fixed.data.train.as_slice(), &fixed.data.held_out].concat();
+    let folds = split_by_motion(fixed, folds)?;
     let stage = fixed.pass(specs, effects, fixed.reference(specs, parameters)?, &folds)?;
     // A held model's parameters do not give way.
     let free = if fixed.prior.is_some() { 0 } else { stage.model_size() };
@@ -126,6 +131,8 @@ fn probes(
             let logarithms = |squares: &[f64]| -> Vec<f64> {
                 squares.iter().map(|square| square.max(f64::MIN_POSITIVE).ln()).collect()
             };
+            let moving = alone.iter().zip(&after).filter(|(square, _)| **square > 0.0);
+            let (alone, after): (Vec<f64>, Vec<f64>) = moving.unzip();
             let t = paired_t(&logarithms(&alone), &logarithms(&after));
             let tail = students_tail(t, (alone.len() as f64 - 1.0).max(1.0));
             let least = if signal == SWINGS { LEAST_SHARE_OF_SWINGS } else { LEAST_SHARE };
@@ -160,10 +167,12 @@ impl<'a> Residual<'a> {
         let folds: Result<Vec<Factor>, RegressorError> =
             self.folds.iter().map(|fold| self.reduced(fold, added)).collect();
         let folds = folds?;
+        let known = without_shapes(&Factor::merge_all(folds.iter())?, added.len())?;
         let mut left = vec![0.0; folds.len()];
         for part in 0..PARTS {
             let others = folds.iter().enumerate().filter(|(place, _)| place % PARTS != part);
-            let fitted = drawn_to_nothing(&Factor::merge_all(others.map(|(_, fold)| fold))?, added.len())?;
+            let others = Factor::merge_all(others.map(|(_, fold)| fold))?;
+            let fitted = drawn_to_nothing(&others, &known, added.len())?;
             for (place, fold) in folds.iter().enumerate().filter(|(place, _)| place % PARTS == part) {
                 left[place] = fold.residual_sum_of_squares(&fitted)?;
             }
@@ -191,8 +200,18 @@ impl<'a> Residual<'a> {
     }
 }
 
-/// Least squares with every column drawn to nothing, the last `added` more than those before.
-fn drawn_to_nothing(factor: &Factor, added: usize) -> Result<Vec<f64>, RegressorError> {
+/// The columns of the model alone, and nothing to be explained by them.
+fn without_shapes(factor: &Factor, added: usize) -> Result<Factor, RegressorError> {
+    let count = factor.parameters() - added;
+    let map = faer::Mat::from_fn(factor.columns(), count + 1, |column, target| {
+        f64::from(u8::from(column == target && target < count))
+    });
+    factor.combine(map.as_ref())
+}
+
+/// Least squares with every column drawn to nothing: the last `added` by themselves, those of the model by
+/// what all rows know of them.
+fn drawn_to_nothing(factor: &Factor, known: &Factor, added: usize) -> Result<Vec<f64>, RegressorError> {
     let count = factor.parameters();
     if count == 0 {
         return Ok(Vec::new());
@@ -200,13 +219,18 @@ fn drawn_to_nothing(factor: &Factor, added: usize) -> Result<Vec<f64>, Regressor
     let mut builder = FactorBuilder::new(count + 1);
     let every: Vec<usize> = (0..=count).collect();
     builder.push_factor(factor, &every, 1.0)?;
-    let norms: Vec<f64> = (0..count).map(|column| factor.column_norm(column)).collect();
-    let largest = norms[count - added..].iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let of_model: Vec<usize> = (0..count - added).chain([count]).collect();
+    builder.push_factor(known, &of_model, KNOWN.sqrt())?;
+    let both = builder.factor();
+    let norms: Vec<f64> = (0..count).map(|column| both.column_norm(column)).collect();
+    let largest = norms[count - added..].iter().copied().fold(0.0, f64::max);
     for column in 0..count {
         let weight = match column < count - added {
-            true => DRAWN_MODEL.sqrt() * norms[column].max(f64::MIN_POSITIVE.sqrt()),
+            true => DRAWN_MODEL.sqrt() * norms[column],
             false => DRAWN.sqrt() * largest,
         };
+        // Without rows any weight makes a parameter nothing.
+        let weight = if weight > 0.0 { weight } else { 1.0 };
         let mut row = vec![0.0; count + 1];
         row[column] = weight;
         builder.push_row(&row)?;

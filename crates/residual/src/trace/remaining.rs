@@ -16,19 +16,27 @@ impl Search<'_> {
     /// Which residuals have structure, and what they follow.
     ///
     /// Structure is what motion foretells on data that were not fitted; what wanders, with a correlation over
-    /// seconds that no sensor's noise has; what hangs together on one joint and not on others; and what a
-    /// training log by itself tells otherwise (`changes`). A residual that is larger than noise and none of
+    /// seconds that no sensor's noise has; what hangs together on one joint and not on others; what a training
+    /// log by itself tells otherwise (`changes`); and an error on motion held out that no model at all would
+    /// not have. A residual that is larger than noise and none of
     /// these is a slow disturbance that follows nothing measured; it accuses nobody.
     pub(super) fn remaining(
         &self,
         held_out: &[GroupedFactor],
-        error: &TorqueError,
+        (training, error): (&TorqueError, &TorqueError),
         fit: &Fit,
         changes: &[LogChange],
     ) -> Result<Remaining, IdentificationError> {
         let expected = self.expected_squares(held_out, fit)?;
+        // What is left of the motion that was fitted to is no error of the parameters.
+        let is_large = |row: usize| {
+            let of_torque = training.rms_torque[row].powi(2);
+            self.is_large(row, error.rmse[row], expected[row])
+                || self.is_large(row, training.rmse[row], Expected { torque: of_torque, of_parameters: 0.0 })
+        };
+        let worse_than_none: Vec<usize> = error.torques_worse_than_none().collect();
         let large: Vec<usize> =
-            (0..error.rmse.len()).filter(|&row| self.is_large(row, error.rmse[row], expected[row])).collect();
+            (0..error.rmse.len()).filter(|&row| is_large(row) || worse_than_none.contains(&row)).collect();
         let mut remaining =
             Remaining { unidentifiable: self.chosen.unidentifiable.clone(), ..Remaining::default() };
         if large.is_empty() {
@@ -61,8 +69,13 @@ impl Search<'_> {
         };
         let wanders = |row: usize| shape.wander[row] > self.options.thresholds.wander;
         let differs = |row: usize| changes.iter().any(|change| change.row == row);
-        let is_structured =
-            |row: &usize| following.contains(row) || wanders(*row) || stands_out(*row) || differs(*row);
+        let is_structured = |row: &usize| {
+            following.contains(row)
+                || wanders(*row)
+                || stands_out(*row)
+                || differs(*row)
+                || worse_than_none.contains(row)
+        };
         let (structured, colour): (Vec<usize>, Vec<usize>) = large.into_iter().partition(is_structured);
         let name = |row: usize| self.fixed.tree.joint(row).joint.clone();
         let disturbance = |&row: &usize| Disturbance {

@@ -1,5 +1,6 @@
 //! The loop: choose, refine, make again, until nothing changes.
 
+use super::folds::{split, split_by_motion};
 use super::hypotheses::{Candidates, Present};
 use super::input::{TraceInput, TraceOptions};
 use super::residuals::ranges_of_residual;
@@ -13,10 +14,6 @@ use phiw_identification::{Data, Design, Effect, EffectSpec, Fold, Identification
 /// Times that all is chosen anew: columns that are made of the model's torque need a second, what they bring
 /// about a third.
 const ROUNDS: usize = 4;
-/// Stretches that the training motion is cut into: enough for a tail probability of one in ten thousand.
-const FOLDS: usize = 20;
-/// Shortest stretch \[s\]: a residual's correlation must be short against it.
-const LEAST_FOLD_S: f64 = 0.5;
 /// Effects that are put into force to see what they explain, at most.
 const CONTESTS: usize = 4;
 /// What the criterion may lose with an effect that leaves, if the constants of the others can make up for it.
@@ -44,7 +41,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         declared: input.declared.len(),
         declared_stays: fixed.prior.is_some(),
         withdrawn: Vec::new(),
-        folds: split(&data.train, 1),
+        folds: split_by_motion(&fixed, split(&data.train, 1))?,
         chosen: Chosen::default(),
         asks_of_logs: false,
         refuted: Vec::new(),
@@ -67,6 +64,8 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
 pub(super) struct Chosen {
     /// Effective rows of each torque.
     pub rows: Vec<f64>,
+    /// Rows of each torque over its effective ones.
+    pub rows_per_effective: Vec<f64>,
     /// Number of hypotheses that there were.
     pub hypotheses: usize,
     /// For each effect that was found, what could stand in its place, and by how much the criterion is larger
@@ -211,6 +210,12 @@ impl Search<'_> {
                 .map(|&unidentifiable| candidates.list[unidentifiable].specs[0].clone())
                 .collect(),
             hypotheses: problem.hypotheses.iter().filter(|hypothesis| !hypothesis.declared).count(),
+            rows_per_effective: problem
+                .torques
+                .iter()
+                .zip(&outcome.rows)
+                .map(|(torque, effective)| (torque.whole.rows() / effective).max(1.0))
+                .collect(),
             rows: outcome.rows,
         };
         self.take(&problem, &candidates, &outcome.members, &outcome.fit.values);
@@ -309,21 +314,4 @@ impl Search<'_> {
         let ranges = self.input.ranges.clone();
         ranges_of_residual(&self.design()?, &self.parameters, self.fixed.data, ranges)
     }
-}
-
-/// Long stretches cut into equal parts, `least_parts` or more each, so that there are enough of them.
-pub(super) fn split(folds: &[Fold], least_parts: usize) -> Vec<Fold> {
-    let parts = FOLDS.div_ceil(folds.len().max(1)).max(least_parts);
-    let cut = |fold: &Fold| {
-        let length = fold.end - fold.start;
-        let parts = parts.min((length / LEAST_FOLD_S) as usize).max(1);
-        let edge = |part: usize| match part == parts {
-            true => fold.end,
-            false => fold.start + length * part as f64 / parts as f64,
-        };
-        (0..parts)
-            .map(|part| Fold { log: fold.log, start: edge(part), end: edge(part + 1) })
-            .collect::<Vec<Fold>>()
-    };
-    folds.iter().flat_map(cut).collect()
 }

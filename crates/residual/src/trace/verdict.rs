@@ -39,7 +39,7 @@ impl Search<'_> {
 
     /// The error of all torques together, over them, where one that is as good as none counts as the largest
     /// such: a joint of large torques would hide by its noise what is won on all others.
-    fn counted(&self, error: &TorqueError) -> f64 {
+    pub(super) fn counted(&self, error: &TorqueError) -> f64 {
         error.relative_from(self.options.thresholds.negligible_share)
     }
 
@@ -98,7 +98,7 @@ impl Search<'_> {
         harm: Harm,
     ) -> Result<Tracing, IdentificationError> {
         let (mut effects, named) = self.name(harm)?;
-        let refinements = effects.split_off(named);
+        let mut refinements = effects.split_off(named);
         let as_declared = effects.is_empty() && refinements.is_empty() && self.withdrawn.is_empty();
         if as_declared && self.is_worse_than(&before.1)? {
             self.specs.clone_from(&self.input.declared);
@@ -109,27 +109,9 @@ impl Search<'_> {
             self.final_fit(effects.is_empty() && refinements.is_empty())?;
         let mut train_folds = folds.moving;
         let held_out_folds = train_folds.split_off(data.train.len());
-        let after = errors(&train_folds, &held_out_folds, &final_fit.parameters)?;
+        let (train, held_out) = errors(&train_folds, &held_out_folds, &final_fit.parameters)?;
         self.parameters.clone_from(&final_fit.parameters);
-        let changes = match self.fixed.prior {
-            Some(_) => Vec::new(),
-            None => log_changes(&final_fit, &data.train, &train_folds)?,
-        };
-        let remaining = self.remaining(&held_out_folds, &after.1, &final_fit, &changes)?;
-        let verdict = match (effects.is_empty(), remaining.joints.is_empty()) {
-            (true, true) => Verdict::Sufficient,
-            (true, false) => Verdict::Unexplained,
-            (false, true) => Verdict::Explained,
-            (false, false) => Verdict::PartlyExplained,
-        };
-        let mut model = Identified {
-            design,
-            fit: final_fit,
-            train: after.0,
-            held_out: after.1,
-            train_folds,
-            held_out_folds,
-        };
+        let mut model = Identified { design, fit: final_fit, train, held_out, train_folds, held_out_folds };
         let mut constants = Vec::new();
         if self.fixed.prior.is_none() {
             constants = scanned_constants(self.fixed.catalogue, &mut model, data)?;
@@ -145,6 +127,24 @@ impl Search<'_> {
                 return self.finish_with(before, harm);
             }
         }
+        if let Some(with) = self.with_textbook(&model)? {
+            model = with.model;
+            self.specs.extend(with.specs);
+            self.parameters.clone_from(&model.fit.parameters);
+            refinements.extend(with.found);
+        }
+        let changes = match self.fixed.prior {
+            Some(_) => Vec::new(),
+            None => log_changes(&model.fit, &data.train, &model.train_folds)?,
+        };
+        let remaining =
+            self.remaining(&model.held_out_folds, (&model.train, &model.held_out), &model.fit, &changes)?;
+        let verdict = match (effects.is_empty(), remaining.joints.is_empty()) {
+            (true, true) => Verdict::Sufficient,
+            (true, false) => Verdict::Unexplained,
+            (false, true) => Verdict::Explained,
+            (false, false) => Verdict::PartlyExplained,
+        };
         let not_judged = self.fixed.not_judged.lock().map(|hypotheses| hypotheses.iter().cloned().collect());
         let not_judged = not_judged.unwrap_or_default();
         Ok(Tracing {
@@ -236,7 +236,7 @@ impl Search<'_> {
     }
 }
 
-fn errors(
+pub(super) fn errors(
     train: &[GroupedFactor],
     held_out: &[GroupedFactor],
     parameters: &[f64],
