@@ -2,6 +2,7 @@
 
 use crate::checks::InputError;
 use crate::covariance::{Covariance, CovarianceSource};
+use crate::drawn::drawn_to_nothing;
 use crate::jackknife::Jackknife;
 use crate::{Design, IdentificationError};
 use phiw_regressor::RegressorError;
@@ -27,6 +28,9 @@ pub struct Fit {
     /// a prediction lacks on motion that the model was not fitted to. Where there are too few folds it is
     /// `residual_std`.
     pub left_out_std: Vec<f64>,
+    /// Whether the logs tell parameters so poorly that all are drawn to nothing: a stretch left out was
+    /// foretold worse than by no model at all. `factor` then has that prior.
+    pub is_drawn: bool,
     /// The weighted factor of \[Φ f\] that gave the parameters, over `determined()` parameters.
     pub factor: Factor,
     /// Covariance of the `determined()` parameters; its diagonal holds the squares of
@@ -104,12 +108,22 @@ pub fn fit(design: &Design, folds: &[GroupedFactor]) -> Result<Fit, Identificati
     let (determined, solution) = solve_determined(&all, &undetermined)?;
     let undetermined: Vec<usize> =
         (0..design.parameter_count()).filter(|parameter| !determined.contains(parameter)).collect();
-    let kept = all.select(&determined)?;
-    let weights: Vec<f64> = solution.group_std.iter().map(|std| 1.0 / std).collect();
-    let factor = kept.combine(&weights)?;
-    let selected: Vec<GroupedFactor> =
+    let own: Vec<GroupedFactor> =
         folds.iter().map(|fold| fold.select(&determined)).collect::<Result<_, _>>()?;
-    let jackknife = Jackknife::of(&selected, &weights)?;
+    let weights = weights_of(&solution);
+    let jackknife = Jackknife::of(&own, &weights)?;
+    let base = determined.partition_point(|&parameter| parameter < design.base().count());
+    let drawn = drawn_to_nothing(&own, base, &weights, jackknife.as_ref())?;
+    let is_drawn = drawn.is_some();
+    let (solution, factor, jackknife) = match drawn {
+        None => (solution, merge(&own)?.combine(&weights)?, jackknife),
+        Some(drawn) => {
+            let all = merge(&drawn)?;
+            let solution = weighted_least_squares(&all)?;
+            let weights = weights_of(&solution);
+            (solution, all.combine(&weights)?, Jackknife::of(&drawn, &weights)?)
+        }
+    };
     let unit = factor.unit_covariance()?;
     let least_squares = |row: usize, column: usize| unit[(row, column)];
     let mut parameters = vec![0.0; design.parameter_count()];
@@ -123,10 +137,11 @@ pub fn fit(design: &Design, folds: &[GroupedFactor]) -> Result<Fit, Identificati
         parameters,
         undetermined,
         left_out_std: match &jackknife {
-            Some(jackknife) => jackknife.left_out_std(&selected)?,
+            Some(jackknife) => jackknife.left_out_std(&own)?,
             None => solution.group_std.clone(),
         },
         residual_std: solution.group_std,
+        is_drawn,
         factor,
         covariance: Covariance::of_entries(CovarianceSource::LeastSquares, &determined, least_squares),
     };
@@ -134,6 +149,10 @@ pub fn fit(design: &Design, folds: &[GroupedFactor]) -> Result<Fit, Identificati
         fit.take_deviations(&determined, &jackknife.deviations(), None);
     }
     Ok(fit)
+}
+
+fn weights_of(solution: &WeightedSolution) -> Vec<f64> {
+    solution.group_std.iter().map(|std| 1.0 / std).collect()
 }
 
 /// The rows of all folds.

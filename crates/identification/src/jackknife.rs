@@ -4,9 +4,6 @@ use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, leave_one_out};
 use phiw_regressor::least_squares::GroupedFactor;
 
-/// Fewer folds say nothing of a spread.
-const LEAST_FOLDS: usize = 4;
-
 /// The solutions of all folds but one.
 pub(crate) struct Jackknife {
     /// A solution for each fold that is left out.
@@ -14,13 +11,16 @@ pub(crate) struct Jackknife {
 }
 
 impl Jackknife {
+    /// Fewer folds say nothing of a spread.
+    pub(crate) const LEAST_FOLDS: usize = 4;
+
     /// Leaves out one fold after the other; `None` where there are too few, or where a fold alone tells some
     /// parameter.
     ///
     /// # Errors
     /// The folds are of different designs.
     pub(crate) fn of(folds: &[GroupedFactor], weights: &[f64]) -> Result<Option<Self>, RegressorError> {
-        if folds.len() < LEAST_FOLDS {
+        if folds.len() < Self::LEAST_FOLDS {
             return Ok(None);
         }
         let weighted: Result<Vec<Factor>, RegressorError> =
@@ -60,18 +60,27 @@ impl Jackknife {
         self.solutions.iter().map(deviation).collect()
     }
 
+    /// For each torque what is left of it on folds that are left out \[N²·m², N²\].
+    ///
+    /// # Errors
+    /// The folds are of another design.
+    pub(crate) fn left_out_squares(&self, folds: &[GroupedFactor]) -> Result<Vec<f64>, RegressorError> {
+        let mut squares = vec![0.0; folds.first().map_or(0, |fold| fold.groups().len())];
+        for (fold, solution) in folds.iter().zip(&self.solutions) {
+            let own = fold.residual_sums_of_squares(solution)?;
+            squares.iter_mut().zip(own).for_each(|(sum, square)| *sum += square);
+        }
+        Ok(squares)
+    }
+
     /// For each torque the RMS of its error on folds that are left out, less the part that the parameters'
     /// uncertainty has in it \[N·m, N\].
     ///
     /// # Errors
     /// The folds are of another design.
     pub(crate) fn left_out_std(&self, folds: &[GroupedFactor]) -> Result<Vec<f64>, RegressorError> {
-        let torques = folds.first().map_or(0, |fold| fold.groups().len());
-        let mut squares = vec![0.0; torques];
-        for (fold, solution) in folds.iter().zip(&self.solutions) {
-            let own = fold.residual_sums_of_squares(solution)?;
-            squares.iter_mut().zip(own).for_each(|(sum, square)| *sum += square);
-        }
+        let squares = self.left_out_squares(folds)?;
+        let torques = squares.len();
         let count = folds.len() as f64;
         let deviations = self.deviations();
         let of_torque = |torque: usize| {

@@ -12,6 +12,7 @@ pub mod model;
 mod accumulate;
 mod conventions;
 mod covariance;
+mod drawn;
 mod effect_selector;
 mod error;
 mod factor_rows;

@@ -34,6 +34,12 @@ pub fn all(session: &Session, identified: &Identified) -> Vec<String> {
                 .to_owned(),
         );
     }
+    if identified.fit.is_drawn {
+        warnings.push(
+            "the training motion tells some parameters too poorly: left out, a stretch of it was foretold worse than by no model at all, and all parameters are drawn to nothing, as much as foretells such stretches best; move several joints together in training, or record more motion"
+                .to_owned(),
+        );
+    }
     warnings.extend(worse_than_none(session, identified));
     warnings
 }
