@@ -13,6 +13,9 @@ use phiw_identification::effect::Sample;
 pub struct ThermalDrift;
 
 const TIME_CONSTANT: &str = "time_constant";
+/// Shortest time constant that a refinement leads to \[s\]: what is over sooner is how a log begins, and no
+/// warming.
+const SHORTEST_S: f64 = 1.0;
 /// Temperatures enter over this span \[K\], so that the parameters are torques at a change that is usual.
 const TEMPERATURE_SPAN: f64 = 10.0;
 const ROOM_TEMPERATURE: f64 = 20.0;
@@ -30,7 +33,9 @@ impl EffectKind for ThermalDrift {
         variants
     }
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
-        around(found, TIME_CONSTANT, step)
+        let mut near = around(found, TIME_CONSTANT, step);
+        near.retain(|constants| constant(constants, TIME_CONSTANT, SHORTEST_S) >= SHORTEST_S);
+        near
     }
     fn telling_motion(&self) -> &'static str {
         "the same motion cold and warm"
@@ -80,6 +85,16 @@ mod tests {
     use crate::fitted::FittedEffect;
     use crate::kind::EffectKind;
     use phiw_identification::EffectSpec;
+
+    /// A drift over 0.27 s was refined from one over 1.25 s: the first moments of a log of ten seconds.
+    #[test]
+    fn a_drift_is_not_refined_to_the_first_moments_of_a_log() {
+        let found = EffectSpec::new("thermal_drift", &["elbow"]).with("time_constant", 1.25).constants;
+        for step in 0..6 {
+            let near = ThermalDrift.refine(&found, step);
+            assert!(!near.is_empty() && near.iter().all(|near| near["time_constant"] >= 1.0), "{near:?}");
+        }
+    }
 
     /// "Falls as it warms up" was said of friction that is less when cold.
     #[test]

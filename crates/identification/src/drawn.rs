@@ -3,9 +3,9 @@
 //! Least squares gives a direction of the parameters that the training motion hardly moves whatever value
 //! fits its noise best. On motion that does move it the torque is then wrong by any factor. Joints that move
 //! one after the other make such logs, and short ones. A prior that no parameter alone makes much more torque
-//! than there is (ridge regression; Hoerl & Kennard 1970) keeps those directions small and leaves what is told
-//! as it is. How strong it is, stretches of the training motion say that are left out (Golub, Heath & Wahba
-//! 1979).
+//! than there is (ridge regression; Hoerl & Kennard 1970) keeps those directions small and leaves what is
+//! told as it is. How strong it is, stretches of the training motion say that are left out (Golub, Heath &
+//! Wahba 1979).
 
 use crate::fit::merge;
 use crate::jackknife::Jackknife;
@@ -14,13 +14,13 @@ use phiw_regressor::factor::FactorBuilder;
 use phiw_regressor::least_squares::{Group, GroupedFactor};
 
 /// Deviations of a parameter about nothing that are tried, in units of the value at which its column alone
-/// would be as large (RMS) as a torque. Rows count as independent; small ones stand for rows of which many are
-/// worth one.
+/// would be as large (RMS) as a torque. Rows count as independent; small ones stand for rows of which many
+/// are worth one.
 const DEVIATIONS: [f64; 6] = [10.0, 3.0, 1.0, 0.3, 0.1, 0.03];
 
-/// By how many times a torque must be foretold worse from the other stretches (RMS) than it is described where
-/// all are fitted: else the model lacks something, and not the motion. Twice is what `log_change.rs` takes for
-/// a difference that no noise makes.
+/// By how many times a torque must be foretold worse from the other stretches (RMS) than it is described
+/// where all are fitted: else the model lacks something, and not the motion. Twice is what `log_change.rs`
+/// takes for a difference that no noise makes.
 const LEAST_RATIO: f64 = 2.0;
 
 /// The folds with a prior that draws all parameters to nothing, each with its share of it; the first `base`

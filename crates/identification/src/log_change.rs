@@ -64,7 +64,8 @@ pub fn log_changes(
         for (fold, others) in own.iter().zip(leave_one_out(&weighted)?) {
             let alone = match others.merge(&all)?.solve() {
                 Ok(solution) => solution.parameters,
-                // Beside what the log tells of other parameters, what all logs tell of one is lost in rounding.
+                // Beside what the log tells of other parameters, what all logs tell of one is lost in
+                // rounding.
                 Err(RegressorError::RankDeficient { .. }) => of_all.clone(),
                 Err(error) => return Err(error.into()),
             };

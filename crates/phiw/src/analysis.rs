@@ -227,9 +227,9 @@ pub enum Rows<'a> {
     },
 }
 
-/// What the sensors' noise alone would leave under the model's inertia \[N·m, N\]; no more than what the model
-/// left of the motion that it was identified from: inertias that few rows tell make any noise of the positions
-/// a large one.
+/// What the sensors' noise alone would leave under the model's inertia \[N·m, N\]; no more than the margin of
+/// noise above what the model left of the motion that it was identified from: inertias that few rows tell
+/// make any noise of the positions a large one.
 ///
 /// # Errors
 /// A log cannot be read any more.
@@ -249,5 +249,5 @@ pub fn noise_floor(session: &Session, rows: Rows<'_>, model: &Model) -> Result<V
         Rows::Logs(data) => trace::noise_floor(&tree, &rotor, surveys, conditioning, &data.sources)?,
         Rows::Reduced { poses, .. } => trace::noise_floor_at(&tree, &rotor, surveys, conditioning, poses)?,
     };
-    Ok(floor.iter().zip(&model.residual_std).map(|(floor, left)| floor.min(*left)).collect())
+    Ok(floor.iter().zip(&model.residual_std).map(|(floor, left)| floor.min(NOISE_MARGIN * left)).collect())
 }

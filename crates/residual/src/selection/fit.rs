@@ -115,9 +115,9 @@ impl Fit {
 
     /// The same parameters fitted with the same weights to the rows of all folds but some.
     ///
-    /// What is in the model in any case, the rigid body and what is declared, is known beside these rows as if
-    /// a small share of all rows had said what it is: a joint that moves in few stretches moves in none of the
-    /// others, and what these make of its body would hide what is to be judged.
+    /// What is in the model in any case, the rigid body and what is declared, is known beside these rows as
+    /// if a small share of all rows had said what it is: a joint that moves in few stretches moves in none of
+    /// the others, and what these make of its body would hide what is to be judged.
     pub fn without(&self, problem: &Problem, folds: &[usize]) -> Self {
         let mut fit = self.clone();
         fit.determined.fill(true);

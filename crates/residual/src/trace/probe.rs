@@ -38,8 +38,8 @@ const PARTS: usize = 5;
 const DRAWN: f64 = 0.01;
 /// The same for a parameter of the model that no rows determine.
 const DRAWN_MODEL: f64 = 1e-6;
-/// Share of all rows that say what the model's parameters are, where folds are left out: a joint that moves in
-/// few of them moves in none of the others, and what these make of its parameters would hide all shapes.
+/// Share of all rows that say what the model's parameters are, where folds are left out: a joint that moves
+/// in few of them moves in none of the others, and what these make of its parameters would hide all shapes.
 const KNOWN: f64 = 0.01;
 
 /// A fitted model whose residual is looked at.

@@ -16,10 +16,10 @@ impl Search<'_> {
     /// Which residuals have structure, and what they follow.
     ///
     /// Structure is what motion foretells on data that were not fitted; what wanders, with a correlation over
-    /// seconds that no sensor's noise has; what hangs together on one joint and not on others; what a training
-    /// log by itself tells otherwise (`changes`); and an error on motion held out that no model at all would
-    /// not have. A residual that is larger than noise and none of
-    /// these is a slow disturbance that follows nothing measured; it accuses nobody.
+    /// seconds that no sensor's noise has; what hangs together on one joint and not on others; what a
+    /// training log by itself tells otherwise (`changes`); and an error on motion held out that no model at
+    /// all would not have. A residual that is larger than noise and none of these is a slow disturbance that
+    /// follows nothing measured; it accuses nobody.
     pub(super) fn remaining(
         &self,
         held_out: &[GroupedFactor],
