@@ -237,6 +237,22 @@ impl Design {
         Ok(ReferenceModel::new(tree).with_shared_effects(effects.iter().map(with_values).collect()))
     }
 
+    /// The parameters that are factors of logged torques ([`Effect::with_logged_factor`]), ascending.
+    pub(crate) fn logged_factor_parameters(&self) -> Vec<usize> {
+        let of_effect = |(index, effect): (usize, &Arc<dyn Effect>)| {
+            let own = self.effect_parameters(index);
+            let is_factor = effect.with_logged_factor(&vec![0.0; own.len()]).is_some();
+            if is_factor { own } else { 0..0 }
+        };
+        self.effects.iter().enumerate().flat_map(of_effect).collect()
+    }
+
+    /// The factor that is in force of the torque that this parameter is a factor of; 1 where none is.
+    pub(crate) fn factor_in_force(&self, parameter: usize) -> f64 {
+        let own = (0..self.effects.len()).find(|&index| self.effect_parameters(index).contains(&parameter));
+        own.and_then(|index| self.effects[index].logged_factor()).map_or(1.0, |(_, factor)| factor)
+    }
+
     /// The same with the factors of logged torques that `parameters` say in force
     /// ([`Effect::logged_factor`]), and the parameters that are left; `None` where no effect has one that is
     /// `least` away from what is in force.

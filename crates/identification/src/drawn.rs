@@ -10,7 +10,6 @@
 use crate::fit::merge;
 use crate::jackknife::Jackknife;
 use phiw_regressor::RegressorError;
-use phiw_regressor::factor::FactorBuilder;
 use phiw_regressor::least_squares::{Group, GroupedFactor};
 
 /// Deviations of a parameter about nothing that are tried, in units of the value at which its column alone
@@ -62,10 +61,12 @@ pub(crate) fn drawn_to_nothing(
     let mut best = None;
     for deviation in DEVIATIONS {
         let share = (1.0 / folds.len() as f64).sqrt() / deviation;
-        let drawn: Vec<GroupedFactor> = folds
-            .iter()
-            .map(|fold| with_prior(fold, &scales, share, weights))
-            .collect::<Result<_, RegressorError>>()?;
+        let weight = |torque: usize, parameter: usize| {
+            let (_, scale) = scales[parameter].filter(|(own, _)| *own == torque)?;
+            Some(share / (weights[torque] * scale))
+        };
+        let drawn: Vec<GroupedFactor> =
+            folds.iter().map(|fold| fold.drawn_to_nothing(weight)).collect::<Result<_, RegressorError>>()?;
         let Some(jackknife) = Jackknife::of(&drawn, weights)? else { continue };
         let error = error_of(&jackknife.left_out_squares(folds)?);
         if error < least {
@@ -93,32 +94,6 @@ fn scale(all: &GroupedFactor, base: usize, parameter: usize) -> Option<(usize, f
         (norm > 0.0 && torque > 0.0).then(|| (place, torque / norm))
     };
     all.groups().iter().enumerate().filter_map(of_group).min_by(|a, b| a.1.total_cmp(&b.1))
-}
-
-/// A fold with a row for each parameter that says that it is nothing. These are no rows of a torque, and are
-/// not counted.
-fn with_prior(
-    fold: &GroupedFactor,
-    scales: &[Option<(usize, f64)>],
-    share: f64,
-    weights: &[f64],
-) -> Result<GroupedFactor, RegressorError> {
-    let mut groups = Vec::with_capacity(fold.groups().len());
-    for (place, group) in fold.groups().iter().enumerate() {
-        let size = group.parameters.len() + 1;
-        let mut builder = FactorBuilder::new(size);
-        builder.push_factor(&group.factor, &(0..size).collect::<Vec<usize>>(), 1.0)?;
-        for (column, &parameter) in group.parameters.iter().enumerate() {
-            if let Some((_, scale)) = scales[parameter].filter(|(own, _)| *own == place) {
-                let mut row = vec![0.0; size];
-                row[column] = share / (weights[place] * scale);
-                builder.push_row(&row)?;
-            }
-        }
-        let factor = builder.factor().standing_for(group.factor.rows());
-        groups.push(Group { parameters: group.parameters.clone(), factor });
-    }
-    GroupedFactor::new(fold.parameter_count(), groups)
 }
 
 #[cfg(test)]

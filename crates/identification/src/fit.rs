@@ -4,6 +4,7 @@ use crate::checks::InputError;
 use crate::covariance::{Covariance, CovarianceSource};
 use crate::drawn::drawn_to_nothing;
 use crate::jackknife::Jackknife;
+use crate::logged_factors::{FIRST_ORDER, LEAST_STEP};
 use crate::{Design, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::Factor;
@@ -39,6 +40,19 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// Of these parameters the one whose value is smallest against its standard deviation, if its 95 % interval
+    /// holds nothing.
+    fn least_certain(&self, parameters: &[usize]) -> Option<usize> {
+        let holds_nothing = |&&parameter: &&usize| {
+            let [low, high] = self.intervals_95[parameter];
+            low <= 0.0 && high >= 0.0
+        };
+        let certainty =
+            |parameter: &usize| (self.parameters[*parameter] / self.standard_deviations[*parameter]).abs();
+        let uncertain = parameters.iter().filter(holds_nothing);
+        uncertain.min_by(|a, b| certainty(a).total_cmp(&certainty(b))).copied()
+    }
+
     /// Parameters that the logs determine, ascending.
     pub fn determined(&self) -> Vec<usize> {
         (0..self.parameters.len()).filter(|parameter| !self.undetermined.contains(parameter)).collect()
@@ -100,11 +114,46 @@ impl TorqueError {
 /// # Errors
 /// There are fewer rows than parameters.
 pub fn fit(design: &Design, folds: &[GroupedFactor]) -> Result<Fit, IdentificationError> {
+    fit_with_factors(design, folds, FIRST_ORDER)
+}
+
+/// The same where what is fitted of factors of torques is kept up to `largest`.
+///
+/// A factor is fitted to first order, about one or about what is in force: where the logs do not tell whether
+/// it is another, what they make of it is a large number that foretells nothing. Such factors leave the fit, the
+/// largest or the least certain first.
+pub(crate) fn fit_with_factors(
+    design: &Design,
+    folds: &[GroupedFactor],
+    largest: f64,
+) -> Result<Fit, IdentificationError> {
+    let factors = design.logged_factor_parameters();
+    let mut untold = Vec::new();
+    loop {
+        let fit = fit_without(design, folds, &untold)?;
+        let value = |factor: &usize| fit.parameters[*factor].abs();
+        let too_large = factors.iter().copied().filter(|factor| value(factor) > largest);
+        let too_large = too_large.max_by(|a, b| value(a).total_cmp(&value(b)));
+        let is_open = |factor: &usize| design.factor_in_force(*factor) == 1.0 || value(factor) > LEAST_STEP;
+        let open: Vec<usize> = factors.iter().copied().filter(is_open).collect();
+        match too_large.or_else(|| fit.least_certain(&open)) {
+            Some(parameter) => untold.push(parameter),
+            None => return Ok(fit),
+        }
+    }
+}
+
+/// The fit with `untold` parameters left out.
+fn fit_without(
+    design: &Design,
+    folds: &[GroupedFactor],
+    untold: &[usize],
+) -> Result<Fit, IdentificationError> {
     let all = merge(folds)?;
     check_length(design, &all)?;
     // Columns that are equal in theory differ by the logs' rounding; the difference must not determine
     // parameters.
-    let undetermined = undetermined(&all)?;
+    let undetermined = [undetermined(&all)?.as_slice(), untold].concat();
     let (determined, solution) = solve_determined(&all, &undetermined)?;
     let undetermined: Vec<usize> =
         (0..design.parameter_count()).filter(|parameter| !determined.contains(parameter)).collect();

@@ -1,7 +1,8 @@
 //! The declared model, identified: constants chosen, parameters fitted, error held out.
 
 use crate::accumulate::{FoldFactors, Rests, accumulate_folds};
-use crate::fit::{Fit, TorqueError, fit, merge, solve_determined, torque_error, undetermined};
+use crate::fit::{Fit, TorqueError, fit_with_factors, merge, solve_determined, torque_error, undetermined};
+use crate::logged_factors::{FIRST_ORDER, in_force};
 use crate::own_torque::{OwnTorqueFit, fit_with_own_torque};
 use crate::reference::ReferenceModel;
 use crate::variants::{Choice, Rivals, choose};
@@ -171,19 +172,21 @@ impl Declared {
         let kept: Vec<usize> = (0..design.base().count()).chain(effects).collect();
         let folds = folds.select(&kept)?;
         let design = design.keep(&chosen);
-        let fit = fit_beside(&design, &folds.moving[..train], with_rivals.as_ref())?;
+        let fit = fit_beside(&design, &folds.moving[..train], with_rivals.as_ref(), f64::INFINITY)?;
         let design = design.with_own_reference(&fit.parameters)?;
         Ok((Fitted { design, fit, train, rivals: with_rivals }, folds))
     }
 }
 
-/// A fit whose deviations count what the choice among `rivals` leaves open.
+/// A fit whose deviations count what the choice among `rivals` leaves open; factors of torques up to
+/// `largest_factor`.
 fn fit_beside(
     design: &Design,
     folds: &[GroupedFactor],
     rivals: Option<&Rivals>,
+    largest_factor: f64,
 ) -> Result<Fit, IdentificationError> {
-    let mut fit = fit(design, folds)?;
+    let mut fit = fit_with_factors(design, folds, largest_factor)?;
     if let Some(Rivals { folds, stands_for }) = rivals {
         crate::rivals::widen(&mut fit, folds, stands_for)?;
     }
@@ -206,19 +209,17 @@ impl Fitted {
     /// be fitted to a torque that moves away from the model's with each fit.
     fn with_own_torque(
         self,
-        mut folds: FoldFactors,
+        folds: FoldFactors,
         read: impl Fn(&Design) -> Result<FoldFactors, IdentificationError>,
     ) -> Result<(Self, FoldFactors), IdentificationError> {
-        let Fitted { mut design, mut fit, train, rivals } = self;
-        let again = |design: &Design, folds: &[GroupedFactor]| fit_beside(design, folds, rivals.as_ref());
-        for _ in 0..FACTOR_PASSES {
-            let Some((moved, parameters)) =
-                design.with_factors_in_force(&fit.parameters, LEAST_FACTOR_STEP)?
-            else {
-                break;
-            };
-            design = moved.with_own_reference(&parameters)?;
-            folds = read(&design)?;
+        let Fitted { design, fit, train, rivals } = self;
+        let with_factors = |design: &Design, folds: &[GroupedFactor], largest: f64| {
+            fit_beside(design, folds, rivals.as_ref(), largest)
+        };
+        let any = |design: &Design, folds: &[GroupedFactor]| with_factors(design, folds, f64::INFINITY);
+        let again = |design: &Design, folds: &[GroupedFactor]| with_factors(design, folds, FIRST_ORDER);
+        let (design, mut fit, folds) = in_force(design, fit, folds, train, &read, any)?;
+        if !design.logged_factor_parameters().is_empty() {
             fit = again(&design, &folds.moving[..train])?;
         }
         let OwnTorqueFit { design, fit, folds } =
@@ -288,11 +289,6 @@ fn relative_error<'a>(
 /// Passes over the logs that bring the model's torque into the columns that need it; a third changes nothing
 /// that the logs can tell.
 const REFERENCE_PASSES: usize = 2;
-
-/// Times that factors of logged torques are put in force, at most.
-const FACTOR_PASSES: usize = 5;
-/// What is left of a factor is exact enough to first order.
-const LEAST_FACTOR_STEP: f64 = 1e-3;
 
 /// The model that the training folds tell with the columns as they are.
 fn fitted_reference(

@@ -28,6 +28,7 @@ mod known_payload;
 mod log_change;
 mod log_file;
 mod log_set;
+mod logged_factors;
 mod mirrored;
 mod model_sources;
 mod own_torque;

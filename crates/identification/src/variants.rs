@@ -105,8 +105,12 @@ impl Rivals {
         for (&effect, rival) in chosen.iter().zip(rivals) {
             let own = design.effect_parameters(effect);
             if let Some(rival) = rival {
-                behind.extend(design.effect_parameters(*rival));
-                stands_for.extend(columns.len()..columns.len() + own.len());
+                // A wave with more harmonics has more columns than its rival, or fewer.
+                let both = design.effect_parameters(*rival).zip(columns.len()..columns.len() + own.len());
+                both.for_each(|(column, own)| {
+                    behind.push(column);
+                    stands_for.push(own);
+                });
             }
             columns.extend(own);
         }

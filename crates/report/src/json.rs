@@ -31,7 +31,8 @@ pub struct ReportJson {
     pub before: TorqueErrors,
     /// The effects in the order in which they were added.
     pub effects: Vec<EffectJson>,
-    /// Effects that are certain, but only polish the form of those before; `after` counts them.
+    /// Effects that only polish the form of those before, or are small and told for all joints together;
+    /// `after` counts them.
     #[serde(default)]
     pub refinements: Vec<EffectJson>,
     /// The errors once all effects are in.

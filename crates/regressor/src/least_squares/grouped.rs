@@ -111,6 +111,34 @@ impl GroupedFactor {
         Self::new(kept.len(), groups?)
     }
 
+    /// The same with a prior: in group k a row of `weight(k, parameter)` times each of its parameters, which
+    /// says that it is nothing, where there is a weight. These are no rows of the torque, and are not counted.
+    ///
+    /// # Errors
+    /// A weight is not finite.
+    pub fn drawn_to_nothing(
+        &self,
+        weight: impl Fn(usize, usize) -> Option<f64>,
+    ) -> Result<Self, RegressorError> {
+        let with_prior = |(place, group): (usize, &Group)| {
+            let size = group.parameters.len() + 1;
+            let mut builder = FactorBuilder::new(size);
+            builder.push_factor(&group.factor, &(0..size).collect::<Vec<usize>>(), 1.0)?;
+            for (column, &parameter) in group.parameters.iter().enumerate() {
+                if let Some(weight) = weight(place, parameter) {
+                    let mut row = vec![0.0; size];
+                    row[column] = weight;
+                    builder.push_row(&row)?;
+                }
+            }
+            let factor = builder.factor().standing_for(group.factor.rows());
+            Ok(Group { parameters: group.parameters.clone(), factor })
+        };
+        let groups: Result<Vec<Group>, RegressorError> =
+            self.groups.iter().enumerate().map(with_prior).collect();
+        Self::new(self.parameter_count, groups?)
+    }
+
     /// The rows of both.
     ///
     /// # Errors
@@ -128,5 +156,23 @@ impl GroupedFactor {
             })
             .collect();
         Self::new(self.parameter_count, groups?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_prior_draws_where_it_has_a_weight_and_adds_no_row() {
+        // f = 3·x over four rows of one, of two torques with a parameter each.
+        let factor = Factor::of_rows(2, &[1.0, 3.0].repeat(4)).unwrap();
+        let groups = (0..2).map(|own| Group { parameters: vec![own], factor: factor.clone() });
+        let plain = GroupedFactor::new(2, groups.collect()).unwrap();
+        let drawn = plain.drawn_to_nothing(|torque, _| (torque == 1).then_some(2.0)).unwrap();
+        assert_eq!(drawn.rows(), plain.rows());
+        let found = drawn.combine(&[1.0, 1.0]).unwrap().solve().unwrap().parameters;
+        // Ridge regression in closed form: Σxf / (Σx² + 2²).
+        assert!((found[0] - 3.0).abs() < 1e-12 && (found[1] - 12.0 / 8.0).abs() < 1e-12, "{found:?}");
     }
 }

@@ -14,7 +14,7 @@ use phiw_identification::fitting::{
 };
 use phiw_identification::{Design, EffectSpec, Fold, IdentificationError, Identified};
 use phiw_regressor::RegressorError;
-use phiw_regressor::factor::{Factor, FactorBuilder};
+use phiw_regressor::factor::Factor;
 use phiw_regressor::least_squares::{Group, GroupedFactor};
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -39,11 +39,10 @@ impl Search<'_> {
         if self.fixed.prior.is_some() || self.chosen.rows_per_effective.is_empty() {
             return Ok(None);
         }
-        let mut specs = self.textbook_of_other_joints()?;
-        let mut deviations = self.deviations(model, &specs)?;
-        let mut told = deviations.clone().into_iter().map(|deviation| deviation > 0.0);
-        specs.retain(|_| told.next().unwrap_or_default());
-        deviations.retain(|deviation| *deviation > 0.0);
+        let open = self.textbook_of_other_joints()?;
+        let deviations = self.deviations(model, &open)?;
+        let told = open.into_iter().zip(deviations).filter(|(_, deviation)| *deviation > 0.0);
+        let (specs, deviations): (Vec<EffectSpec>, Vec<f64>) = told.unzip();
         if specs.is_empty() {
             return Ok(None);
         }
@@ -151,18 +150,17 @@ impl Search<'_> {
         let stretches = [self.whole.train.as_slice(), &self.whole.held_out].concat();
         let read =
             |design: &Design| accumulate_folds(design, &stretches, &self.whole.sources, Rests::Dropped);
-        // A fit counts rows as they are: what was known before counts as many times more.
-        let weight = |parameter: usize, row: usize| {
-            model.fit.residual_std[row] * self.chosen.rows_per_effective[row].sqrt()
-                / deviations[parameter - first]
-        };
         let fit_drawn = |design: &Design, folds: &[GroupedFactor]| {
-            // Each fold has its share, so that whichever is left out the rest knows the same.
+            // Each fold has its share, so that whichever is left out the rest knows the same. A fit counts
+            // rows as they are: what was known before counts as many times more.
             let share = (1.0 / folds.len().max(1) as f64).sqrt();
-            let drawn: Result<Vec<GroupedFactor>, RegressorError> = folds
-                .iter()
-                .map(|fold| drawn_to_nothing(fold, first, &|parameter, row| share * weight(parameter, row)))
-                .collect();
+            let weight = |torque: usize, parameter: usize| {
+                let deviation = deviations.get(parameter.checked_sub(first)?)?;
+                let noise = model.fit.residual_std[torque] * self.chosen.rows_per_effective[torque].sqrt();
+                Some(share * noise / deviation)
+            };
+            let drawn: Result<Vec<GroupedFactor>, RegressorError> =
+                folds.iter().map(|fold| fold.drawn_to_nothing(weight)).collect();
             fit(design, &drawn?)
         };
         let (design, folds) = self.read_with(model, &specs, &stretches)?;
@@ -248,27 +246,4 @@ fn beside(factor: &Factor, last: &[f64]) -> Vec<f64> {
         values[row] = (factor.entry(row, count) - after) / factor.entry(row, row);
     }
     values
-}
-
-/// A fold with a row of this weight for each parameter from `first` on that says that it is nothing; these
-/// are no rows of the torque, and are not counted.
-fn drawn_to_nothing(
-    fold: &GroupedFactor,
-    first: usize,
-    weight: &dyn Fn(usize, usize) -> f64,
-) -> Result<GroupedFactor, RegressorError> {
-    let mut groups = Vec::with_capacity(fold.groups().len());
-    for (row, group) in fold.groups().iter().enumerate() {
-        let size = group.parameters.len() + 1;
-        let mut builder = FactorBuilder::new(size);
-        builder.push_factor(&group.factor, &(0..size).collect::<Vec<usize>>(), 1.0)?;
-        for (column, &parameter) in group.parameters.iter().enumerate().filter(|(_, own)| **own >= first) {
-            let mut pull = vec![0.0; size];
-            pull[column] = weight(parameter, row);
-            builder.push_row(&pull)?;
-        }
-        let factor = builder.factor().standing_for(group.factor.rows());
-        groups.push(Group { parameters: group.parameters.clone(), factor });
-    }
-    GroupedFactor::new(fold.parameter_count(), groups)
 }
