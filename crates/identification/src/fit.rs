@@ -40,8 +40,8 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Of these parameters the one whose value is smallest against its standard deviation, if its 95 % interval
-    /// holds nothing.
+    /// Of these parameters the one whose value is smallest against its standard deviation, if its 95 %
+    /// interval holds nothing.
     fn least_certain(&self, parameters: &[usize]) -> Option<usize> {
         let holds_nothing = |&&parameter: &&usize| {
             let [low, high] = self.intervals_95[parameter];
@@ -120,8 +120,8 @@ pub fn fit(design: &Design, folds: &[GroupedFactor]) -> Result<Fit, Identificati
 /// The same where what is fitted of factors of torques is kept up to `largest`.
 ///
 /// A factor is fitted to first order, about one or about what is in force: where the logs do not tell whether
-/// it is another, what they make of it is a large number that foretells nothing. Such factors leave the fit, the
-/// largest or the least certain first.
+/// it is another, what they make of it is a large number that foretells nothing. Such factors leave the fit,
+/// the largest or the least certain first.
 pub(crate) fn fit_with_factors(
     design: &Design,
     folds: &[GroupedFactor],

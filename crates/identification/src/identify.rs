@@ -98,7 +98,7 @@ fn identify_rows(
             folds = accumulate_folds(&declared.design, &all_folds, sources, rests)?;
         }
     }
-    let (fitted, folds) = declared.fitted(folds, train.len())?;
+    let (fitted, folds) = declared.fitted(folds, train.len(), f64::INFINITY)?;
     // The error is that of the model as it is used: with its own torque in the columns that need one.
     fitted.with_own_torque(folds, |design| accumulate_folds(design, &all_folds, sources, rests))
 }
@@ -157,13 +157,19 @@ impl Declared {
     ) -> Result<(Identified, WithRests), IdentificationError> {
         check_size("folds at rest", folds.at_rest.len(), folds.moving.len())?;
         check_size("training folds", train.min(folds.moving.len()), train)?;
-        let (fitted, folds) = self.fitted(folds, train)?;
+        let (fitted, folds) = self.fitted(folds, train, FIRST_ORDER)?;
         let with_rests = fitted.with_rests(&folds)?;
         Ok((fitted.identified(folds.moving)?, with_rests))
     }
 
-    /// The variants chosen and fitted, and the folds' factors with their columns alone.
-    fn fitted(self, folds: FoldFactors, train: usize) -> Result<(Fitted, FoldFactors), IdentificationError> {
+    /// The variants chosen and fitted, with factors of torques up to `largest_factor`, and the folds' factors
+    /// with their columns alone.
+    fn fitted(
+        self,
+        folds: FoldFactors,
+        train: usize,
+        largest_factor: f64,
+    ) -> Result<(Fitted, FoldFactors), IdentificationError> {
         let Declared { design, slots } = self;
         let training = &folds.moving[..train];
         let Choice { chosen, rivals } = choose(&design, &slots, &merge(training)?)?;
@@ -172,7 +178,7 @@ impl Declared {
         let kept: Vec<usize> = (0..design.base().count()).chain(effects).collect();
         let folds = folds.select(&kept)?;
         let design = design.keep(&chosen);
-        let fit = fit_beside(&design, &folds.moving[..train], with_rivals.as_ref(), f64::INFINITY)?;
+        let fit = fit_beside(&design, &folds.moving[..train], with_rivals.as_ref(), largest_factor)?;
         let design = design.with_own_reference(&fit.parameters)?;
         Ok((Fitted { design, fit, train, rivals: with_rivals }, folds))
     }

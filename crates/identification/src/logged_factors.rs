@@ -1,9 +1,9 @@
 //! Factors of logged torques, put in force.
 //!
-//! A gain is fitted as a multiple of the torque of an earlier fit. Where it is far from one, or where the logs
-//! hardly tell it, the step that this fit asks for may lead away: the torque of a last joint that mostly rubs
-//! fits any factor nearly alike. So a step is taken if the factor is certain to be another, before it and after,
-//! and if the torques are explained better with it in force; otherwise a shorter one.
+//! A gain is fitted as a multiple of the torque of an earlier fit. Where it is far from one, or where the
+//! logs hardly tell it, the step that this fit asks for may lead away: the torque of a last joint that mostly
+//! rubs fits any factor nearly alike. So a step is taken if the factor is certain to be another, before it
+//! and after, and if the torques are explained better with it in force; otherwise a shorter one.
 
 use crate::accumulate::FoldFactors;
 use crate::fit::{Fit, merge, solve_determined, undetermined};
@@ -86,8 +86,8 @@ fn is_certain(fit: &Fit, factor: usize, in_force: f64) -> bool {
     in_force + low > 0.0 || in_force + high < 0.0
 }
 
-/// Σ rows·log σ of what is left of the torques with all factors as they are in force, and all other parameters
-/// at their best.
+/// Σ rows·log σ of what is left of the torques with all factors as they are in force, and all other
+/// parameters at their best.
 fn left(folds: &[GroupedFactor], factors: &[usize]) -> Result<f64, RegressorError> {
     let all = merge(folds)?;
     let others: Vec<usize> =
