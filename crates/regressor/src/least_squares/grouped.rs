@@ -111,8 +111,9 @@ impl GroupedFactor {
         Self::new(kept.len(), groups?)
     }
 
-    /// The same with a prior: in group k a row of `weight(k, parameter)` times each of its parameters, which
-    /// says that it is nothing, where there is a weight. These are no rows of the torque, and are not counted.
+    /// The same with a prior: in group k a row of `weight(k, parameter)` times each of its parameters, where
+    /// there is a weight, which says that the parameter is nothing. These are no rows of the torque, and are
+    /// not counted.
     ///
     /// # Errors
     /// A weight is not finite.
