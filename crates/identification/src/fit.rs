@@ -109,7 +109,8 @@ impl TorqueError {
     }
 }
 
-/// Fits a design to the rows of all `folds`, each torque weighted by its own residual.
+/// Fits a design to the rows of all `folds`, each torque weighted by its own residual. Factors of logged
+/// torques that the rows do not tell are left out, as parameters that are undetermined.
 ///
 /// # Errors
 /// There are fewer rows than parameters.

@@ -11,7 +11,8 @@ use crate::{Design, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_regressor::least_squares::{Group, GroupedFactor};
 
-/// What is left of a factor is no larger, or not known to first order.
+/// Largest change of a factor that is believed to first order. What is fitted beyond it and could not be put
+/// in force is left out.
 pub(crate) const FIRST_ORDER: f64 = 0.5;
 /// Times that factors are put in force, at most.
 const PASSES: usize = 5;
