@@ -5,7 +5,7 @@ use super::concentrated_settings::ConcentratedSettings;
 use super::in_order::{Colour, InOrder};
 use super::likelihood::column;
 use super::misfit::{TorqueMisfit, misfits};
-use super::profile::{Minimum, Profile};
+use super::profile::{Curvature, Minimum, Profile};
 use super::sensitivity::Sensitivity;
 use super::smoothing::{Belief, Smoothed};
 use super::{Estimate, Estimator, Evidence};
@@ -334,7 +334,7 @@ impl Estimator for ConcentratedLikelihood {
         let rigid = design.base().count();
         let mut x = parts.prior.start(&present.standard, &present_parameters[rigid..]);
         let mut colours = vec![Colour { correlation: 0.0, felt: 0.0 }; design.rows().len()];
-        let mut covariance = None;
+        let (mut covariance, mut curvature) = (None, Curvature::unknown());
         let mut std_of_noise = Vec::new();
         let settings = &self.settings;
         let common = settings.tempered_rounds + settings.rounds_in_common;
@@ -347,7 +347,7 @@ impl Estimator for ConcentratedLikelihood {
             };
             let last = round + 1 == rounds;
             let steps = if last { settings.newton.most_steps } else { settings.steps_a_round };
-            let found: Minimum = profile.minimum(x, steps);
+            let found: Minimum = profile.minimum(x, steps, &mut curvature);
             (x, covariance) = (found.x, found.covariance);
             let w = &parts.map * &x;
             let mut next = parts.colours(self, w.col_as_slice(0));
@@ -380,7 +380,7 @@ impl Estimator for ConcentratedLikelihood {
             let smoothed = self.smoothed(design, present, (w, &colours, &std), Which::MostLikely)?;
             let Some((again, spread)) = smoothed else { break };
             let own = Parts { spread: Some(spread), ..self.parts(design, &again)? };
-            let found = own.profile(self, &colours)?.minimum(x, settings.newton.most_steps);
+            let found = own.profile(self, &colours)?.minimum(x, settings.newton.most_steps, &mut curvature);
             (x, covariance) = (found.x, found.covariance);
             path.push(x.clone());
             if let ([first, second, third], Some(covariance)) = (path.as_slice(), &covariance) {

@@ -185,16 +185,7 @@ pub(super) fn log_determinant_curvature(
     let part: f64 = chosen().map(|(sensitivity, _)| sensitivity.weight).sum();
     for (sensitivity, response) in chosen() {
         let Some(response) = response else { continue };
-        let reduced = response.reduced(sensitivity);
-        let weight = sensitivity.weight * all / part;
-        faer::linalg::matmul::matmul(
-            &mut curvature,
-            faer::Accum::Add,
-            reduced.transpose(),
-            &reduced,
-            weight,
-            faer::Par::Seq,
-        );
+        response.add_curvature(sensitivity, 0, sensitivity.weight * all / part, &mut curvature);
     }
     curvature
 }

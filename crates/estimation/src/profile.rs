@@ -6,7 +6,7 @@
 
 use super::body_prior::BodyPrior;
 use super::likelihood::log_determinant_curvature;
-use super::response::{Response, log_determinant};
+use super::response::{Modes, Response};
 use super::sensitivity::Sensitivity;
 use super::settings::NewtonSettings;
 use faer::prelude::Solve;
@@ -84,57 +84,72 @@ impl Profile<'_> {
 
     /// −log L without the prior; infinite where an inertia is not positive definite.
     pub fn likelihood(&self, w: &Mat<f64>) -> f64 {
-        let mut cost: f64 =
+        self.modes(w).map_or(f64::INFINITY, |modes| self.likelihood_of_modes(w, &modes))
+    }
+
+    /// Inertia and damping of all instants; none where an inertia is not positive definite.
+    fn modes(&self, w: &Mat<f64>) -> Option<Vec<Modes>> {
+        self.sensitivities.iter().map(|sensitivity| Modes::of(sensitivity, w)).collect()
+    }
+
+    fn likelihood_of_modes(&self, w: &Mat<f64>, modes: &[Modes]) -> f64 {
+        let cost: f64 =
             self.squares(w).iter().map(|(rows, square, _)| 0.5 * rows * (square / rows.max(1.0)).ln()).sum();
         let share = self.instants_weight();
-        for sensitivity in self.sensitivities {
-            let Some(value) = log_determinant(sensitivity, w) else { return f64::INFINITY };
-            cost -= share * sensitivity.weight * value;
-        }
-        cost
+        let instants = self.sensitivities.iter().zip(modes);
+        cost - share
+            * instants.map(|(sensitivity, modes)| sensitivity.weight * modes.log_determinant()).sum::<f64>()
     }
 
-    fn cost(&self, x: &Mat<f64>) -> f64 {
-        let divergence = self.prior.divergence(x);
-        if divergence.is_infinite() {
-            return divergence;
+    /// The objective at `x`; none where a body or an inertia is not possible.
+    fn at(&self, x: Mat<f64>) -> Option<Point> {
+        let divergence = self.prior.divergence(&x);
+        if !divergence.is_finite() {
+            return None;
         }
-        self.likelihood(&(self.map * x)) + self.prior_weight * divergence
+        let w = self.map * &x;
+        let modes = self.modes(&w)?;
+        let cost = self.likelihood_of_modes(&w, &modes) + self.prior_weight * divergence;
+        Some(Point { x, w, modes, cost })
     }
 
-    /// Damped Newton steps from `x`, which is inside, `most_steps` of them at most.
-    pub fn minimum(&self, mut x: Mat<f64>, most_steps: usize) -> Minimum {
+    /// Damped Newton steps from `x`, which is inside, `most_steps` of them at most. `curvature` is that of the
+    /// log-determinants, which changes slowly: it is found anew where it is old, and left for the next time.
+    pub fn minimum(&self, x: Mat<f64>, most_steps: usize, curvature: &mut Curvature) -> Minimum {
         let settings = &self.newton;
         let parameters = self.map.nrows();
-        let mut curvature = Mat::zeros(parameters, parameters);
-        let mut freshness = 0;
-        let mut cost = self.cost(&x);
         let share = self.instants_weight();
         let (mut covariance, mut settled) = (None, false);
-        for step in 0..most_steps {
-            let w = self.map * &x;
-            let responses: Vec<Option<Response>> =
-                self.sensitivities.iter().map(|sensitivity| Response::of(sensitivity, &w)).collect();
-            if step < settings.fresh_steps || step % settings.curvature_every.max(1) == 0 {
-                curvature = log_determinant_curvature(
+        let Some(mut point) = self.at(x.clone()) else { return Minimum { x, covariance, settled } };
+        for _ in 0..most_steps {
+            let w = &point.w;
+            let responses: Vec<Option<Response>> = self
+                .sensitivities
+                .iter()
+                .zip(&point.modes)
+                .map(|(sensitivity, modes)| Response::of_modes(sensitivity, modes))
+                .collect();
+            let fresh = curvature.is_due(settings);
+            if fresh {
+                curvature.matrix = log_determinant_curvature(
                     self.sensitivities,
                     &responses,
                     parameters,
                     settings.instants_every,
                 );
-                curvature *= faer::Scale(share);
-                freshness = step;
             }
-            let (mut gradient, mut hessian) = (Mat::zeros(parameters, 1), curvature.clone());
+            curvature.steps += 1;
+            let (mut gradient, mut hessian) =
+                (Mat::zeros(parameters, 1), &curvature.matrix * faer::Scale(share));
             for (sensitivity, response) in self.sensitivities.iter().zip(&responses) {
                 let Some(response) = response else { continue };
                 gradient -= response.gradient(sensitivity, 0) * faer::Scale(share * sensitivity.weight);
             }
-            let downdates = self.add_squares(&w, &mut gradient, &mut hessian);
+            let downdates = self.add_squares(w, &mut gradient, &mut hessian);
             let transposed = self.map.transpose();
             let mut gradient = transposed * gradient;
             let mut hessian = transposed * hessian * self.map;
-            self.prior.add_to(&x, self.prior_weight, &mut gradient, &mut hessian);
+            self.prior.add_to(&point.x, self.prior_weight, &mut gradient, &mut hessian);
             let [relative, absolute] = settings.damping;
             for k in 0..hessian.nrows() {
                 hessian[(k, k)] = hessian[(k, k)] * (1.0 + relative) + absolute;
@@ -147,16 +162,18 @@ impl Profile<'_> {
             });
             let Some(factor) = factor else { break };
             let direction = factor.solve(&gradient);
-            let decrement: f64 = (0..x.nrows()).map(|k| direction[(k, 0)] * gradient[(k, 0)]).sum();
-            covariance = Some(factor.solve(Mat::<f64>::identity(x.nrows(), x.nrows())));
-            let moved = self.line_search(&mut x, &mut cost, &direction, decrement);
-            let near = decrement.max(0.0).sqrt() < settings.settled && step > freshness;
-            settled = !moved || near || decrement < settings.least_decrement;
+            let size = point.x.nrows();
+            let decrement: f64 = (0..size).map(|k| direction[(k, 0)] * gradient[(k, 0)]).sum();
+            covariance = Some(factor.solve(Mat::<f64>::identity(size, size)));
+            let next = self.line_search(&point, &direction, decrement);
+            let near = decrement.max(0.0).sqrt() < settings.settled && !fresh;
+            settled = next.is_none() || near || decrement < settings.least_decrement;
+            point = next.unwrap_or(point);
             if settled {
                 break;
             }
         }
-        Minimum { x, covariance, settled }
+        Minimum { x: point.x, covariance, settled }
     }
 
     /// Adds the squares' part of gradient and curvature, and returns what is to be taken off the latter as a
@@ -185,20 +202,44 @@ impl Profile<'_> {
         downdates
     }
 
-    /// Moves `x` along −direction as far as the objective falls enough (Armijo); false if it does not
-    /// fall.
-    fn line_search(&self, x: &mut Mat<f64>, cost: &mut f64, direction: &Mat<f64>, decrement: f64) -> bool {
+    /// The point along −direction at which the objective falls enough (Armijo); none if it does not fall.
+    fn line_search(&self, from: &Point, direction: &Mat<f64>, decrement: f64) -> Option<Point> {
         let mut length = 1.0;
         while length > self.newton.shortest_step {
-            let trial = &*x - direction * faer::Scale(length);
-            let reached = self.cost(&trial);
-            if reached <= *cost - self.newton.sufficient_decrease * length * decrement {
-                (*x, *cost) = (trial, reached);
-                return true;
+            let reached = self.at(&from.x - direction * faer::Scale(length));
+            let enough = from.cost - self.newton.sufficient_decrease * length * decrement;
+            if let Some(reached) = reached.filter(|reached| reached.cost <= enough) {
+                return Some(reached);
             }
             length *= 0.5;
         }
-        false
+        None
+    }
+}
+
+/// Where the objective was looked at: w, and the inertias of all instants under it.
+struct Point {
+    x: Mat<f64>,
+    w: Mat<f64>,
+    modes: Vec<Modes>,
+    cost: f64,
+}
+
+/// Curvature of −Σ weight·log det J, and the steps that have been taken since minima are looked for along a
+/// path.
+pub(super) struct Curvature {
+    matrix: Mat<f64>,
+    steps: usize,
+}
+
+impl Curvature {
+    /// None yet.
+    pub fn unknown() -> Self {
+        Curvature { matrix: Mat::zeros(0, 0), steps: 0 }
+    }
+
+    fn is_due(&self, settings: &NewtonSettings) -> bool {
+        self.steps < settings.fresh_steps || self.steps.is_multiple_of(settings.curvature_every.max(1))
     }
 }
 

@@ -7,7 +7,8 @@
 //! of friction alone, log(1 + x/2), is then so far off that a thousand rows take the difference for friction.
 
 use super::sensitivity::{Sensitivity, element, packed, place};
-use faer::{Mat, Side};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, Par, Side};
 use phiw_dynamics::dense::Cholesky;
 
 /// Up to here p is summed as a series; beyond, e^−x is nothing beside 1.
@@ -47,26 +48,30 @@ pub(super) struct Response {
 
 /// Inertia and damping of an instant as their eigenvectors see them: Cholesky's factor of A, x and the
 /// vectors in its frame.
-struct Modes {
+pub(super) struct Modes {
     factor: Cholesky,
     values: Vec<f64>,
     vectors: Mat<f64>,
+    /// A + ½T·F, packed.
+    half_damped: Mat<f64>,
 }
 
 impl Modes {
-    fn of(sensitivity: &Sensitivity, w: &Mat<f64>) -> Option<Self> {
+    /// None where the inertia is not one.
+    pub fn of(sensitivity: &Sensitivity, w: &Mat<f64>) -> Option<Self> {
         let n = sensitivity.directions;
         let (inertia, mut damping) = (&sensitivity.inertia * w, &sensitivity.damping * w);
         let factor = factor(n, inertia.col_as_slice(0))?;
+        let half_damped = inertia + &damping * faer::Scale(0.5);
         reduce(&factor, damping.col_as_slice_mut(0));
         let reduced = damping.col_as_slice(0);
         let entry = |row: usize, column: usize| element(reduced, row.max(column), row.min(column));
         let eigen = Mat::from_fn(n, n, entry).self_adjoint_eigen(Side::Lower).ok()?;
         let values = (0..n).map(|mode| eigen.S()[mode]).collect();
-        Some(Modes { factor, values, vectors: eigen.U().to_owned() })
+        Some(Modes { factor, values, vectors: eigen.U().to_owned(), half_damped })
     }
 
-    fn log_determinant(&self) -> f64 {
+    pub fn log_determinant(&self) -> f64 {
         self.factor.log_determinant() + self.values.iter().map(|&x| damped(x)).sum::<f64>()
     }
 }
@@ -79,8 +84,12 @@ pub(super) fn log_determinant(sensitivity: &Sensitivity, w: &Mat<f64>) -> Option
 impl Response {
     /// None where the inertia is not one.
     pub fn of(sensitivity: &Sensitivity, w: &Mat<f64>) -> Option<Self> {
+        Self::of_modes(sensitivity, &Modes::of(sensitivity, w)?)
+    }
+
+    /// The same where the modes are known. None where A + ½T·F is no inertia.
+    pub fn of_modes(sensitivity: &Sensitivity, modes: &Modes) -> Option<Self> {
         let n = sensitivity.directions;
-        let modes = Modes::of(sensitivity, w)?;
         // Columns of L⁻ᵀU.
         let mut vectors = modes.vectors.clone();
         for mode in 0..n {
@@ -99,10 +108,9 @@ impl Response {
             }
             slope
         };
-        let both = &sensitivity.inertia * w + &sensitivity.damping * w * faer::Scale(0.5);
         Some(Response {
             slopes: [sum(&|x| 1.0 - x * damped_slope(x)), sum(&damped_slope)],
-            factor: factor(n, both.col_as_slice(0))?,
+            factor: factor(n, modes.half_damped.col_as_slice(0))?,
         })
     }
 
@@ -113,13 +121,42 @@ impl Response {
             + sensitivity.damping.get(.., first..).transpose() * by_damping
     }
 
-    /// L⁻¹ S L⁻ᵀ of each parameter's A + ½T·F, packed: their products are those of a curvature.
-    pub fn reduced(&self, sensitivity: &Sensitivity) -> Mat<f64> {
-        let mut columns = &sensitivity.inertia + &sensitivity.damping * faer::Scale(0.5);
-        for parameter in 0..columns.ncols() {
-            reduce(&self.factor, columns.col_as_slice_mut(parameter));
+    /// Adds `weight` times tr(G⁻¹ S_k G⁻¹ S_l) to element (k, l − `first`), for all parameters k and those l
+    /// from `first` on: G = A + ½T·F under the parameters, S_k what parameter k adds to it.
+    pub fn add_curvature(
+        &self,
+        sensitivity: &Sensitivity,
+        first: usize,
+        weight: f64,
+        curvature: &mut Mat<f64>,
+    ) {
+        let columns = &sensitivity.inertia + &sensitivity.damping * faer::Scale(0.5);
+        let moved = self.squeezed() * columns.get(.., first..);
+        matmul(curvature, Accum::Add, columns.transpose(), &moved, weight, Par::Seq);
+    }
+
+    /// The matrix that makes G⁻¹ S G⁻¹ of a packed S.
+    fn squeezed(&self) -> Mat<f64> {
+        let n = self.factor.size();
+        let inverse = self.factor.inverse();
+        let row_of = |index: usize| &inverse[index * n..(index + 1) * n];
+        let mut map = Mat::zeros(packed(n), packed(n));
+        for k in 0..n {
+            for l in 0..=k {
+                let (by_k, by_l) = (row_of(k), row_of(l));
+                let from = if k == l { std::f64::consts::FRAC_1_SQRT_2 } else { 1.0 };
+                let column = map.col_as_slice_mut(place(k, l));
+                for row in 0..n {
+                    let [own_k, own_l] = [by_k[row], by_l[row]].map(|value| from * value);
+                    let to = &mut column[place(row, 0)..=place(row, row)];
+                    for ((to, k), l) in to.iter_mut().zip(by_k).zip(by_l) {
+                        *to = own_k * l + own_l * k;
+                    }
+                    to[row] *= std::f64::consts::FRAC_1_SQRT_2;
+                }
+            }
         }
-        columns
+        map
     }
 }
 
@@ -162,6 +199,7 @@ fn reduce(factor: &Cholesky, column: &mut [f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use faer::prelude::Solve;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -197,6 +235,38 @@ mod tests {
                     "{slope} {}",
                     gradient[(parameter, 0)]
                 );
+            }
+        }
+    }
+
+    /// Whole matrices are the oracle.
+    #[test]
+    fn a_curvature_is_the_trace_of_four_matrices() {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        for n in [1, 2, 5] {
+            let sensitivity = sensitivity(&mut rng, n, 4);
+            let w = Mat::from_fn(4, 1, |k, _| [1.0, 0.4, -0.3, 0.2][k]);
+            let whole = |column: &Mat<f64>| {
+                Mat::from_fn(n, n, |row, col| element(column.col_as_slice(0), row.max(col), row.min(col)))
+            };
+            let both = &sensitivity.inertia + &sensitivity.damping * faer::Scale(0.5);
+            let inverse = whole(&(&both * &w)).llt(Side::Lower).unwrap().solve(Mat::<f64>::identity(n, n));
+            let part = |k: usize| &inverse * whole(&both.get(.., k..k + 1).to_owned());
+            for first in [0, 3] {
+                let mut curvature = Mat::zeros(4, 4 - first);
+                let response = Response::of(&sensitivity, &w).unwrap();
+                response.add_curvature(&sensitivity, first, 2.0, &mut curvature);
+                for k in 0..4 {
+                    for l in first..4 {
+                        let product = part(k) * part(l);
+                        let expected: f64 = (0..n).map(|index| 2.0 * product[(index, index)]).sum();
+                        let found = curvature[(k, l - first)];
+                        assert!(
+                            (found - expected).abs() < 1e-9 * (1.0 + expected.abs()),
+                            "{found} {expected}"
+                        );
+                    }
+                }
             }
         }
     }

@@ -149,9 +149,8 @@ impl MotionLikelihood {
             }
             // A part of the instants is enough for a curvature, which is the dearest part.
             if index % every == every / 2 {
-                let (reduced, weight) = (response.reduced(&sensitivity), sensitivity.weight * all / part);
-                let added = reduced.get(.., present..);
-                matmul(&mut curvature, Accum::Add, reduced.transpose(), added, weight, Par::Seq);
+                let weight = sensitivity.weight * all / part;
+                response.add_curvature(&sensitivity, present, weight, &mut curvature);
             }
         }
         let mut start = 0;
