@@ -197,16 +197,29 @@ impl<'a> Search<'a> {
     /// The same with hypotheses of `open` alone.
     pub(super) fn forward_among(&mut self, open: Vec<usize>) -> bool {
         let screened = screen(self.problem, &self.model.fit, &self.rows, &open);
-        let moves = self.moves(&screened);
-        let larger = |added: Vec<Member>| (self.model.members.iter().copied().chain(added).collect(), ());
-        let models = self.ranked(moves.into_iter().map(larger).collect(), &self.model.fit, usize::MAX);
-        let better = models.into_iter().map(|(model, ())| model).filter(|model| {
-            model.settled
-                && model.value < self.model.value - LEAST_STEP
-                && model.members != self.model.members
-        });
-        let best = self.first_that_foretells(better.collect());
-        best.map(|best| self.model = best).is_some()
+        let mut moves = self.moves(&screened);
+        // What gains most and foretells nothing must not bar what gains less.
+        while !moves.is_empty() {
+            let larger = |added: Vec<Member>| {
+                (self.model.members.iter().copied().chain(added.clone()).collect(), added)
+            };
+            let models = self.ranked(moves.into_iter().map(larger).collect(), &self.model.fit, usize::MAX);
+            let better = |(model, _): &(Model, Vec<Member>)| {
+                model.value < self.model.value - LEAST_STEP && model.members != self.model.members
+            };
+            let (fitted, rest): (Vec<_>, Vec<_>) =
+                models.into_iter().filter(better).partition(|(model, _)| model.settled);
+            if fitted.is_empty() {
+                return false;
+            }
+            let fitted = fitted.into_iter().map(|(model, _)| model).collect();
+            if let Some(best) = self.first_that_foretells(fitted) {
+                self.model = best;
+                return true;
+            }
+            moves = rest.into_iter().map(|(_, added)| added).collect();
+        }
+        false
     }
 
     /// The first of these that foretells what it is not fitted to better than the present model.
