@@ -4,10 +4,11 @@
 //! What the logs do not tell comes from the URDF. How much it weighs is chosen by the error on training folds
 //! that are left out; held-out folds fit nothing here either.
 
+use crate::accumulate::accumulate;
 use crate::effect::QuadraticForm;
 use crate::fit::{Fit, TorqueError, merge, torque_error};
 use crate::mirrored::mirror_map;
-use crate::{Design, IdentificationError};
+use crate::{Data, Design, IdentificationError, Identified};
 pub use phiw_consistency::Ellipsoid;
 use phiw_consistency::{
     MatrixTerm, PriorSettings, Problem, PseudoInertia, Settings, Solution, possible_priors,
@@ -85,6 +86,9 @@ pub struct Consistent {
     pub parameters: Vec<f64>,
     /// Weight of the prior that was chosen.
     pub weight: f64,
+    /// Whether training folds that were left out are foretold better by possible bodies than by least squares.
+    /// Not where the fit is drawn to nothing: that is not compared.
+    pub foretells_better: bool,
     /// What the objective can be above the optimum, in nats of independent samples.
     pub gap: f64,
     /// Whether the gap is as small as the solver's settings ask.
@@ -95,6 +99,44 @@ pub struct Consistent {
     pub train: TorqueError,
     /// Error on the folds held out.
     pub held_out: TorqueError,
+}
+
+impl Identified {
+    /// The model that phiw reports and predicts with: these bodies, which can exist, where they foretell
+    /// better than least squares' do. Intervals then hold the values of both. Columns that are made of the
+    /// model's own torque are made again from `data`.
+    ///
+    /// # Errors
+    /// A log cannot be read any more.
+    pub fn with_possible(
+        mut self,
+        possible: &Consistent,
+        data: Option<&Data<'_>>,
+    ) -> Result<Self, IdentificationError> {
+        if !possible.foretells_better {
+            return Ok(self);
+        }
+        for (interval, value) in self.fit.intervals_95.iter_mut().zip(&possible.parameters) {
+            if interval.iter().all(|end| end.is_finite()) {
+                *interval = [interval[0].min(*value), interval[1].max(*value)];
+            }
+        }
+        self.fit.parameters.clone_from(&possible.parameters);
+        self.train.clone_from(&possible.train);
+        self.held_out.clone_from(&possible.held_out);
+        if !self.design.needs().of_reference() {
+            return Ok(self);
+        }
+        self.design = self.design.with_own_reference(&self.fit.parameters)?;
+        if let Some(Data { train, held_out, sources, .. }) = data {
+            let all = [train.as_slice(), held_out].concat();
+            self.train_folds = accumulate(&self.design, &all, sources)?;
+            self.held_out_folds = self.train_folds.split_off(train.len());
+            self.train = torque_error(&self.train_folds, &self.fit.parameters)?;
+            self.held_out = torque_error(&self.held_out_folds, &self.fit.parameters)?;
+        }
+        Ok(self)
+    }
 }
 
 /// Bodies of standard parameters, ten for each, that no distribution of mass has.
@@ -121,7 +163,11 @@ pub fn consistent(
     let weights = row_weights(fit, train_folds, settings)?;
     let blocks = merged(train_folds, settings.folds, &weights)?;
     let posed = columns.problem(design, settings)?;
-    let weight = choose_weight(&columns, &posed, &blocks, settings)?;
+    let Choice { weight, error } = choose_weight(&columns, &posed, &blocks, settings)?;
+    let foretells_better = match error.filter(|_| !fit.is_drawn) {
+        Some(error) => error < left_out_by_least_squares(fit, &blocks)?,
+        None => false,
+    };
     let all = Factor::merge_all(&blocks)?;
     let solution = columns.with_data(posed, &all)?.solve(weight, &settings.solver)?;
     let parameters = columns.parameters(&solution);
@@ -131,6 +177,7 @@ pub fn consistent(
         standard: solution.standard,
         parameters,
         weight: solution.weight,
+        foretells_better: foretells_better && solution.certified,
         gap: solution.gap,
         certified: solution.certified,
         iterations: solution.iterations,
@@ -163,20 +210,21 @@ fn merged(folds: &[GroupedFactor], count: usize, weights: &[f64]) -> Result<Vec<
     (0..count).map(block).collect()
 }
 
+/// A weight of the prior, and the squares of what it leaves of folds that are left out, if there are enough.
+struct Choice {
+    weight: f64,
+    error: Option<f64>,
+}
+
 /// The weight with the smallest error on folds that are left out.
 fn choose_weight(
     columns: &Columns<'_>,
     posed: &Problem,
     blocks: &[Factor],
     settings: &ConsistentSettings,
-) -> Result<f64, IdentificationError> {
-    if blocks.len() < 2 || settings.weights.len() < 2 {
-        return Ok(settings
-            .weights
-            .first()
-            .copied()
-            .filter(|_| blocks.len() > 1)
-            .unwrap_or(settings.default_weight));
+) -> Result<Choice, IdentificationError> {
+    if blocks.len() < 2 || settings.weights.is_empty() {
+        return Ok(Choice { weight: settings.default_weight, error: None });
     }
     let rests: Vec<Factor> = leave_one_out(blocks)?;
     let errors = |(rest, left_out): (&Factor, &Factor)| -> Result<Vec<f64>, IdentificationError> {
@@ -189,8 +237,30 @@ fn choose_weight(
     };
     let by_fold: Vec<Vec<f64>> = rests.par_iter().zip(blocks).map(errors).collect::<Result<_, _>>()?;
     let total = |index: usize| by_fold.iter().map(|errors| errors[index]).sum::<f64>();
-    let best = (0..settings.weights.len()).min_by(|&a, &b| total(a).total_cmp(&total(b)));
-    Ok(best.map_or(settings.default_weight, |best| settings.weights[best]))
+    let best = (0..settings.weights.len()).map(|index| (total(index), index));
+    let best = best.min_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(match best {
+        Some((error, index)) => Choice { weight: settings.weights[index], error: Some(error) },
+        None => Choice { weight: settings.default_weight, error: None },
+    })
+}
+
+/// The squares of what least squares leaves of folds that are left out; infinite where the others do not
+/// determine what all of them do.
+fn left_out_by_least_squares(fit: &Fit, blocks: &[Factor]) -> Result<f64, RegressorError> {
+    let mut columns = fit.determined();
+    columns.push(fit.parameters.len());
+    let blocks: Vec<Factor> = blocks.iter().map(|block| block.select(&columns)).collect::<Result<_, _>>()?;
+    let mut error = 0.0;
+    for (rest, left_out) in leave_one_out(&blocks)?.iter().zip(&blocks) {
+        let parameters = match rest.solve() {
+            Ok(solution) => solution.parameters,
+            Err(RegressorError::RankDeficient { .. }) => return Ok(f64::INFINITY),
+            Err(error) => return Err(error),
+        };
+        error += left_out.residual_sum_of_squares(&parameters)?;
+    }
+    Ok(error)
 }
 
 /// From the factors' columns to the problem's: base parameters become standard ones, and effects that the fit

@@ -63,7 +63,7 @@ pub fn identify(
     fitted.identified(folds.moving)
 }
 
-/// [`identify`], and what the error is with rests included.
+/// [`identify`], and the rows at which joints rest.
 ///
 /// # Errors
 /// The same.
@@ -71,10 +71,9 @@ pub fn identify_with_rests(
     tree: &Tree,
     effects: Vec<Variants>,
     data: &Data<'_>,
-) -> Result<(Identified, WithRests), IdentificationError> {
+) -> Result<(Identified, RowsAtRest), IdentificationError> {
     let (fitted, folds) = identify_rows(tree, effects, data, Rests::Kept)?;
-    let with_rests = fitted.with_rests(&folds)?;
-    Ok((fitted.identified(folds.moving)?, with_rests))
+    Ok((fitted.identified(folds.moving)?, RowsAtRest { folds: folds.at_rest }))
 }
 
 fn identify_rows(
@@ -154,12 +153,11 @@ impl Declared {
         self,
         folds: FoldFactors,
         train: usize,
-    ) -> Result<(Identified, WithRests), IdentificationError> {
+    ) -> Result<(Identified, RowsAtRest), IdentificationError> {
         check_size("folds at rest", folds.at_rest.len(), folds.moving.len())?;
         check_size("training folds", train.min(folds.moving.len()), train)?;
         let (fitted, folds) = self.fitted(folds, train, FIRST_ORDER)?;
-        let with_rests = fitted.with_rests(&folds)?;
-        Ok((fitted.identified(folds.moving)?, with_rests))
+        Ok((fitted.identified(folds.moving)?, RowsAtRest { folds: folds.at_rest }))
     }
 
     /// The variants chosen and fitted, with factors of torques up to `largest_factor`, and the folds' factors
@@ -245,23 +243,37 @@ impl Fitted {
             held_out_folds,
         })
     }
+}
 
-    fn with_rests(&self, folds: &FoldFactors) -> Result<WithRests, IdentificationError> {
-        let relative = |range: Range<usize>| {
-            let both = folds.moving[range.clone()].iter().chain(&folds.at_rest[range]);
-            relative_error(both, &self.fit.parameters)
+/// The factors of the rows at which joints rest, fold by fold: those of training first. No fit takes them.
+pub struct RowsAtRest {
+    folds: Vec<GroupedFactor>,
+}
+
+impl RowsAtRest {
+    /// What they add to a model that was identified from the other rows of these folds.
+    ///
+    /// # Errors
+    /// The model is of another design.
+    pub fn added_to(&self, identified: &Identified) -> Result<WithRests, IdentificationError> {
+        let Identified { design, fit, train_folds, held_out_folds, .. } = identified;
+        check_size("folds at rest", self.folds.len(), train_folds.len() + held_out_folds.len())?;
+        let (train, held_out) = self.folds.split_at(train_folds.len());
+        let relative = |moving: &[GroupedFactor], at_rest: &[GroupedFactor]| {
+            relative_error(moving.iter().chain(at_rest), &fit.parameters)
         };
         let rows = |folds: &[GroupedFactor], torque: usize| -> u64 {
             folds.iter().map(|fold| fold.groups()[torque].factor.rows()).sum()
         };
         let share = |torque: usize| {
-            let (moving, at_rest) = (rows(&folds.moving, torque), rows(&folds.at_rest, torque));
+            let moving = rows(train_folds, torque) + rows(held_out_folds, torque);
+            let at_rest = rows(&self.folds, torque);
             at_rest as f64 / (moving + at_rest).max(1) as f64
         };
         Ok(WithRests {
-            train_relative: relative(0..self.train)?,
-            held_out_relative: relative(self.train..folds.moving.len())?,
-            share: (0..self.design.rows().len()).map(share).collect(),
+            train_relative: relative(train_folds, train)?,
+            held_out_relative: relative(held_out_folds, held_out)?,
+            share: (0..design.rows().len()).map(share).collect(),
         })
     }
 }

@@ -50,7 +50,7 @@ pub use block_source::{BlockSource, EveryNth};
 pub use design::Design;
 pub use effect::{Effect, EffectCatalogue, EffectSpec};
 pub use error::IdentificationError;
-pub use identify::{Data, Identified, Variants, WithRests, identify, identify_with_rests};
+pub use identify::{Data, Identified, RowsAtRest, Variants, WithRests, identify, identify_with_rests};
 pub use kept_blocks::KeptBlocks;
 pub use log_file::{Interruption, LogFile, Progress};
 pub use log_set::LogSet;

@@ -221,7 +221,8 @@ impl Model {
         Model { held_out_rmse: Some(rmse.to_vec()), ..self }
     }
 
-    /// The same with the fit over possible bodies beside it.
+    /// The same with the fit over possible bodies beside it. Where that is the model's own
+    /// ([`Identified::with_possible`](crate::Identified::with_possible)), its bodies are these, too.
     ///
     /// # Errors
     /// It is not of this design.
@@ -248,6 +249,11 @@ impl Model {
                 .map(|effect| consistent.parameters[design.effect_parameters(effect)].to_vec())
                 .collect(),
         });
+        if consistent.foretells_better
+            && let Some(possible) = &self.consistent
+        {
+            self.bodies.clone_from(&possible.bodies);
+        }
         Ok(self)
     }
 

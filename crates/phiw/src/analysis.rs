@@ -1,10 +1,10 @@
 //! A fitted model with everything that the report says of it.
 
+use crate::possible_bodies::PossibleBodies;
 use crate::session::Session;
 use crate::traces::Traces;
-use crate::{Error, conventions, extents, fingerprint, possible_bodies, told, warnings};
+use crate::{Error, conventions, fingerprint, told, warnings};
 use phiw_identification::bandwidth::Bandwidth;
-use phiw_identification::consistent::{Consistent, ConsistentSettings, Ellipsoid, Known, consistent};
 use phiw_identification::effect::JointProperty;
 use phiw_identification::fitting::{held_out_change, log_changes, merge};
 use phiw_identification::model::DataFingerprint;
@@ -24,8 +24,8 @@ pub struct Analysis<'a> {
     pub identified: &'a Identified,
     /// The same as it is written to `model.json`.
     pub model: Model,
-    /// The same fit over bodies that can exist.
-    pub consistent: Consistent,
+    /// The same fit over bodies that can exist, and least squares.
+    pub possible: PossibleBodies,
     /// What the logs tell of each parameter.
     pub information: InformationJson,
     /// Torques over time; none where the rows were not at hand.
@@ -52,6 +52,7 @@ impl<'a> Analysis<'a> {
         session: &'a Session,
         rows: Rows<'_>,
         identified: &'a Identified,
+        possible: PossibleBodies,
         with_rests: Option<WithRests>,
     ) -> Result<Self, Error> {
         let Identified { design, fit, .. } = identified;
@@ -70,12 +71,8 @@ impl<'a> Analysis<'a> {
             true => model.with_held_out_rmse(&identified.held_out.rmse),
             false => model,
         };
-        let (known, unknown_extents) = known(session)?;
-        let settings = ConsistentSettings { known, ..ConsistentSettings::default() };
-        let consistent =
-            consistent(design, fit, &identified.train_folds, &identified.held_out_folds, &settings)?;
-        let model = model.with_consistent(design, &consistent)?;
-        let information = told::information(session, identified, &consistent)?;
+        let model = model.with_consistent(design, &possible.consistent)?;
+        let information = told::information(session, identified, &possible.consistent)?;
         let traces = match rows {
             Rows::Logs(data) => {
                 let folds = [data.train.as_slice(), data.held_out.as_slice()];
@@ -90,15 +87,14 @@ impl<'a> Analysis<'a> {
         if let Rows::Logs(data) = rows {
             warnings.extend(conventions::warnings(session, data)?);
         }
-        warnings.extend(unknown_extents);
-        warnings.extend(possible_bodies::warning(&model, &consistent, fit));
+        warnings.extend(possible.warnings(model.bodies.len(), fit));
         warnings.extend(warnings::at_rest_where_held_out(session, &at_rest));
         warnings.extend(warnings::changed_where_held_out(session, &changed));
         Ok(Analysis {
             session,
             identified,
             model,
-            consistent,
+            possible,
             information,
             traces,
             with_rests,
@@ -173,44 +169,6 @@ impl<'a> Analysis<'a> {
         shares.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
         Ok(shares)
     }
-}
-
-/// What the user knows of the bodies, and a warning where geometry that was asked for is not known.
-fn known(session: &Session) -> Result<(Vec<Known>, Option<String>), Error> {
-    let bodies = session.tree.bodies();
-    let body_of = |link: &String| {
-        let links = || bodies.iter().map(|body| body.link.as_str()).collect::<Vec<_>>().join(", ");
-        let body = bodies.iter().position(|body| body.link == *link);
-        body.ok_or_else(|| Error::UnknownLink { link: link.clone(), links: links() })
-    };
-    let mut known = Vec::new();
-    for (link, mass) in &session.arguments.mass {
-        known.push(Known::Mass(body_of(link)?, *mass));
-    }
-    for (link, [x, y, z, a, b, c]) in &session.arguments.inside {
-        let ellipsoid = Ellipsoid { center: [*x, *y, *z], half_axes: [*a, *b, *c] };
-        known.push(Known::Inside(body_of(link)?, ellipsoid));
-    }
-    let mut warning = None;
-    if session.arguments.inside_geometry {
-        let (extents, unknown) = extents::of_bodies(session);
-        let given: Vec<usize> =
-            session.arguments.inside.iter().map(|(link, _)| body_of(link)).collect::<Result<_, _>>()?;
-        let others = extents.into_iter().filter(|(body, _)| !given.contains(body));
-        known.extend(others.map(|(body, extent)| Known::InsideBox(body, extent.lower, extent.upper)));
-        warning = unknown;
-    }
-    for (link, image) in &session.arguments.mirrored {
-        known.push(Known::Mirrored(body_of(link)?, body_of(image)?));
-    }
-    let of_links: f64 = session.arguments.mass.iter().map(|(_, mass)| mass).sum();
-    if let Some(total) = session.arguments.total_mass {
-        if session.arguments.mass.len() >= bodies.len() || of_links >= total {
-            return Err(Error::TotalMass { total, of_links });
-        }
-        known.push(Known::TotalMass(total));
-    }
-    Ok((known, warning))
 }
 
 /// Where the rows of the logs are.

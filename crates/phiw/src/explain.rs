@@ -11,6 +11,7 @@ use crate::identify::{Outcome, Results, outputs};
 use crate::log_apart::what_differs;
 use crate::model_file::ModelFile;
 use crate::output::take_folder;
+use crate::possible_bodies::PossibleBodies;
 use crate::report_json::{by_joint, report_json};
 use crate::session::{Session, read_robot};
 use crate::torque_zeros::ZerosOfLogs;
@@ -36,6 +37,9 @@ struct Start {
     specs: Vec<EffectSpec>,
     parameters: Vec<f64>,
     held: Option<HeldModel>,
+    /// Error of the model on the training folds and on those held out, once its bodies are settled; none of
+    /// a held model.
+    errors: Option<(TorqueError, TorqueError)>,
 }
 
 /// Identifies the declared model (or takes the held one), traces its residual, and writes the grown model
@@ -125,8 +129,16 @@ fn results_knowing(
 
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
+    let possible = match &arguments.model {
+        None => {
+            let (settled, possible) = PossibleBodies::settle(&session, tracing.model, Some(&data))?;
+            tracing.model = settled;
+            possible
+        }
+        Some(_) => PossibleBodies::beside_held(&session, &tracing.model)?,
+    };
     let mut analysis =
-        Analysis::new(&session, Rows::Logs(&data), &tracing.model, None)?.with_bandwidth(bandwidth);
+        Analysis::new(&session, Rows::Logs(&data), &tracing.model, possible, None)?.with_bandwidth(bandwidth);
     if arguments.model.is_none() {
         analysis = analysis.with_logs_compared()?;
         // Logs that are too short to say what differs say nothing of it.
@@ -241,7 +253,10 @@ fn traced(
     };
     let mut options = TraceOptions { excluded, ..TraceOptions::default() };
     options.thresholds = thresholds(arguments)?;
-    let tracing = trace(input, &options)?;
+    let mut tracing = trace(input, &options)?;
+    if let Some(errors) = start.errors {
+        tracing.before = errors;
+    }
     Ok(Traced { start: start.model, floor, tracing })
 }
 
@@ -284,12 +299,15 @@ fn start(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Re
             .map_err(|error| session.of_training_logs(error))?;
         session.joints_without_held_out_motion(&identified.held_out_folds)?;
         let Identified { design, fit, .. } = &identified;
-        return Ok(Start {
+        let start = Start {
             model: Model::of_fit(design, fit, &session.declared, &session.held, cutoffs)?,
             specs: design.effects().iter().map(|effect| effect.spec()).collect(),
             parameters: fit.parameters.clone(),
             held: None,
-        });
+            errors: None,
+        };
+        let (identified, _) = PossibleBodies::settle(session, identified, Some(data))?;
+        return Ok(Start { errors: Some((identified.train, identified.held_out)), ..start });
     };
     let file = ModelFile::given(session.arguments.in_memory.model.as_ref(), path)?;
     let (design, parameters) = file.design(&session.arguments.urdf, &session.tree, &session.catalogue)?;
@@ -302,7 +320,7 @@ fn start(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Re
         left: model.left(),
     };
     let specs = design.effects().iter().map(|effect| effect.spec()).collect();
-    Ok(Start { model, specs, parameters, held: Some(held) })
+    Ok(Start { model, specs, parameters, held: Some(held), errors: None })
 }
 
 fn verdict(verdict: trace::Verdict) -> Verdict {

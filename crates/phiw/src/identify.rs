@@ -7,6 +7,7 @@ use crate::exported::Carried;
 use crate::identified_mjcf::{self, identified_mjcf};
 use crate::identified_urdf::identified_urdf;
 use crate::output::take_folder;
+use crate::possible_bodies::PossibleBodies;
 use crate::report_json::report_json;
 use crate::session::Session;
 use crate::{Error, bandwidth, page, summary};
@@ -73,9 +74,13 @@ pub fn results(arguments: &SessionArguments, console: &Console) -> Result<Result
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
     let effects = session.effects(&data)?;
-    let (identified, with_rests) = phiw_identification::identify_with_rests(&session.tree, effects, &data)
+    let (identified, at_rest) = phiw_identification::identify_with_rests(&session.tree, effects, &data)
         .map_err(|error| session.of_training_logs(error))?;
-    let analysis = Analysis::new(&session, Rows::Logs(&data), &identified, Some(with_rests))?;
+    let (identified, possible) = PossibleBodies::settle(&session, identified, Some(&data))?;
+    // Columns of the model's own torque were made again, those of the rests were not.
+    let is_as_reduced = !identified.design.needs().of_reference();
+    let with_rests = is_as_reduced.then(|| at_rest.added_to(&identified)).transpose()?;
+    let analysis = Analysis::new(&session, Rows::Logs(&data), &identified, possible, with_rests)?;
     let analysis = analysis.with_bandwidth(bandwidth).with_logs_compared()?;
     console.finish();
 

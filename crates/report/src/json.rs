@@ -336,6 +336,9 @@ pub struct ConsistencyJson {
     pub gap: f64,
     /// Whether that is next to nothing.
     pub certified: bool,
+    /// Whether the model is this fit: it foretells training motion that is left out better than least squares.
+    #[serde(default)]
+    pub is_model: bool,
     /// Bodies, by their joints, that least squares has made impossible.
     pub impossible: Vec<String>,
     /// RMS error of each joint on held-out motion (N·m or N).

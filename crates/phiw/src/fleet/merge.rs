@@ -6,6 +6,7 @@ use crate::argument_values::quoted;
 use crate::console::Console;
 use crate::identify::{Outcome, outputs};
 use crate::output::take_folder;
+use crate::possible_bodies::PossibleBodies;
 use crate::report_json::report_json;
 use crate::{Error, page, summary};
 use phiw_identification::bandwidth::Bandwidth;
@@ -52,10 +53,12 @@ pub fn merge(arguments: &MergeArguments, console: &Console) -> Result<Outcome, E
     let bandwidth = bandwidth_of(&plan, &logs)?;
     let (folds, train, poses) = in_order(&plan, logs);
     let Plan { session, declared, logs: fingerprints, .. } = plan;
-    let (identified, with_rests) =
+    let (identified, at_rest) =
         declared.identified(folds, train).map_err(|error| session.of_training_logs(error))?;
     let rows = Rows::Reduced { fingerprints: &fingerprints, poses: &poses };
-    let analysis = Analysis::new(&session, rows, &identified, Some(with_rests))?;
+    let (identified, possible) = PossibleBodies::settle(&session, identified, None)?;
+    let with_rests = at_rest.added_to(&identified)?;
+    let analysis = Analysis::new(&session, rows, &identified, possible, Some(with_rests))?;
     let analysis = analysis.with_bandwidth(bandwidth).with_logs_compared()?;
     console.finish();
 
