@@ -130,6 +130,26 @@ fn what_is_there_is_found_and_nothing_else_from_any_start() {
     }
 }
 
+/// What one stretch of motion says and no other foretells nothing of that stretch. Six such effects gain more
+/// than the one that is there, which was not found for them.
+#[test]
+fn what_foretells_nothing_does_not_bar_what_does() {
+    const TORQUES: usize = 7;
+    const ROWS: usize = 400;
+    let truth: Vec<(usize, usize, f64)> =
+        (0..TORQUES).map(|torque| (torque, 0, if torque == 0 { 0.4 } else { 5.0 })).collect();
+    let row = std::cell::Cell::new(0);
+    let once = |columns: &mut [f64]| {
+        let (torque, own) = (row.get() / ROWS, row.get() % ROWS);
+        row.set(row.get() + 1);
+        if torque > 0 && own >= ROWS / 5 {
+            columns[0] *= 0.02;
+        }
+    };
+    let problem = problem_with(&mut RandomNumbers::new(7), TORQUES, 2, &truth, 0.0, once);
+    assert_eq!(chosen(&problem, Vec::new()), [(0, 0)]);
+}
+
 #[test]
 fn nothing_is_named_in_noise_of_any_colour() {
     for colour in [0.0, 0.5, 0.8, 0.9] {
