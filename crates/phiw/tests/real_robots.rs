@@ -31,7 +31,13 @@ fn files(folder: &Path, prefix: &str) -> Vec<PathBuf> {
 /// torque, did the work of the asymmetric friction; that left as harmful, and then the gain did no good.
 #[test]
 fn real_robots_end_the_same_whatever_was_declared() {
-    for (robot, urdf) in [("emps", "emps.urdf"), ("tx40", "tx40.urdf"), ("xl330", "robot.urdf")] {
+    let robots = [
+        ("emps", "emps.urdf", &["train"][..], "validate"),
+        ("tx40", "tx40.urdf", &["train"], "validate"),
+        ("xl330", "robot.urdf", &["train"], "validate"),
+        ("kr300", "kr300.urdf", &["traj_A", "traj_B"], "traj_C"),
+    ];
+    for (robot, urdf, train, validate) in robots {
         let Some(logs) = logs_of(robot) else { continue };
         let declared: [&[&str]; 3] = [
             &[],
@@ -42,8 +48,8 @@ fn real_robots_end_the_same_whatever_was_declared() {
             let out = tempfile::tempdir().unwrap();
             let session = SessionArguments {
                 urdf: logs.join(urdf),
-                train: files(&logs, "train"),
-                validate: files(&logs, "validate"),
+                train: train.iter().flat_map(|start| files(&logs, start)).collect(),
+                validate: files(&logs, validate),
                 declare: declared.iter().map(|&kind| kind.to_owned()).collect(),
                 out: out.path().to_path_buf(),
                 quiet: true,

@@ -142,6 +142,7 @@ fn additions_of_the_program_come_last() {
             prior_weight: 10.0,
             gap: 1e-9,
             certified: true,
+            is_model: true,
             impossible: vec!["joint_2".into()],
             validate: JointMap::from([(
                 "joint_1".into(),
