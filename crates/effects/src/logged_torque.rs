@@ -30,7 +30,11 @@ impl EffectKind for TimeDelay {
         QUICK_REVERSALS
     }
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
-        format!("The torque of {} is stamped {:.2} ms late.", found.joints(), 1e3 * LATE.value(found))
+        let (joints, late_ms) = (found.joints(), 1e3 * LATE.value(found));
+        match late_ms < 0.0 {
+            true => format!("The torque of {joints} acts {:.2} ms after it is logged.", -late_ms),
+            false => format!("The torque of {joints} is stamped {late_ms:.2} ms late."),
+        }
     }
     /// A torque that is logged before it acts is a command, and its motor is late. One that is logged after
     /// it has acted is late in the log alone: nothing in a simulator's robot does that.

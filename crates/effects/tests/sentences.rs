@@ -106,6 +106,16 @@ fn each_kind_says_its_sentence() {
     }
 }
 
+/// It was "stamped -9.24 ms late".
+#[test]
+fn a_torque_that_is_logged_before_it_acts_is_said_to_be() {
+    let tree = read_urdf(ARM, &UrdfOptions::default()).unwrap().tree;
+    let catalogue = Catalogue::default();
+    let effect = catalogue.build(&EffectSpec::new("time_delay", &["shoulder"]), &tree).unwrap();
+    let words = catalogue.sentence(&effect.spec(), &effect.parameters(), &[-0.00924]);
+    assert_eq!(words, "The torque of shoulder acts 9.24 ms after it is logged.");
+}
+
 #[test]
 fn each_sentence_is_one() {
     let tree = read_urdf(ARM, &UrdfOptions::default()).unwrap().tree;
