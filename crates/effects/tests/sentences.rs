@@ -2,7 +2,7 @@
 
 use phiw_dynamics::Tree;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
-use phiw_effects::{Catalogue, EffectKind, JointRange, SignalRanges};
+use phiw_effects::{Catalogue, Constants, EffectKind, JointRange, SignalRanges};
 use phiw_identification::EffectSpec;
 use phiw_identification::effect::EffectParameter;
 
@@ -111,7 +111,7 @@ fn each_kind_says_its_sentence() {
 fn a_torque_that_is_logged_before_it_acts_is_said_to_be() {
     let tree = read_urdf(ARM, &UrdfOptions::default()).unwrap().tree;
     let catalogue = Catalogue::default();
-    let effect = catalogue.build(&EffectSpec::new("time_delay", &["shoulder"]), &tree).unwrap();
+    let effect = catalogue.kind("time_delay").unwrap().build(&tree, &[0], &Constants::new());
     let words = catalogue.sentence(&effect.spec(), &effect.parameters(), &[-0.00924]);
     assert_eq!(words, "The torque of shoulder acts 9.24 ms after it is logged.");
 }
