@@ -113,8 +113,8 @@ impl Profile<'_> {
         Some(Point { x, w, modes, cost })
     }
 
-    /// Damped Newton steps from `x`, which is inside, `most_steps` of them at most. `curvature` is that of the
-    /// log-determinants, which changes slowly: it is found anew where it is old, and left for the next time.
+    /// Damped Newton steps from `x`, which is inside, `most_steps` of them at most. `curvature` is that of
+    /// the log-determinants, which changes slowly: it is found anew where it is old, and kept for the next.
     pub fn minimum(&self, x: Mat<f64>, most_steps: usize, curvature: &mut Curvature) -> Minimum {
         let settings = &self.newton;
         let parameters = self.map.nrows();

@@ -86,8 +86,8 @@ pub struct Consistent {
     pub parameters: Vec<f64>,
     /// Weight of the prior that was chosen.
     pub weight: f64,
-    /// Whether training folds that were left out are foretold better by possible bodies than by least squares.
-    /// Not where the fit is drawn to nothing: that is not compared.
+    /// Whether possible bodies foretell left-out training folds better than least squares does. Not where the
+    /// fit is drawn to nothing: that is not compared.
     pub foretells_better: bool,
     /// What the objective can be above the optimum, in nats of independent samples.
     pub gap: f64,

@@ -99,7 +99,7 @@ fn a_robot_without_masses_gets_bodies_that_can_exist() {
     let tree: Tree = synthetic::tree();
     let possible = model.consistent_tree(&tree).unwrap();
     assert_eq!(impossible_bodies(&possible.inertial_parameters()), [0; 0]);
-    // What least squares leaves open on so little motion, possible bodies foretell better: they are the model.
+    // Of so little motion possible bodies foretell more than least squares: they are the model.
     assert!(cost.is_model && said("the model has the possible ones"), "{:?}", report.warnings);
     assert_eq!(model.identified_tree(&tree).unwrap().inertial_parameters(), possible.inertial_parameters());
 }

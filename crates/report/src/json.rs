@@ -336,7 +336,7 @@ pub struct ConsistencyJson {
     pub gap: f64,
     /// Whether that is next to nothing.
     pub certified: bool,
-    /// Whether the model is this fit: it foretells training motion that is left out better than least squares.
+    /// Whether the model is this fit: it foretells left-out training motion better than least squares.
     #[serde(default)]
     pub is_model: bool,
     /// Bodies, by their joints, that least squares has made impossible.
