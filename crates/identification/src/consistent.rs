@@ -8,6 +8,7 @@ use crate::accumulate::accumulate;
 use crate::effect::QuadraticForm;
 use crate::fit::{Fit, TorqueError, merge, torque_error};
 use crate::mirrored::mirror_map;
+use crate::model::with_masses;
 use crate::{Data, Design, IdentificationError, Identified};
 pub use phiw_consistency::Ellipsoid;
 use phiw_consistency::{
@@ -99,6 +100,8 @@ pub struct Consistent {
     pub train: TorqueError,
     /// Error on the folds held out.
     pub held_out: TorqueError,
+    /// Bodies of the tree that no distribution of mass has as least squares makes them.
+    pub impossible_by_least_squares: Vec<usize>,
 }
 
 impl Identified {
@@ -171,7 +174,10 @@ pub fn consistent(
     let all = Factor::merge_all(&blocks)?;
     let solution = columns.with_data(posed, &all)?.solve(weight, &settings.solver)?;
     let parameters = columns.parameters(&solution);
+    let base = design.base();
+    let by_least_squares = base.to_standard(&fit.parameters[..base.count()], &with_masses(design.tree()))?;
     Ok(Consistent {
+        impossible_by_least_squares: impossible_bodies(&by_least_squares),
         train: torque_error(train_folds, &parameters)?,
         held_out: torque_error(held_out_folds, &parameters)?,
         standard: solution.standard,

@@ -10,6 +10,7 @@ pub mod effect;
 pub mod model;
 
 mod accumulate;
+mod consistent_model;
 mod conventions;
 mod covariance;
 mod drawn;

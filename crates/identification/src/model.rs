@@ -1,7 +1,7 @@
 //! An identified model: rigid body, effects, and the data of the fit; written to `model.json` and read back.
 
 use crate::checks::check_size_of_robot;
-use crate::consistent::Consistent;
+pub use crate::consistent_model::ConsistentModel;
 use crate::covariance::Covariance;
 use crate::effect::{EffectError, EffectSelector};
 use crate::factor_rows::FactorRows;
@@ -10,7 +10,6 @@ pub use crate::model_sources::{BaseMap, DataFingerprint, DataRole};
 use crate::reference::ReferenceModel;
 use crate::{Design, Effect, EffectCatalogue, EffectSpec, IdentificationError};
 use phiw_dynamics::Tree;
-use phiw_dynamics::check::check_size;
 use phiw_dynamics::inertia::{PARAMETER_NAMES, PARAMETERS_PER_BODY};
 use phiw_limits::Limits;
 use phiw_regressor::BaseParameters;
@@ -78,19 +77,6 @@ pub struct Model {
     /// The same fit over bodies that can exist: what a simulator or a controller should be given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub consistent: Option<ConsistentModel>,
-}
-
-/// Parameters of bodies that can exist, and of effects within their bounds.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ConsistentModel {
-    /// Weight of the URDF's bodies, in nats of independent samples.
-    pub prior_weight: f64,
-    /// How far the objective can be above its optimum, in the same unit.
-    pub gap: f64,
-    /// Standard parameters of each body, all possible.
-    pub bodies: Vec<BodyParameters>,
-    /// Parameters of each effect of [`Model::effects`], in its order.
-    pub effects: Vec<Vec<f64>>,
 }
 
 /// A parameter with its standard deviation.
@@ -219,42 +205,6 @@ impl Model {
     /// The same with its error on the logs that were held out.
     pub fn with_held_out_rmse(self, rmse: &[f64]) -> Self {
         Model { held_out_rmse: Some(rmse.to_vec()), ..self }
-    }
-
-    /// The same with the fit over possible bodies beside it. Where that is the model's own
-    /// ([`Identified::with_possible`](crate::Identified::with_possible)), its bodies are these, too.
-    ///
-    /// # Errors
-    /// It is not of this design.
-    pub fn with_consistent(
-        mut self,
-        design: &Design,
-        consistent: &Consistent,
-    ) -> Result<Self, IdentificationError> {
-        check_size(
-            "standard parameters",
-            consistent.standard.len(),
-            PARAMETERS_PER_BODY * self.bodies.len(),
-        )?;
-        check_size("parameters", consistent.parameters.len(), design.parameter_count())?;
-        let bodies = self.bodies.iter().zip(consistent.standard.as_chunks().0);
-        let effects = 0..design.effects().len();
-        self.consistent = Some(ConsistentModel {
-            prior_weight: consistent.weight,
-            gap: consistent.gap,
-            bodies: bodies
-                .map(|(body, inertial)| BodyParameters { joint: body.joint.clone(), inertial: *inertial })
-                .collect(),
-            effects: effects
-                .map(|effect| consistent.parameters[design.effect_parameters(effect)].to_vec())
-                .collect(),
-        });
-        if consistent.foretells_better
-            && let Some(possible) = &self.consistent
-        {
-            self.bodies.clone_from(&possible.bodies);
-        }
-        Ok(self)
     }
 
     /// Whether the numbers of a file can be a model's: finite, of a size that squares can be taken of,
@@ -419,28 +369,7 @@ impl Model {
         self.left_out_std.as_ref().unwrap_or(&self.residual_std)[torque]
     }
 
-    /// The tree with bodies that can exist; with the least-squares ones where the model has no others.
-    ///
-    /// # Errors
-    /// The tree has other bodies.
-    pub fn consistent_tree(&self, tree: &Tree) -> Result<Tree, IdentificationError> {
-        let Some(consistent) = &self.consistent else { return self.identified_tree(tree) };
-        let parameters: Vec<f64> = consistent.bodies.iter().flat_map(|body| body.inertial).collect();
-        let mut possible = tree.clone();
-        possible.set_inertial_parameters(&parameters)?;
-        Ok(possible)
-    }
-
-    /// Value of the k-th parameter of an effect that belongs to the possible bodies; the least-squares one
-    /// where the model has no others.
-    pub fn consistent_effect(&self, effect: usize, parameter: usize) -> Option<f64> {
-        match &self.consistent {
-            Some(consistent) => consistent.effects.get(effect)?.get(parameter).copied(),
-            None => Some(self.effects.get(effect)?.parameters.get(parameter)?.value),
-        }
-    }
-
-    /// The tree with the model's standard parameters, as least squares has found them.
+    /// The tree with the model's standard parameters.
     ///
     /// # Errors
     /// The tree has other bodies.

@@ -37,9 +37,8 @@ struct Start {
     specs: Vec<EffectSpec>,
     parameters: Vec<f64>,
     held: Option<HeldModel>,
-    /// Error of the model on the training folds and on those held out, once its bodies are settled; none of
-    /// a held model.
-    errors: Option<(TorqueError, TorqueError)>,
+    /// The declared model; none where one is held.
+    declared: Option<Identified>,
 }
 
 /// Identifies the declared model (or takes the held one), traces its residual, and writes the grown model
@@ -97,7 +96,7 @@ fn results_knowing(
     };
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
-    let Traced { start, floor, mut tracing } = traced(arguments, &excluded, &session, &data)?;
+    let Traced { start, declared, floor, mut tracing } = traced(arguments, &excluded, &session, &data)?;
     if let Some(corner_hz) = low_passed_in_band(arguments, &session, &tracing) {
         let corner = significant(corner_hz, 3);
         let warning = format!(
@@ -129,13 +128,15 @@ fn results_knowing(
 
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
-    let possible = match &arguments.model {
-        None => {
-            let (settled, possible) = PossibleBodies::settle(&session, tracing.model, Some(&data))?;
-            tracing.model = settled;
+    let possible = match declared {
+        Some(declared) => {
+            let (before, _) = PossibleBodies::settle(&session, declared, Some(&data))?;
+            tracing.before = (before.train, before.held_out);
+            let (after, possible) = PossibleBodies::settle(&session, tracing.model, Some(&data))?;
+            tracing.model = after;
             possible
         }
-        Some(_) => PossibleBodies::beside_held(&session, &tracing.model)?,
+        None => PossibleBodies::beside_held(&session, &tracing.model)?,
     };
     let mut analysis =
         Analysis::new(&session, Rows::Logs(&data), &tracing.model, possible, None)?.with_bandwidth(bandwidth);
@@ -215,9 +216,10 @@ pub fn command_line(arguments: &ExplainArguments) -> String {
     line
 }
 
-/// A model to start from, the noise floor, and what was traced.
+/// A model to start from, the declared one where none is held, the noise floor, and what was traced.
 struct Traced {
     start: Model,
+    declared: Option<Identified>,
     floor: Vec<f64>,
     tracing: Tracing,
 }
@@ -253,11 +255,8 @@ fn traced(
     };
     let mut options = TraceOptions { excluded, ..TraceOptions::default() };
     options.thresholds = thresholds(arguments)?;
-    let mut tracing = trace(input, &options)?;
-    if let Some(errors) = start.errors {
-        tracing.before = errors;
-    }
-    Ok(Traced { start: start.model, floor, tracing })
+    let tracing = trace(input, &options)?;
+    Ok(Traced { start: start.model, declared: start.declared, floor, tracing })
 }
 
 /// The thresholds that are asked for, or else their defaults.
@@ -299,15 +298,13 @@ fn start(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Re
             .map_err(|error| session.of_training_logs(error))?;
         session.joints_without_held_out_motion(&identified.held_out_folds)?;
         let Identified { design, fit, .. } = &identified;
-        let start = Start {
+        return Ok(Start {
             model: Model::of_fit(design, fit, &session.declared, &session.held, cutoffs)?,
             specs: design.effects().iter().map(|effect| effect.spec()).collect(),
             parameters: fit.parameters.clone(),
             held: None,
-            errors: None,
-        };
-        let (identified, _) = PossibleBodies::settle(session, identified, Some(data))?;
-        return Ok(Start { errors: Some((identified.train, identified.held_out)), ..start });
+            declared: Some(identified),
+        });
     };
     let file = ModelFile::given(session.arguments.in_memory.model.as_ref(), path)?;
     let (design, parameters) = file.design(&session.arguments.urdf, &session.tree, &session.catalogue)?;
@@ -320,7 +317,7 @@ fn start(arguments: &ExplainArguments, session: &Session, data: &Data<'_>) -> Re
         left: model.left(),
     };
     let specs = design.effects().iter().map(|effect| effect.spec()).collect();
-    Ok(Start { model, specs, parameters, held: Some(held), errors: None })
+    Ok(Start { model, specs, parameters, held: Some(held), declared: None })
 }
 
 fn verdict(verdict: trace::Verdict) -> Verdict {

@@ -5,11 +5,9 @@ use crate::page::counted;
 use crate::report_json::by_joint;
 use crate::session::Session;
 use crate::{Error, extents};
-use phiw_identification::consistent::{
-    Consistent, ConsistentSettings, Ellipsoid, Known, consistent, impossible_bodies,
-};
+use phiw_identification::consistent::{Consistent, ConsistentSettings, Ellipsoid, Known, consistent};
 use phiw_identification::fitting::{Fit, TorqueError};
-use phiw_identification::{Data, Identified, Model};
+use phiw_identification::{Data, Identified};
 use phiw_report::json::{ConsistencyJson, OfBothFits};
 use phiw_report::number::percent;
 
@@ -58,11 +56,9 @@ impl PossibleBodies {
         let settings = ConsistentSettings { known, ..ConsistentSettings::default() };
         let Identified { design, fit, train_folds, held_out_folds, .. } = identified;
         let consistent = consistent(design, fit, train_folds, held_out_folds, &settings)?;
-        let model = Model::of_fit(design, fit, &[], &[], (0.0, 0.0))?;
-        let standard: Vec<f64> = model.bodies.iter().flat_map(|body| body.inertial).collect();
-        let bodies = impossible_bodies(&standard).into_iter();
+        let joint = |&body: &usize| design.tree().bodies()[body].joint.clone();
         Ok(PossibleBodies {
-            impossible: bodies.map(|body| model.bodies[body].joint.clone()).collect(),
+            impossible: consistent.impossible_by_least_squares.iter().map(joint).collect(),
             least_squares: identified.held_out.clone(),
             consistent,
             unknown_extents,
