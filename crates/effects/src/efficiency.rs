@@ -30,6 +30,9 @@ impl EffectKind for DriveEfficiency {
     fn name(&self) -> &str {
         "drive_efficiency"
     }
+    fn special_case(&self) -> Option<&'static str> {
+        Some("load_dependent_friction")
+    }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         let widths: Vec<Constants> = few_sign_widths(site[0], ranges).into_iter().step_by(2).collect();
         product(&values(PART, [DRIVING, DRIVEN, BOTH]), &widths)

@@ -93,6 +93,9 @@ impl EffectKind for Asymmetric {
     fn name(&self) -> &str {
         "asymmetric_friction"
     }
+    fn special_case(&self) -> Option<&'static str> {
+        Some("torque_offset")
+    }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         let widths = few_sign_widths(site[0], ranges);
         let mut variants = values("part", [0.0]);

@@ -163,6 +163,13 @@ pub trait EffectKind: Send + Sync {
         false
     }
 
+    /// The kind on the same joint, with fewer numbers, of which every torque is one that this kind makes, too:
+    /// a spring whose rest is far away is an offset. This one gives way to it where it is not worth a name
+    /// beside it.
+    fn special_case(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Whether it is what the drive or the logger does to a torque before it is written down, and nothing
     /// that the robot does: it refines a model, but never has a name.
     fn is_of_the_log(&self) -> bool {

@@ -16,6 +16,9 @@ impl EffectKind for JointSpring {
     fn name(&self) -> &str {
         "joint_spring"
     }
+    fn special_case(&self) -> Option<&'static str> {
+        Some("torque_offset")
+    }
     fn telling_motion(&self) -> &'static str {
         "slow motion over the whole range of the joint"
     }

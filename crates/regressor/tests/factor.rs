@@ -143,6 +143,16 @@ proptest! {
 }
 
 #[test]
+fn a_column_of_rounding_alone_is_undetermined() {
+    // The torque of a vertical force about a vertical axis, beside that of a horizontal one.
+    let row = |k: f64| [1e-16 * (13.0 * k * k).sin(), k.sin(), 0.3 * k.sin() + 1e-3 * k.cos()];
+    let rows: Vec<f64> = (0..40).flat_map(|k| row(f64::from(k))).collect();
+    let factor = Factor::of_rows(3, &rows).unwrap();
+    assert_eq!(factor.undetermined_columns(), [0]);
+    assert!(factor.solve().is_err());
+}
+
+#[test]
 fn dependent_columns_are_named_whatever_comes_before_them() {
     // Columns: zero, x, 2x, y, x + y, right-hand side.
     let row = |x: f64, y: f64| [0.0, x, 2.0 * x, y, x + y, 3.0 * x - y];

@@ -15,6 +15,6 @@ mod triangle;
 
 pub use builder::FactorBuilder;
 pub use leave_one_out::leave_one_out;
-pub use queries::Solution;
+pub use queries::{ROUNDING, Solution};
 pub use substitution::{solve_lower, solve_upper};
 pub use triangle::Factor;

@@ -9,6 +9,9 @@ use phiw_dynamics::dense::dot;
 /// A column whose part orthogonal to the columns before it is smaller than this share of its norm is
 /// undetermined.
 const RANK_TOLERANCE: f64 = 1e-7;
+/// A column smaller than this share of the largest is nothing but rounding: the torque of a force along an
+/// axis about which its joint does not turn.
+pub const ROUNDING: f64 = 1e-13;
 
 /// A least-squares solution (paper, equation 4).
 #[derive(Clone, Debug, PartialEq)]
@@ -35,11 +38,15 @@ impl Solution {
 }
 
 impl Factor {
-    /// The columns of Φ that the rows do not determine: those that depend on the columns before them.
+    /// The columns of Φ that the rows do not determine: those that depend on the columns before them, and
+    /// those that are rounding beside the largest ([`ROUNDING`]).
     pub fn undetermined_columns(&self) -> Vec<usize> {
         let size = self.parameters();
         let norms: Vec<f64> = (0..size).map(|column| self.column_norm(column)).collect();
-        if (0..size).all(|column| self.entry(column, column).abs() > RANK_TOLERANCE * norms[column]) {
+        let least = ROUNDING * norms.iter().copied().fold(0.0, f64::max);
+        let is_new =
+            |column: usize, left: f64| left > RANK_TOLERANCE * norms[column] && norms[column] >= least;
+        if (0..size).all(|column| is_new(column, self.entry(column, column).abs())) {
             return Vec::new();
         }
         // A dependent column shifts the diagonal of those after it: orthogonalise the columns one by one.
@@ -54,7 +61,7 @@ impl Factor {
                 }
             }
             let norm = dot(&rest, &rest).sqrt();
-            if norm > RANK_TOLERANCE * norms[column] {
+            if is_new(column, norm) {
                 rest.iter_mut().for_each(|value| *value /= norm);
                 basis.push(rest);
             } else {

@@ -1,6 +1,6 @@
 //! Scalar products of columns: what is left of the rows of one torque.
 
-use phiw_regressor::factor::Factor;
+use phiw_regressor::factor::{Factor, ROUNDING};
 
 /// ΦᵀΦ of some columns, the right-hand side as the last of them.
 ///
@@ -21,13 +21,24 @@ impl Products {
         Products { size, values: vec![0.0; size * size], rows: 0.0 }
     }
 
-    /// RᵀR. The factor of few rows has as few that are not zero.
+    /// RᵀR. The factor of few rows has as few that are not zero. Columns of which there is nothing but what
+    /// rounding makes beside the largest are zero.
     pub fn of_factor(factor: &Factor) -> Self {
         let size = factor.columns();
         let rows = usize::try_from(factor.rows()).map_or(size, |rows| rows.min(size));
         let r = factor.as_mat().subrows(0, rows);
         let product = r.transpose() * r;
-        let values = (0..size).flat_map(|column| product.col_as_slice(column).to_vec()).collect();
+        let mut values: Vec<f64> =
+            (0..size).flat_map(|column| product.col_as_slice(column).to_vec()).collect();
+        let parameters = 0..factor.parameters();
+        let largest = parameters.clone().map(|column| product[(column, column)]).fold(0.0, f64::max);
+        let least = ROUNDING * ROUNDING * largest;
+        for column in parameters.filter(|&column| product[(column, column)] < least) {
+            (0..size).for_each(|other| {
+                values[column * size + other] = 0.0;
+                values[other * size + column] = 0.0;
+            });
+        }
         Products { size, values, rows: factor.rows() as f64 }
     }
 
@@ -84,5 +95,22 @@ impl Products {
     pub fn score(&self, column: usize, w: &[(usize, f64)]) -> f64 {
         let products = self.column(column);
         products[self.size - 1] - w.iter().map(|&(other, value)| products[other] * value).sum::<f64>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Products;
+    use phiw_regressor::factor::Factor;
+
+    /// An external force named a moment of 10¹⁷ N·m: its column was rounding, and followed the noise.
+    #[test]
+    fn a_column_of_rounding_alone_explains_nothing() {
+        let row = |k: f64| [k.sin(), 1e-16 * (13.0 * k * k).sin(), (13.0 * k * k).sin()];
+        let rows: Vec<f64> = (0..40).flat_map(|k| row(f64::from(k))).collect();
+        let products = Products::of_factor(&Factor::of_rows(3, &rows).unwrap());
+        assert_eq!(products.column(1), [0.0; 3]);
+        assert!(products.column(0).iter().zip([1, 0, 1]).all(|(value, some)| (*value != 0.0) == (some == 1)));
+        assert!(products.right_hand_side() > 1.0);
     }
 }

@@ -265,7 +265,7 @@ impl Search<'_> {
     /// Whether a form of something simpler is worth a name of its own: it must take away most of what the
     /// simpler ones leave, be a share of the torque, and be large beside what it is a form of or leave next
     /// to nothing.
-    fn is_form_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
+    pub(super) fn is_form_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
         let hypothesis = &trial.problem.hypotheses[member.hypothesis];
         hypothesis.torques.iter().any(|&torque| {
             let whole = trial.torque(torque).right_hand_side().max(f64::MIN_POSITIVE);

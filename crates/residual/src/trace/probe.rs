@@ -8,7 +8,7 @@ use crate::selection::students_tail;
 use phiw_effects::SignalRanges;
 use phiw_identification::{EffectSpec, IdentificationError};
 use phiw_regressor::RegressorError;
-use phiw_regressor::factor::{Factor, FactorBuilder};
+use phiw_regressor::factor::{Factor, FactorBuilder, ROUNDING};
 use phiw_regressor::least_squares::GroupedFactor;
 use rayon::prelude::*;
 
@@ -224,13 +224,15 @@ fn drawn_to_nothing(factor: &Factor, known: &Factor, added: usize) -> Result<Vec
     let both = builder.factor();
     let norms: Vec<f64> = (0..count).map(|column| both.column_norm(column)).collect();
     let largest = norms[count - added..].iter().copied().fold(0.0, f64::max);
+    let heaviest = norms.iter().copied().fold(0.0, f64::max);
+    let otherwise = if heaviest > 0.0 { heaviest } else { 1.0 };
     for column in 0..count {
         let weight = match column < count - added {
             true => DRAWN_MODEL.sqrt() * norms[column],
             false => DRAWN.sqrt() * largest,
         };
-        // Without rows any weight makes a parameter nothing.
-        let weight = if weight > 0.0 { weight } else { 1.0 };
+        // Where the rows say nothing of a parameter any weight makes it nothing.
+        let weight = if weight > ROUNDING * heaviest { weight } else { otherwise };
         let mut row = vec![0.0; count + 1];
         row[column] = weight;
         builder.push_row(&row)?;

@@ -135,6 +135,7 @@ impl Search<'_> {
         self.ask_of_logs()?;
         self.take_back()?;
         self.prefer_simpler_forms()?;
+        self.prefer_special_cases()?;
         Ok(self)
     }
 
@@ -287,7 +288,7 @@ impl Search<'_> {
     }
 
     /// Puts another effect, with its parameters at nothing, in the place of one.
-    fn replace(&mut self, place: usize, spec: EffectSpec) -> Result<(), IdentificationError> {
+    pub(super) fn replace(&mut self, place: usize, spec: EffectSpec) -> Result<(), IdentificationError> {
         let own = self.design()?.effect_parameters(place);
         self.specs[place] = spec;
         let count = self
