@@ -44,6 +44,8 @@ enum Task {
     Coverage(coverage::Arguments),
     /// Robot logs with effects that nobody declared: generate, trace with `phiw explain`, score.
     Undeclared(undeclared::Arguments),
+    /// Effects added to the torques of measured logs: traced with `phiw explain`, scored.
+    Added(added::Arguments),
     /// The experiments of the paper's section 5, resumable, on one machine or many.
     Paper(paper::Arguments),
     /// The curriculum on a robot whose noise nobody knows: estimators, sensors and noises compared.
@@ -74,6 +76,7 @@ fn main() -> anyhow::Result<ExitCode> {
         Task::Consistent(arguments) => consistent::command(&arguments),
         Task::Conventions(arguments) => conventions::command(&arguments),
         Task::Coverage(arguments) => coverage::command(&arguments),
+        Task::Added(arguments) => added::command(&arguments),
         Task::Undeclared(arguments) => undeclared::command(&arguments),
     };
     done.map(|()| ExitCode::SUCCESS)

@@ -11,6 +11,7 @@
 //! | [`paper`] | do the results of the paper's section 5 come out, with balance and undeclared effects as well? |
 //! | [`noise`] | what does the curriculum learn from a robot whose noise nobody knows? |
 //! | [`undeclared`] | which undeclared effects does `phiw explain` find in logs, and what does it invent? |
+//! | [`added`] | does it find an effect that was added to the torques of a real robot? |
 //! | [`plant`] | does it find them in the closed loop of a physics engine, tracked poorly? |
 //! | [`retarget`] | how fast and how close is retargeting, over whole databases and against others? |
 //! | [`oracle`] | do dynamics, C3D reader and exported files agree with Pinocchio, ezc3d and MuJoCo? |
@@ -22,6 +23,7 @@
 //!
 //! Unlike the library crates, experiments print, and write where they are told.
 
+pub mod added;
 pub mod consistent;
 pub mod conventions;
 pub mod coverage;
