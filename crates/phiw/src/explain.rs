@@ -156,7 +156,7 @@ fn results_knowing(
     }));
     analysis.warnings.extend(refuted::sentences(&tracing.withdrawn));
     if tracing.held_out_had_a_say {
-        analysis.warnings.push(HELD_OUT_HAD_A_SAY.to_owned());
+        analysis.warnings.push(held_out_had_a_say(&tracing.left_out_by_held_out));
     }
     let reproduction = HeldOutReproduction::of(&analysis)?;
     analysis.warnings.extend(reproduction.warnings());
@@ -180,9 +180,23 @@ fn results_knowing(
 }
 
 /// What is said where motion held out decided what is in the model.
-const HELD_OUT_HAD_A_SAY: &str = "of what the training logs alone would have chosen, something made the error on \
-     the motion held out larger and was left out: the error after is not blind, and training logs with more kinds \
-     of motion would help";
+fn held_out_had_a_say(left_out: &[EffectSpec]) -> String {
+    let mut named: Vec<String> =
+        left_out.iter().map(|spec| format!("{} of {}", spec.kind, spec.joints.join("+"))).collect();
+    let more = named.len().saturating_sub(MOST_LEFT_OUT);
+    named.truncate(MOST_LEFT_OUT);
+    if more > 0 {
+        named.push(format!("{more} more"));
+    }
+    let named = if named.is_empty() { String::new() } else { format!(" ({})", named.join(", ")) };
+    format!(
+        "of what the training logs alone would have chosen, something made the error on the motion held out larger \
+         and was left out{named}: the error after is not blind, and training logs with more kinds of motion would help"
+    )
+}
+
+/// Effects that are named of those that were left out.
+const MOST_LEFT_OUT: usize = 6;
 
 /// The corner of the filter that the torque went through before it was logged \[Hz\], if that is below the
 /// cut-off of columns and torque and nobody asked for this one.

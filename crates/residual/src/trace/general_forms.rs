@@ -117,8 +117,7 @@ impl Search<'_> {
     fn is_done_by_special_case(&self, place: usize, other: &Search<'_>) -> Result<bool, IdentificationError> {
         let beside = self.beside(place, other)?;
         Ok(beside.is_some_and(|(own, member, squares)| {
-            !self.is_seen_or_absorbed(&own, member, &squares).0
-                && !self.is_form_material(&own, member, &squares)
+            !self.is_material(&own, member, &squares) && !self.is_form_material(&own, member, &squares)
         }))
     }
 

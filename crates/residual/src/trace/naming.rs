@@ -52,6 +52,7 @@ impl Search<'_> {
             if harmful.is_empty() {
                 harmful = self.misleading(&trial).into_iter().collect();
                 self.held_out_had_a_say |= !harmful.is_empty();
+                self.left_out_by_held_out.extend(harmful.iter().map(|&place| self.specs[place].clone()));
             }
             if harmful.is_empty() {
                 break trial;
@@ -310,7 +311,7 @@ impl Search<'_> {
     /// It must take away a share of the residual of a torque that it acts on, and be a share of that torque.
     /// Where the other parameters have taken up most of it, it is to be seen on any torque, and must be a
     /// share of its torque by itself.
-    fn is_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
+    pub(super) fn is_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
         let (seen, absorbed) = self.is_seen_or_absorbed(trial, member, squares);
         seen || absorbed
     }

@@ -47,6 +47,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         refuted: Vec::new(),
         uncertain: Vec::new(),
         held_out_had_a_say: false,
+        left_out_by_held_out: Vec::new(),
         input: &input,
         options,
     };
@@ -102,6 +103,8 @@ pub(super) struct Search<'a> {
     pub uncertain: Vec<(String, Vec<String>)>,
     /// Whether motion held out had a say.
     pub held_out_had_a_say: bool,
+    /// What was left out for that.
+    pub left_out_by_held_out: Vec<EffectSpec>,
     pub input: &'a TraceInput<'a>,
     pub options: &'a TraceOptions,
 }

@@ -135,6 +135,8 @@ pub struct Tracing {
     /// Whether motion held out had a say: of what training motion alone would have chosen, something made the
     /// error there larger.
     pub held_out_had_a_say: bool,
+    /// What was left out for that.
+    pub left_out_by_held_out: Vec<EffectSpec>,
     /// Kinds and joints of which some constants could not be judged, since their columns are not finite on
     /// these logs.
     pub not_judged: Vec<(String, Vec<String>)>,

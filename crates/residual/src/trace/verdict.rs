@@ -27,8 +27,13 @@ impl Search<'_> {
         if self.is_no_worse_than_declared(&tracing) || !tracing.withdrawn.is_empty() {
             return Ok(tracing);
         }
+        let blind = tracing.specs;
         let tracing = self.with_a_say_of_what_is_held_out(before, most)?;
-        Ok(Tracing { held_out_had_a_say: true, ..tracing })
+        let is_in = |spec: &EffectSpec| {
+            tracing.specs.iter().any(|other| other.kind == spec.kind && other.joints == spec.joints)
+        };
+        let left_out_by_held_out = blind.into_iter().filter(|spec| !is_in(spec)).collect();
+        Ok(Tracing { held_out_had_a_say: true, left_out_by_held_out, ..tracing })
     }
 
     /// Whether the model's error on motion held out is no worse than the declared one's, of all torques
@@ -158,6 +163,7 @@ impl Search<'_> {
             refinements,
             remaining,
             held_out_had_a_say: self.held_out_had_a_say,
+            left_out_by_held_out: self.left_out_by_held_out,
             not_judged,
         })
     }
