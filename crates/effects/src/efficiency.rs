@@ -2,7 +2,9 @@
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, product, values};
+use crate::kind::{
+    Constants, EffectKind, Signal, SignalRanges, SpecialCase, around, constant, product, values,
+};
 use crate::sign::{Sign, WIDTH, few_sign_widths};
 use phiw_codegen::{Expression, Function, JointTorque};
 use phiw_dynamics::Tree;
@@ -30,8 +32,8 @@ impl EffectKind for DriveEfficiency {
     fn name(&self) -> &str {
         "drive_efficiency"
     }
-    fn special_case(&self) -> Option<&'static str> {
-        Some("load_dependent_friction")
+    fn special_case(&self) -> Option<SpecialCase> {
+        Some(SpecialCase { kind: "load_dependent_friction", parameter: None })
     }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         let widths: Vec<Constants> = few_sign_widths(site[0], ranges).into_iter().step_by(2).collect();

@@ -2,7 +2,9 @@
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, product, values};
+use crate::kind::{
+    Constants, EffectKind, Signal, SignalRanges, SpecialCase, around, constant, product, values,
+};
 use crate::mechanism::ServoFriction;
 use crate::sign::{POWER, Sign, WIDTH, few_sign_widths, sign_widths, signs_near};
 use phiw_codegen::{Expression, Function, JointTorque};
@@ -93,8 +95,8 @@ impl EffectKind for Asymmetric {
     fn name(&self) -> &str {
         "asymmetric_friction"
     }
-    fn special_case(&self) -> Option<&'static str> {
-        Some("torque_offset")
+    fn special_case(&self) -> Option<SpecialCase> {
+        Some(SpecialCase { kind: "torque_offset", parameter: Some("fc_difference") })
     }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         let widths = few_sign_widths(site[0], ranges);

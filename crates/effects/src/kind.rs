@@ -166,7 +166,7 @@ pub trait EffectKind: Send + Sync {
     /// The kind on the same joint, with fewer numbers, of which every torque is one that this kind makes, too:
     /// a spring whose rest is far away is an offset. This one gives way to it where it is not worth a name
     /// beside it.
-    fn special_case(&self) -> Option<&'static str> {
+    fn special_case(&self) -> Option<SpecialCase> {
         None
     }
 
@@ -190,6 +190,15 @@ pub trait EffectKind: Send + Sync {
 
     /// Builds it. `site` is one that it accepts; constants that are missing take their defaults.
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect>;
+}
+
+/// A simpler kind that another one includes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SpecialCase {
+    /// Its name.
+    pub kind: &'static str,
+    /// The parameter of the other one that makes the same torque by itself, if one does.
+    pub parameter: Option<&'static str>,
 }
 
 /// Ranges of the signals of one joint over the training logs.

@@ -2,7 +2,7 @@
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant, product, values};
+use crate::kind::{Constants, EffectKind, Signal, SignalRanges, SpecialCase, constant, product, values};
 use crate::mechanism::{Mechanism, Mechanisms};
 use phiw_codegen::{Expression, Function, JointTorque};
 use phiw_dynamics::{JointType, Tree};
@@ -16,8 +16,8 @@ impl EffectKind for JointSpring {
     fn name(&self) -> &str {
         "joint_spring"
     }
-    fn special_case(&self) -> Option<&'static str> {
-        Some("torque_offset")
+    fn special_case(&self) -> Option<SpecialCase> {
+        Some(SpecialCase { kind: "torque_offset", parameter: Some("k_q0") })
     }
     fn telling_motion(&self) -> &'static str {
         "slow motion over the whole range of the joint"

@@ -67,7 +67,8 @@ impl Search<'_> {
     fn special_case(&self, place: usize) -> Result<Option<EffectSpec>, IdentificationError> {
         let own = &self.specs[place];
         let catalogue = self.fixed.catalogue;
-        let Some(kind) = catalogue.kind(&own.kind)?.special_case() else { return Ok(None) };
+        let Some(special) = catalogue.kind(&own.kind)?.special_case() else { return Ok(None) };
+        let kind = special.kind;
         let special = EffectSpec { kind: kind.to_owned(), joints: own.joints.clone(), ..own.clone() };
         let is_special = |spec: &EffectSpec| spec.kind == special.kind && spec.joints == special.joints;
         let may_not_change = self.fixed.prior.is_some() && self.specs[..self.declared].iter().any(is_special);
@@ -109,16 +110,37 @@ impl Search<'_> {
     /// torques where they are foretold.
     fn is_done_by(&self, place: usize, other: &Search<'_>) -> Result<bool, IdentificationError> {
         let beside = self.beside(place, other)?;
-        Ok(beside.is_some_and(|(own, member, squares)| !self.is_seen_or_absorbed(&own, member, &squares).0))
+        Ok(beside.is_some_and(|(own, member, squares)| {
+            !self.is_seen_or_absorbed(&own, member, &squares, |_| 0.0).0
+        }))
     }
 
     /// The same where the other model has its special case: it is a form of that, and is one still where that
-    /// leaves most of what it takes.
+    /// leaves most of what it takes, or where others have taken up most of what that does not make.
     fn is_done_by_special_case(&self, place: usize, other: &Search<'_>) -> Result<bool, IdentificationError> {
-        let beside = self.beside(place, other)?;
-        Ok(beside.is_some_and(|(own, member, squares)| {
-            !self.is_material(&own, member, &squares) && !self.is_form_material(&own, member, &squares)
-        }))
+        let Some((own, member, squares)) = self.beside(place, other)? else { return Ok(false) };
+        let spec = &self.specs[place];
+        let special = self.fixed.catalogue.kind(&spec.kind)?.special_case();
+        let parameters = self.fixed.build(std::slice::from_ref(spec))?;
+        let parameters = parameters.iter().flat_map(|effect| effect.parameters());
+        let alike =
+            parameters.zip(&own.problem.variant(member).parameters).find_map(|(parameter, &place)| {
+                (Some(parameter.name.as_str()) == special.and_then(|special| special.parameter))
+                    .then_some(place)
+            });
+        // What is left of its torque beside the column that makes the special case.
+        let beyond = |torque: usize| {
+            let (rows, values) = (own.torque(torque), own.values_of(member, torque));
+            let column = alike.and_then(|parameter| own.problem.torques[torque].column(parameter));
+            let along = column.map_or(0.0, |column| {
+                let products = rows.column(column);
+                let along: f64 = values.iter().map(|&(other, value)| products[other] * value).sum();
+                along * along / products[column].max(f64::MIN_POSITIVE)
+            });
+            (rows.size_of(&values) - along).max(0.0)
+        };
+        let (seen, absorbed) = self.is_seen_or_absorbed(&own, member, &squares, beyond);
+        Ok(!seen && !absorbed && !self.is_form_material(&own, member, &squares))
     }
 
     /// The effect at `place` in the model on trial, and what this and another model leave where torques are

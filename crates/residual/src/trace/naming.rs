@@ -312,17 +312,19 @@ impl Search<'_> {
     /// Where the other parameters have taken up most of it, it is to be seen on any torque, and must be a
     /// share of its torque by itself.
     pub(super) fn is_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
-        let (seen, absorbed) = self.is_seen_or_absorbed(trial, member, squares);
+        let own = |torque: usize| trial.torque(torque).size_of(&trial.values_of(member, torque));
+        let (seen, absorbed) = self.is_seen_or_absorbed(trial, member, squares, own);
         seen || absorbed
     }
 
     /// Whether what an effect takes is to be seen on a torque that it acts on; and whether the other
-    /// parameters have taken up most of what it is.
+    /// parameters have taken up most of what it is, which is `own` squares of each torque.
     pub(super) fn is_seen_or_absorbed(
         &self,
         trial: &Trial,
         member: Member,
         squares: &Squares,
+        own: impl Fn(usize) -> f64,
     ) -> (bool, bool) {
         let thresholds = &self.options.thresholds;
         let Squares { initial, without, with } = squares;
@@ -347,7 +349,7 @@ impl Search<'_> {
                 && share >= thresholds.least_share
                 && taken >= thresholds.least_of_others * by_others
                 && (taken / whole).sqrt() >= thresholds.least_size;
-            size = size.max((rows.size_of(&trial.values_of(member, torque)) / whole).sqrt());
+            size = size.max((own(torque) / whole).sqrt());
         }
         (seen, largest_share >= thresholds.least_share && size >= thresholds.least_visible)
     }
