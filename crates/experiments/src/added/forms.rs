@@ -46,6 +46,8 @@ pub struct Scale {
     /// The joint whose motion makes it, where that is another.
     pub other: usize,
     factor: f64,
+    /// RMS of the joint's torque with the effect over the same without it.
+    pub growth: f64,
     /// Lowest, middle (median) and highest position.
     positions: [f64; 3],
     /// RMS of the velocity.
@@ -121,6 +123,7 @@ impl Scale {
             joint,
             other: (joint + 1) % training[0].signals.len(),
             factor: 1.0,
+            growth: 1.0,
             positions: [q[0], q[q.len() / 2], q[q.len() - 1]],
             velocity: rms(&all(|signals| &signals.v)),
             time_constant: 0.35 * longest,
@@ -133,6 +136,12 @@ impl Scale {
                 share * rms(&all(|signals| &signals.torque)) / rms(&added)
             }
         };
+        let with = |log: &MeasuredLog| -> Vec<f64> {
+            let own = &log.signals[joint].torque;
+            own.iter().zip(scale.torque(log, 0.0)).map(|(torque, added)| torque + added).collect()
+        };
+        let with: Vec<f64> = training.iter().flat_map(with).collect();
+        scale.growth = rms(&with) / rms(&all(|signals| &signals.torque));
         scale
     }
 

@@ -14,12 +14,11 @@
 //!
 //! # What it prints
 //!
-//! The names that the robot has as it is. Then, for each effect and joint, what became of it: it is named;
-//! what the formulas of forms.rs call equal to it is; it is among the rivals of a name on its joint, or among
-//! the refinements; it is missed. "Absorbed" is what the declared model takes up, which then leaves less
-//! than the robot leaves as it is (a rotor on an axis whose inertia is free), and what its joint has a name or
-//! a refinement of as it is ("there"): neither counts. Names that neither the robot has as it is nor the
-//! effect brings are listed as "beside".
+//! The names that the robot has as it is. Then, for each effect and joint, what became of it: it is named, or
+//! what forms.rs calls equal to it is; it is among the rivals of a name on its joint, or among the
+//! refinements; it is missed. "Absorbed" is what the declared model takes up (a rotor on an axis whose inertia
+//! is free), and "there" what its joint has as a name or a refinement as it is: neither counts. Names that
+//! neither the robot has as it is nor the effect brings are listed beside.
 //!
 //! # Where results go
 //!
@@ -49,7 +48,7 @@ pub struct Arguments {
     /// Robots, by the names of their folders.
     #[arg(long, value_delimiter = ',', default_value = "tx40,emps")]
     robot: Vec<String>,
-    /// Effects that are declared.
+    /// Effects that are declared; `nothing` for none.
     #[arg(long, value_delimiter = ',', default_value = "viscous_friction,coulomb_friction,rotor_inertia")]
     declare: Vec<String>,
     /// Only these effects.
@@ -193,7 +192,7 @@ impl Tracer<'_> {
         let mut command = Command::new(self.program);
         command.env("RAYON_NUM_THREADS", "1").arg("explain").arg("--urdf").arg(self.urdf);
         command.arg("--train").args(train).arg("--validate").args(validate).arg("--out").arg(out);
-        if !self.declared.is_empty() {
+        if self.declared != ["nothing"] {
             command.args(["--declare", &self.declared.join(",")]);
         }
         let output = command.output().with_context(|| self.program.display().to_string())?;

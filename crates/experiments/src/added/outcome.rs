@@ -67,7 +67,7 @@ pub fn of(as_it_is: &Report, report: &Report, scale: &Scale, joints: &[String]) 
         Outcome::Rival
     } else if report.refinements.iter().any(|effect| on(effect) && is_it(&effect.kind)) {
         Outcome::Refined
-    } else if !is_visible(as_it_is, report) {
+    } else if !is_visible(as_it_is, report, scale, joints) {
         Outcome::Absorbed
     } else {
         Outcome::Missed
@@ -75,15 +75,17 @@ pub fn of(as_it_is: &Report, report: &Report, scale: &Scale, joints: &[String]) 
 }
 
 /// Whether the declared model leaves more of a joint's torque with the effect than without it, by more than
-/// the robot leaves as it is once it is explained.
-fn is_visible(as_it_is: &Report, report: &Report) -> bool {
+/// the robot leaves as it is once it is explained. What is left grows with the torque that it is left of: a
+/// gain makes it larger, and is not seen.
+fn is_visible(as_it_is: &Report, report: &Report, scale: &Scale, joints: &[String]) -> bool {
     let explained = match as_it_is.after.validate.rmse.is_empty() {
         true => &as_it_is.before.validate.rmse,
         false => &as_it_is.after.validate.rmse,
     };
     report.before.validate.rmse.iter().any(|(joint, with)| {
-        let without = as_it_is.before.validate.rmse.get(joint).copied().unwrap_or_default();
-        let left = explained.get(joint).copied().unwrap_or_default();
+        let growth = if *joint == joints[scale.joint] { scale.growth } else { 1.0 };
+        let without = growth * as_it_is.before.validate.rmse.get(joint).copied().unwrap_or_default();
+        let left = growth * explained.get(joint).copied().unwrap_or_default();
         with * with - without * without > left * left
     })
 }
@@ -159,7 +161,7 @@ mod tests {
             (("gravity_balancer", "a"), "joint_spring", "", 2.0, Outcome::Rival),
             (("joint_spring", "b"), "", "joint_spring", 2.0, Outcome::Refined),
             (("joint_spring", "b"), "", "", 1.1, Outcome::Absorbed),
-            (("joint_spring", "b"), "joint_spring", "", 1.2, Outcome::Missed),
+            (("joint_spring", "b"), "joint_spring", "", 2.0, Outcome::Missed),
         ];
         for (effect, rival, refinement, before, expected) in table {
             let with = report(effect, rival, refinement, before, 0.5);

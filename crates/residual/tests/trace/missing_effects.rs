@@ -24,6 +24,19 @@ fn an_offset_is_named() {
     check(|_, torque| torque[0] += 0.7, &[("torque_offset", &["shoulder"])]);
 }
 
+/// A constant torque beside a weak spring was named a spring, whose rest was ten turns away: what the spring
+/// makes beside a constant is worth no name.
+#[test]
+fn an_offset_beside_a_weak_spring_is_an_offset() {
+    for (offset, stiffness, expected) in
+        [(3.0, 0.03, "torque_offset"), (3.0, 1.2, "joint_spring"), (0.0, 1.2, "joint_spring")]
+    {
+        let tracing = traced(11, &|state, torque| torque[1] += offset + stiffness * state.q[1]);
+        let expected = [(expected.to_owned(), vec!["elbow".to_owned()])];
+        assert_eq!(named(&tracing), expected, "{offset} N·m, {stiffness} N·m/rad");
+    }
+}
+
 #[test]
 fn stribeck_friction_is_named() {
     let stribeck = |state: &State<'_>, torque: &mut [f64]| {
