@@ -163,9 +163,9 @@ pub trait EffectKind: Send + Sync {
         false
     }
 
-    /// The kind on the same joint, with fewer numbers, of which every torque is one that this kind makes, too:
-    /// a spring whose rest is far away is an offset. This one gives way to it where it is not worth a name
-    /// beside it.
+    /// The kind on the same joint, with fewer numbers, of which every torque is one that this kind makes,
+    /// too: a spring whose rest is far away is an offset. This one gives way to it where it is not worth a
+    /// name beside it.
     fn special_case(&self) -> Option<SpecialCase> {
         None
     }

@@ -16,9 +16,9 @@
 //!
 //! The names that the robot has as it is. Then, for each effect and joint, what became of it: it is named, or
 //! what forms.rs calls equal to it is; it is among the rivals of a name on its joint, or among the
-//! refinements; it is missed. "Absorbed" is what the declared model takes up (a rotor on an axis whose inertia
-//! is free), and "there" what its joint has as a name or a refinement as it is: neither counts. Names that
-//! neither the robot has as it is nor the effect brings are listed beside.
+//! refinements; it is missed. "Absorbed" is what the declared model takes up (a rotor on an axis whose
+//! inertia is free), and "there" what its joint has as a name or a refinement as it is: neither counts. Names
+//! that neither the robot has as it is nor the effect brings are listed beside.
 //!
 //! # Where results go
 //!

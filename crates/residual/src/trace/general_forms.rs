@@ -62,8 +62,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// The special case of the effect at `place`, with those of its constants that this has, too; `None` where
-    /// there is none, or it may not be found.
+    /// The special case of the effect at `place`, with those of its constants that this has, too; `None`
+    /// where there is none, or it may not be found.
     fn special_case(&self, place: usize) -> Result<Option<EffectSpec>, IdentificationError> {
         let own = &self.specs[place];
         let catalogue = self.fixed.catalogue;
