@@ -50,6 +50,9 @@ pub struct Contender {
     pub merit: f64,
     /// Number of its parameters and constants: what makes it simple.
     pub size: usize,
+    /// Place of its kind in the catalogue, which has what is common first: of two that are as simple and
+    /// explain alike, as a spring and a balancer on a short arc, the earlier is believed.
+    pub rank: usize,
 }
 
 /// The outcome of a contest.
@@ -69,8 +72,8 @@ impl ScoreTestSettings {
         merits.iter().take_while(|merit| **merit >= self.near * best).count().min(self.most_near)
     }
 
-    /// Which contender is believed: the simplest of those that explain the logs as well as the best. None if
-    /// no contender is worth its price.
+    /// Which contender is believed: the simplest of those that explain the logs as well as the best, and of
+    /// those the most common. None if no contender is worth its price.
     pub fn contest(&self, contenders: &[Contender]) -> Option<Winner> {
         let merit = |index: usize| contenders[index].merit;
         let mut worth: Vec<usize> =
@@ -78,7 +81,7 @@ impl ScoreTestSettings {
         worth.sort_by(|&a, &b| merit(b).total_cmp(&merit(a)));
         let most = merit(*worth.first()?);
         let alike = worth.iter().copied().filter(|&index| merit(index) >= most - self.alike);
-        let winner = alike.min_by_key(|&index| contenders[index].size)?;
+        let winner = alike.min_by_key(|&index| (contenders[index].size, contenders[index].rank))?;
         let least = most + self.least_rival.ln();
         worth.retain(|&index| merit(index) >= least && index != winner);
         Some(Winner { winner, rivals: worth })

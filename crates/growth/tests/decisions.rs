@@ -23,28 +23,29 @@ fn as_many_effects_are_fitted_as_are_near_the_best() {
 #[test]
 fn the_simplest_of_those_that_explain_alike_is_believed() {
     let settings = ScoreTestSettings { least_merit: 5.0, alike: 3.0, least_rival: 0.1, ..Default::default() };
-    // Merits and sizes, who is believed, and who is nearly as likely.
-    type Case<'a> = (&'a [(f64, usize)], Option<(usize, &'a [usize])>);
+    // Merits, sizes and places in the catalogue, who is believed, and who is nearly as likely.
+    type Case<'a> = (&'a [(f64, usize, usize)], Option<(usize, &'a [usize])>);
     let cases: &[Case<'_>] = &[
         (&[], None),
-        (&[(4.9, 1)], None),
-        (&[(f64::NAN, 1)], None),
-        (&[(f64::NEG_INFINITY, 1), (9.0, 4)], Some((1, &[]))),
-        (&[(9.0, 1)], Some((0, &[]))),
-        (&[(9.0, 1), (20.0, 3)], Some((1, &[]))),
+        (&[(4.9, 1, 0)], None),
+        (&[(f64::NAN, 1, 0)], None),
+        (&[(f64::NEG_INFINITY, 1, 0), (9.0, 4, 1)], Some((1, &[]))),
+        (&[(9.0, 1, 0)], Some((0, &[]))),
+        (&[(9.0, 1, 0), (20.0, 3, 1)], Some((1, &[]))),
         // Three less, and simpler.
-        (&[(17.0, 1), (20.0, 3)], Some((0, &[1]))),
-        (&[(16.9, 1), (20.0, 3)], Some((1, &[]))),
-        // Equally simple: the likelier one; ln 10 = 2.3 less is a chance of one in ten.
-        (&[(18.0, 2), (20.0, 2)], Some((1, &[0]))),
-        (&[(17.6, 2), (20.0, 2)], Some((1, &[]))),
-        (&[(19.0, 2), (20.0, 3), (19.5, 2)], Some((2, &[1, 0]))),
+        (&[(17.0, 1, 1), (20.0, 3, 0)], Some((0, &[1]))),
+        (&[(16.9, 1, 1), (20.0, 3, 0)], Some((1, &[]))),
+        // As simple: the one that the catalogue has first; ln 10 = 2.3 less is a chance of one in ten.
+        (&[(18.0, 2, 9), (20.0, 2, 10)], Some((0, &[1]))),
+        (&[(18.0, 2, 10), (20.0, 2, 9)], Some((1, &[0]))),
+        (&[(16.9, 2, 9), (20.0, 2, 10)], Some((1, &[]))),
+        (&[(19.0, 2, 4), (20.0, 3, 3), (19.5, 2, 2)], Some((2, &[1, 0]))),
         // What is not worth its price is neither believed nor a rival.
-        (&[(4.0, 1), (6.0, 2)], Some((1, &[]))),
+        (&[(4.0, 1, 0), (6.0, 2, 1)], Some((1, &[]))),
     ];
     for (contenders, expected) in cases {
         let list: Vec<Contender> =
-            contenders.iter().map(|&(merit, size)| Contender { merit, size }).collect();
+            contenders.iter().map(|&(merit, size, rank)| Contender { merit, size, rank }).collect();
         let expected = expected.map(|(winner, rivals)| Winner { winner, rivals: rivals.to_vec() });
         assert_eq!(settings.contest(&list), expected, "{contenders:?}");
     }
