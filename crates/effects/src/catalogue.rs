@@ -63,6 +63,11 @@ impl Catalogue {
         self.kinds.iter().map(Box::as_ref)
     }
 
+    /// The place of a kind in the order of simplicity; none for one that is unknown here.
+    pub fn rank(&self, name: &str) -> Option<usize> {
+        self.kinds().position(|kind| kind.name() == name)
+    }
+
     /// A kind by its name.
     ///
     /// # Errors

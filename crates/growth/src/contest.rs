@@ -50,8 +50,8 @@ pub struct Contender {
     pub merit: f64,
     /// Number of its parameters and constants: what makes it simple.
     pub size: usize,
-    /// Place of its kind in the catalogue, which has what is common first: of two that are as simple and
-    /// explain alike, as a spring and a balancer on a short arc, the earlier is believed.
+    /// Place of its kind in the catalogue's order of simplicity: of two with as many numbers that explain
+    /// alike, as a spring and a balancer on a short arc, the earlier is believed.
     pub rank: usize,
 }
 
@@ -72,8 +72,8 @@ impl ScoreTestSettings {
         merits.iter().take_while(|merit| **merit >= self.near * best).count().min(self.most_near)
     }
 
-    /// Which contender is believed: the simplest of those that explain the logs as well as the best, and of
-    /// those the most common. None if no contender is worth its price.
+    /// Which contender is believed: of those that explain the logs as well as the best the one with the
+    /// fewest numbers, then the earliest of the catalogue. None if no contender is worth its price.
     pub fn contest(&self, contenders: &[Contender]) -> Option<Winner> {
         let merit = |index: usize| contenders[index].merit;
         let mut worth: Vec<usize> =

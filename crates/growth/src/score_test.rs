@@ -218,8 +218,8 @@ impl ScoreTest {
             let effects: Vec<EffectSpec> = refined.into_iter().map(|gain| gain.effect).collect();
             let (_, with) = self.fit(robot, model, &[known, &effects].concat(), logs)?;
             let size = effects.iter().map(|effect| size(robot, effect)).fold(0, usize::saturating_add);
-            let is_own = |kind: &dyn EffectKind| effects.first().is_some_and(|own| own.kind == kind.name());
-            let rank = self.catalogue.kinds().position(is_own).unwrap_or(usize::MAX);
+            let rank = effects.first().and_then(|effect| self.catalogue.rank(&effect.kind));
+            let rank = rank.unwrap_or(usize::MAX);
             contenders.push(Contender { merit: hypothesis.merit_of(without - with), size, rank });
             answers.push(effects);
         }

@@ -1,5 +1,6 @@
 //! The decisions of a score test as tables of cases.
 
+use phiw_effects::Catalogue;
 use phiw_growth::{Contender, ScoreTestSettings, Winner};
 
 #[test]
@@ -49,4 +50,14 @@ fn the_simplest_of_those_that_explain_alike_is_believed() {
         let expected = expected.map(|(winner, rivals)| Winner { winner, rivals: rivals.to_vec() });
         assert_eq!(settings.contest(&list), expected, "{contenders:?}");
     }
+}
+
+/// On the arc of a wrist both save 992 of −log L; the balancer was believed for a third of a unit.
+#[test]
+fn of_a_spring_and_a_balancer_that_explain_alike_the_spring_is_believed() {
+    let catalogue = Catalogue::default();
+    let of_kind = |kind, merit| Contender { merit, size: 2, rank: catalogue.rank(kind).unwrap() };
+    let contenders = [of_kind("gravity_balancer", 984.3), of_kind("joint_spring", 984.0)];
+    let expected = Winner { winner: 1, rivals: vec![0] };
+    assert_eq!(ScoreTestSettings::default().contest(&contenders), Some(expected));
 }

@@ -45,7 +45,7 @@ impl Candidates {
             if declared && fixed.prior.is_some() {
                 continue;
             }
-            let rank = fixed.catalogue.kinds().position(|kind| kind.name() == spec.kind).unwrap_or_default();
+            let rank = fixed.catalogue.rank(&spec.kind).unwrap_or_default();
             candidates.present.push(Member { hypothesis: candidates.list.len(), variant: 0 });
             candidates.list.push(Candidate {
                 kind: 2 * rank + usize::from(spec.joints.len() > 1),

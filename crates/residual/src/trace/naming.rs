@@ -72,10 +72,7 @@ impl Search<'_> {
     /// For each effect of the model how many simpler ones on the same joints it stands on, by its place: what
     /// the textbook has stands on none, the first form of it on one level, the next on two.
     fn levels(&self, trial: &Trial) -> BTreeMap<usize, usize> {
-        let rank = |place: usize| {
-            let kind = &self.specs[place].kind;
-            self.fixed.catalogue.kinds().position(|other| other.name() == kind)
-        };
+        let rank = |place: usize| self.fixed.catalogue.rank(&self.specs[place].kind);
         let is_form = |member: &Member| {
             let hypothesis = &trial.problem.hypotheses[member.hypothesis];
             !hypothesis.declared && !hypothesis.requires.is_empty()
