@@ -95,15 +95,16 @@ impl Evaluator for OffsetColumns<'_> {
 }
 
 /// The logged torque is the commanded one; what is delivered clips at `limit`. The column is the part beyond
-/// it, where the motion asks for the limit too: noise of the measured torque must not explain itself. The
-/// parameter is one where the drive clips in truth.
+/// it, where the motion asks for the limit too: noise of the measured torque must not explain itself, and
+/// what moves as only more than the limit can move it was not clipped. The parameter is one where the drive
+/// clips in truth.
 pub struct ActuatorSaturation;
 
 const LIMIT: &str = "limit";
 /// The lowest limit that is plausible: the steps of refinement together once led below the torque's RMS.
 const LEAST_LIMIT: &str = "least_limit";
-/// Share of the limit that the model's torque reaches where the drive clips; the model was fitted with the
-/// clipping, and is not exact.
+/// Share of the limit that the model's torque reaches where the drive clips, and of the model's torque that
+/// the limit reaches; the model was fitted with the clipping, and is not exact.
 const REACHED: f64 = 0.9;
 /// How far the peaks of noise stand out, in RMS of the filtered residual: those of a few thousand samples
 /// reach four times their own RMS.
@@ -153,7 +154,8 @@ impl EffectKind for ActuatorSaturation {
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
             let torque = sample.tau().get(joint).copied().unwrap_or_default();
             let of_motion = sample.total_torque().get(joint).copied().unwrap_or_default();
-            let reached = of_motion * torque.signum() >= REACHED * limit;
+            let of_motion = of_motion * torque.signum();
+            let reached = of_motion >= REACHED * limit && REACHED * of_motion <= limit;
             out[0] = if reached { torque.signum() * (torque.abs() - limit).max(0.0) } else { 0.0 };
         };
         let parameters = [("clipped_share", ParameterKind::Ratio, CLIPPED_SHARE.0)];

@@ -13,6 +13,7 @@ mod accumulate;
 mod consistent_model;
 mod conventions;
 mod covariance;
+mod disturbances;
 mod drawn;
 mod effect_selector;
 mod error;
@@ -62,6 +63,7 @@ pub use predict::{Prediction, predict};
 /// the folds held out.
 pub mod fitting {
     pub use crate::accumulate::{FoldFactors, Rests, accumulate, accumulate_folds};
+    pub use crate::disturbances::{Disturbance, DisturbanceSettings, disturbances};
     pub use crate::factor_rows::FactorRows;
     pub use crate::fit::{Fit, TorqueError, fit, merge, torque_error, torques_with_enough_rows};
     pub use crate::free_constants::{ByConstant, FreeConstant, free_constants};

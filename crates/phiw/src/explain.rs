@@ -4,6 +4,7 @@ use crate::analysis::{Analysis, Rows, noise_floor};
 use crate::argument_values::quoted;
 use crate::arguments::ExplainArguments;
 use crate::console::Console;
+use crate::disturbed::DisturbedLogs;
 use crate::draws::Draws;
 use crate::explain_page;
 use crate::held_out_reproduction::HeldOutReproduction;
@@ -56,7 +57,8 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
 ///
 /// Where the torque was low-passed before it was logged, it is traced again in the band that this has left:
 /// above its corner a filter's form decides, and what is not known of it looks like effects. Where its zero
-/// differs from log to log, it is traced again without these zeros: they belong to logs, not to a model.
+/// differs from log to log, it is traced again without these zeros: they belong to logs, not to a model. And
+/// where something else acted on the robot for a moment, it is traced again without that moment.
 ///
 /// # Errors
 /// An input is wrong.
@@ -72,6 +74,8 @@ struct OfTheLogs {
     /// The zeros of torques that were found and taken off, and in how many traces.
     torque_zeros: Option<ZerosOfLogs>,
     traced_for_zeros: usize,
+    /// Moments in which something else acted on the robot, which are left out.
+    disturbed: DisturbedLogs,
 }
 
 /// Traces that seek zeros of torques: a zero that is small beside others is found once these are off.
@@ -106,6 +110,10 @@ fn results_knowing(
         let mut lower = arguments.clone();
         lower.session.parallel_cutoff_hz = Some(corner_hz);
         return results_knowing(&lower, console, &OfTheLogs { low_passed: Some(warning), ..known.clone() });
+    }
+    if let Some(disturbed) = known.disturbed.and_those_of(&session, &data, &tracing)? {
+        let without = disturbed.left_out_of(arguments);
+        return results_knowing(&without, console, &OfTheLogs { disturbed, ..known.clone() });
     }
     let zeros = ZerosOfLogs::of(&session, &data, &tracing, known.torque_zeros.as_ref())?;
     if zeros.is_some() {
@@ -148,6 +156,7 @@ fn results_knowing(
     }
     analysis.noise_floor = floor;
     analysis.warnings.extend(known.low_passed.clone());
+    analysis.warnings.extend(known.disturbed.warning(&session));
     if let Some(zeros) = &known.torque_zeros {
         analysis.warnings.extend(zeros.warning(&session, thresholds(arguments)?.least_size));
     }

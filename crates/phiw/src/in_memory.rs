@@ -17,6 +17,9 @@ pub struct InMemory {
     pub model: Option<String>,
     /// Logs, by name.
     pub logs: BTreeMap<PathBuf, Arc<NamedColumns>>,
+    /// Stretches of training logs in which something else acted on the robot, first and last stamp each
+    /// \[s\], by the log's name: they are left out.
+    pub disturbed: BTreeMap<PathBuf, Vec<[f64; 2]>>,
     /// What calls the work off.
     pub interruption: Interruption,
 }

@@ -10,6 +10,7 @@ pub mod command;
 pub mod console;
 mod conventions;
 mod date;
+mod disturbed;
 mod draws;
 mod error;
 mod exit_status;

@@ -46,13 +46,20 @@ pub fn train_and_validate(
     map: Option<&Arc<LogMap>>,
     given: &InMemory,
 ) -> [Vec<LogSource>; 2] {
-    let Some(map) = map else { return [sources(train, None, given), sources(validate, None, given)] };
+    let undisturbed = |source: LogSource| {
+        let left_out = given.disturbed.get(&source.path).cloned().unwrap_or_default();
+        LogSource { left_out, ..source }
+    };
+    let Some(map) = map else {
+        let training = sources(train, None, given).into_iter().map(undisturbed).collect();
+        return [training, sources(validate, None, given)];
+    };
     let part = |log: &PathBuf, part| {
         let columns = given.logs.get(log).cloned();
         LogSource { part, columns, ..LogSource::mapped(log, Some(map.clone())) }
     };
     let has_validation = |log: &&PathBuf| !map.facts(log).validate.is_empty();
-    let training = train.iter().map(|log| part(log, LogPart::Train)).collect();
+    let training = train.iter().map(|log| undisturbed(part(log, LogPart::Train))).collect();
     let mut held_out: Vec<LogSource> =
         train.iter().filter(has_validation).map(|log| part(log, LogPart::Validate)).collect();
     held_out.extend(validate.iter().map(|log| match has_validation(&log) {

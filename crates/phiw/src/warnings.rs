@@ -183,6 +183,8 @@ pub fn of_log(survey: &Survey) -> Vec<String> {
             }
             // `check` says these, with what follows from them.
             GapReason::Held | GapReason::ZeroRow => return None,
+            // The trace that has found them says these.
+            GapReason::Disturbed => return None,
             GapReason::LeftOut => format!("{name}: {count} {rows} left out by the map"),
             reason => format!(
                 "{name}: {count} {rows} skipped ({reason}), first at {rows_are} {line}; the log is split there"

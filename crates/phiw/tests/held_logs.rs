@@ -74,6 +74,25 @@ fn a_held_log_gives_the_model_of_the_log_that_it_was_made_of() {
     assert!(warnings.iter().any(|warning| warning.contains("the repeats are left out")), "{warnings:?}");
 }
 
+/// Positions of two joints that were read at a quarter of the log's rate were named elasticities of their
+/// drives.
+#[test]
+fn held_positions_name_what_fresh_ones_do() {
+    let logs = || [synthetic::recording(1, 30.0), synthetic::recording(2, 20.0)];
+    let stale = |log: Recording| {
+        let mut q = held(&log, 4).q;
+        q.iter_mut().zip(&log.q).step_by(log.joints.len()).for_each(|(q, fresh)| *q = *fresh);
+        Recording { q, ..log }
+    };
+    let (names, errors, _) = explained(logs());
+    let (found, found_errors, warnings) = explained(logs().map(stale));
+    assert_eq!(found, names);
+    for (error, expected) in found_errors.into_iter().zip(errors) {
+        assert!((error - expected).abs() < 0.02 * expected, "{error} instead of {expected}");
+    }
+    assert!(warnings.iter().any(|warning| warning.contains("between its readings")), "{warnings:?}");
+}
+
 /// One row in a hundred had no torques but zeros: an error of 2.7 % was left where 0.3 % is possible, and
 /// nothing was said.
 #[test]

@@ -42,6 +42,8 @@ pub enum FindingKind {
     HeldRows,
     /// A signal that keeps each value for several rows.
     HeldSignal,
+    /// A position that did so, and is interpolated.
+    HeldPosition,
     /// Rows of zeros, of messages that were missed.
     ZeroRows,
     /// An angle that begins anew after a turn.
@@ -70,6 +72,7 @@ impl FindingKind {
             FindingKind::Sampling => "sampling",
             FindingKind::HeldRows => "held_rows",
             FindingKind::HeldSignal => "held_signal",
+            FindingKind::HeldPosition => "held_position",
             FindingKind::ZeroRows => "zero_rows",
             FindingKind::Turns => "turns",
             FindingKind::TorqueUnit => "torque_unit",
@@ -96,9 +99,9 @@ impl FindingKind {
             FindingKind::Clock => "velocities and accelerations carry the stamps' error",
             FindingKind::Sampling => "accelerations can't be told",
             FindingKind::HeldRows => "read as they are, they would be steps in time, and look like delays",
-            FindingKind::HeldSignal => {
-                "it is late by half of that on the mean, which looks like a delay; accelerations from held positions are \
-                 those of steps"
+            FindingKind::HeldSignal => "it is late by half of that on the mean, which looks like a delay",
+            FindingKind::HeldPosition => {
+                "read as it is, it would be late by half of that, and its accelerations those of steps"
             }
             FindingKind::ZeroRows => "as measurements they would be jumps that no model can follow",
             FindingKind::Turns => "as it stands it would be a motion at an impossible speed",
@@ -128,6 +131,9 @@ impl FindingKind {
             }
             FindingKind::HeldSignal => {
                 "log all signals of a joint when they are read, or all at the rate of the slowest"
+            }
+            FindingKind::HeldPosition => {
+                "it is interpolated between its readings; log it as often as the torque"
             }
             FindingKind::ZeroRows => {
                 "they are left out, and bridged from the rows beside; find out why messages are missed"
@@ -228,16 +234,18 @@ fn mended(survey: &Survey) -> Vec<Finding> {
 
 /// Signals that are held, though not all at once; one for all joints where they are alike.
 fn held(survey: &Survey) -> Vec<Finding> {
-    let positions = |joint: &JointSurvey| joint.position_shape.held;
+    // What is between their readings is not held any more.
+    let held = &survey.mending.held_positions;
+    let position = |joint: usize| held.get(joint).copied().filter(|rows| *rows > 1.0);
     let torques = |joint: &JointSurvey| joint.torque.and_then(|torque| torque.shape.held);
-    let signals: [(&str, Vec<Option<f64>>); 2] = [
-        ("q", survey.joints.iter().map(positions).collect()),
-        ("tau", survey.joints.iter().map(torques).collect()),
+    let signals: [(FindingKind, &str, Vec<Option<f64>>); 2] = [
+        (FindingKind::HeldPosition, "q", (0..survey.joints.len()).map(position).collect()),
+        (FindingKind::HeldSignal, "tau", survey.joints.iter().map(torques).collect()),
     ];
     let mut all = Vec::new();
-    for (signal, rows) in signals {
+    for (kind, signal, rows) in signals {
         let finding = |column: String, whose: &str, rows: f64| Finding {
-            kind: FindingKind::HeldSignal,
+            kind,
             column,
             measured: format!(
                 "{whose}keeps each value for {rows:.1} rows ({:.1} ms), in which other columns change",

@@ -29,12 +29,14 @@ pub enum GapReason {
     TruncatedLastRow,
     /// A stretch that the map of the log leaves out.
     LeftOut,
+    /// Something else acted on the robot: a push, a collision.
+    Disturbed,
     /// Time jumps: samples are missing, though no row is.
     TimeJump,
 }
 
 impl GapReason {
-    pub(crate) const ALL: [GapReason; 12] = [
+    pub(crate) const ALL: [GapReason; 13] = [
         GapReason::EmptyCell,
         GapReason::NotFinite,
         GapReason::Huge,
@@ -46,6 +48,7 @@ impl GapReason {
         GapReason::DuplicateStamp,
         GapReason::TruncatedLastRow,
         GapReason::LeftOut,
+        GapReason::Disturbed,
         GapReason::TimeJump,
     ];
 }
@@ -64,6 +67,7 @@ impl fmt::Display for GapReason {
             GapReason::DuplicateStamp => "duplicate time stamp",
             GapReason::TruncatedLastRow => "truncated last row",
             GapReason::LeftOut => "left out by the map",
+            GapReason::Disturbed => "something else acted on the robot",
             GapReason::TimeJump => "jump in time",
         })
     }

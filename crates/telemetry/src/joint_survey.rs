@@ -183,6 +183,11 @@ impl JointCollector {
         }
     }
 
+    /// Rows for which the position is held on the mean, where the log is faster than what it logs.
+    pub fn held_position(&self) -> Option<f64> {
+        self.q_shape.held()
+    }
+
     /// The segment is over.
     pub fn end_segment(&mut self) {
         self.q_shape.end_segment();

@@ -18,6 +18,7 @@ mod controller_signal;
 mod differentiator;
 mod error;
 mod gap;
+mod held_positions;
 mod histogram;
 mod hold;
 mod kernel;

@@ -23,6 +23,8 @@ pub(crate) struct LogRows {
     last: Vec<f64>,
     /// Which stretches are read; `None` where all are.
     facts: Option<LogFacts>,
+    /// [`LogSource::left_out`].
+    disturbed: Vec<[f64; 2]>,
     part: LogPart,
     first_stamp: Option<f64>,
 }
@@ -42,7 +44,7 @@ pub(crate) fn open_log_of(
     joints: &[String],
     torque: (TorqueColumns, Signal),
 ) -> Result<LogRows, LogError> {
-    let LogSource { path, map, part, columns: in_memory, .. } = source;
+    let LogSource { path, map, part, columns: in_memory, left_out, .. } = source;
     let map = map.as_deref();
     let options = OpenOptions { topic: map.and_then(|map| map.topic()).map(str::to_owned) };
     let mut table = match in_memory {
@@ -76,6 +78,7 @@ pub(crate) fn open_log_of(
         columns,
         is_plain,
         facts,
+        disturbed: left_out.clone(),
         part: *part,
         first_stamp: None,
     })
@@ -164,10 +167,13 @@ impl Rows for LogRows {
             Step::Row { place } => place,
         };
         let (mut reason, t) = self.signals(values);
-        if let Some(t) = t
-            && self.is_left_out(t)
-        {
-            reason = Some(GapReason::LeftOut);
+        if let Some(t) = t {
+            if self.disturbed.iter().any(|[from, to]| (*from..=*to).contains(&t)) {
+                reason = Some(GapReason::Disturbed);
+            }
+            if self.is_left_out(t) {
+                reason = Some(GapReason::LeftOut);
+            }
         }
         Ok(match reason {
             None => Row::Sample { line },

@@ -16,6 +16,9 @@ pub struct LogSource {
     pub part: LogPart,
     /// What is read instead of the file, of a log in memory.
     pub columns: Option<Arc<NamedColumns>>,
+    /// Stretches in which something else acted on the robot, first and last stamp each \[s\]: they are left
+    /// out.
+    pub left_out: Vec<[f64; 2]>,
     /// What the map calls it, where that is not the name it has now.
     pub name_in_map: Option<PathBuf>,
 }
@@ -28,7 +31,14 @@ impl LogSource {
 
     /// A log whose columns a map explains.
     pub fn mapped(path: impl Into<PathBuf>, map: Option<Arc<LogMap>>) -> Self {
-        LogSource { path: path.into(), map, part: LogPart::All, columns: None, name_in_map: None }
+        LogSource {
+            path: path.into(),
+            map,
+            part: LogPart::All,
+            columns: None,
+            left_out: Vec::new(),
+            name_in_map: None,
+        }
     }
 
     /// The same log at another place, of which the map says what it says of this one.

@@ -2,6 +2,7 @@
 //! follow.
 
 use crate::gap::GapReason;
+use crate::held_positions::BetweenReadings;
 use crate::reader::Rows;
 use crate::spike::WithoutSpikes;
 use crate::turns::WithoutTurns;
@@ -10,8 +11,8 @@ use crate::without_stretches::WithoutStretches;
 use crate::zero_rows::{WithoutZeroRows, ZeroRows};
 use serde::{Deserialize, Serialize};
 
-/// Rows that are read once though they were written several times, zeros that are bridged, and turns that are
-/// undone.
+/// Rows that are read once though they were written several times, zeros that are bridged, turns that are
+/// undone, and positions between their readings.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Mending {
     /// Rows for which each is held; 1 where each is a new one.
@@ -27,6 +28,10 @@ pub(crate) struct Mending {
     /// How often each joint's position jumped by a turn; empty where nobody counted.
     #[serde(default)]
     pub turns: Vec<u64>,
+    /// Rows for which each joint's position is held, on the mean, and 1 where it is read anew in every row;
+    /// empty where that is so of all.
+    #[serde(default)]
+    pub held_positions: Vec<f64>,
 }
 
 impl Default for Mending {
@@ -37,21 +42,26 @@ impl Default for Mending {
             longest_step: 0.0,
             zero_rows: ZeroRows::default(),
             turns: Vec::new(),
+            held_positions: Vec::new(),
         }
     }
 }
 
 /// Rows of which a [`Mending`] is made.
-pub(crate) type Mended<R> = WithoutTurns<WithoutZeroRows<WithoutHeld<R>>>;
+pub(crate) type Mended<R> = BetweenReadings<WithoutTurns<WithoutZeroRows<WithoutHeld<R>>>>;
 
 impl Mending {
     pub fn is_none(&self) -> bool {
-        self.held == 1 && self.zero_bounds.is_empty() && self.turns.iter().all(|turns| *turns == 0)
+        self.held == 1
+            && self.zero_bounds.is_empty()
+            && self.held_positions.is_empty()
+            && self.turns.iter().all(|turns| *turns == 0)
     }
 
     pub fn of<R: Rows>(&self, rows: R) -> Mended<R> {
         let once = WithoutHeld::new(rows, self.held);
-        WithoutTurns::new(WithoutZeroRows::new(once, self.zero_bounds.clone(), self.longest_step))
+        let bridged = WithoutZeroRows::new(once, self.zero_bounds.clone(), self.longest_step);
+        BetweenReadings::new(WithoutTurns::new(bridged), &self.held_positions)
     }
 }
 

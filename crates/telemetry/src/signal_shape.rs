@@ -206,7 +206,12 @@ impl ShapeCollector {
             mean_run: rows / self.runs.max(1) as f64,
             still: self.still,
             still_rows: self.still_rows,
-            held: self.between_jumps.hold().map(|hold| hold.mean),
+            held: self.held(),
         }
+    }
+
+    /// [`SignalShape::held`] of what came so far.
+    pub fn held(&self) -> Option<f64> {
+        self.between_jumps.hold().map(|hold| hold.mean)
     }
 }

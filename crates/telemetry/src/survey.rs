@@ -224,6 +224,10 @@ pub(crate) fn survey_rows<R: Rows>(
         (mending.zero_bounds, mending.longest_step) = (bounds, collector.steps.longest());
         (collector, counts, rows) = pass(open, &mending, progress)?;
     }
+    if let Some(held) = collector.held_positions() {
+        mending.held_positions = held;
+        (collector, counts, rows) = pass(open, &mending, progress)?;
+    }
     let (mut spikes, mut spike_bounds) = (Vec::new(), Vec::new());
     if let Some(bounds) = collector.spikes.bounds(rows.layout(), SpikeSettings::default()) {
         // Spikes would distort all statistics: the pass is repeated without them.
@@ -265,6 +269,7 @@ pub(crate) fn survey_rows<R: Rows>(
         });
     }
     let survey = collector.finish(rows.path(), rows.rows_are(), joints, counts);
+    let rows = rows.into_inner();
     mending.turns = rows.counts().to_vec();
     let rows = rows.into_inner();
     mending.zero_rows = rows.counts();
@@ -322,6 +327,12 @@ struct Collector<'a> {
 }
 
 impl<'a> Collector<'a> {
+    /// [`Mending::held_positions`]; `None` where all positions are read anew in every row.
+    fn held_positions(&self) -> Option<Vec<f64>> {
+        let held: Vec<Option<f64>> = self.joints.iter().map(JointCollector::held_position).collect();
+        held.iter().any(Option::is_some).then(|| held.iter().map(|rows| rows.unwrap_or(1.0)).collect())
+    }
+
     fn new(layout: &Layout, steps: Steps, progress: &'a mut dyn FnMut(u64, u64)) -> Self {
         Collector {
             joints: (0..layout.joints)

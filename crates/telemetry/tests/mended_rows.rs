@@ -94,20 +94,39 @@ fn a_held_log_is_read_as_the_log_that_it_was_made_of() {
 
 /// Torques that are read every fourth row are late by a row and a half; nothing was said of it.
 #[test]
-fn signals_that_are_held_by_themselves_are_said_and_kept() {
-    use FindingKind::HeldSignal;
+fn torques_that_are_held_by_themselves_are_said_and_kept() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");
     let log = log();
     let every_fourth = |row: usize| row / 4 * 4;
     let (torques, _) = read(&Recording { tau: held(&log.tau, every_fourth), ..log.clone() }, &path);
-    assert_eq!(kinds(&torques), [(HeldSignal, "tau".to_owned())]);
+    assert_eq!(kinds(&torques), [(FindingKind::HeldSignal, "tau".to_owned())]);
     assert_eq!((torques.held_rows(), torques.used_rows), (None, torques.rows));
-    // One joint alone.
+}
+
+/// Positions of three wrist joints that were read every fourth row were named elasticities of their drives.
+#[test]
+fn positions_that_are_held_by_themselves_are_interpolated_between_their_readings() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    let log = log();
+    let (_, fresh) = read(&log, &path);
+    let of_all = held(&log.q, |row| row / 4 * 4);
     let mut one = log.clone();
-    let of_both = held(&log.q, every_fourth);
-    one.q.iter_mut().zip(of_both).skip(1).step_by(2).for_each(|(q, held)| *q = held);
-    assert_eq!(kinds(&read(&one, &path).0), [(HeldSignal, "q.b".to_owned())]);
+    one.q.iter_mut().zip(&of_all).skip(1).step_by(2).for_each(|(q, held)| *q = *held);
+    for (q, column) in [(one.q, "q.b"), (of_all, "q")] {
+        let (survey, blocks) = read(&Recording { q, ..log.clone() }, &path);
+        assert_eq!(kinds(&survey), [(FindingKind::HeldPosition, column.to_owned())]);
+        assert_eq!((survey.held_rows(), survey.used_rows), (None, survey.rows));
+        let pairs = blocks.iter().zip(&fresh).flat_map(|(block, fresh)| {
+            let accelerations = block.qdd.iter().copied().zip(fresh.qdd.iter().copied());
+            block.q.iter().copied().zip(fresh.q.iter().copied()).chain(accelerations)
+        });
+        let (wrong, whole) = pairs.fold((0.0, 0.0), |(wrong, whole), (q, fresh)| {
+            (wrong + (q - fresh).powi(2), whole + fresh.powi(2))
+        });
+        assert!(wrong < 0.01_f64.powi(2) * whole, "{}", (wrong / whole).sqrt());
+    }
 }
 
 /// One row in a hundred in which all torques were 0 left an error of 2.7 % where 0.3 % is possible; nothing

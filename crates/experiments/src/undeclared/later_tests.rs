@@ -83,6 +83,41 @@ fn a_held_torque_changes_every_so_many_samples() {
 }
 
 #[test]
+fn held_positions_change_every_so_many_samples() {
+    check(Situation::HeldPositions, |case, log| {
+        let held = &case.sensors.logging.as_ref().expect("a wide case").held_positions;
+        let (last, held) = (held.len() - 1, held[held.len() - 1]);
+        assert!(held > 1 && case.sensors.rate / held as f64 >= 20.0, "{held}");
+        let position = column(log, &format!("q.{}", case.robot.tree.joint(last).joint));
+        assert!(position.chunks(held).all(|chunk| chunk.iter().all(|value| *value == chunk[0])));
+        let changes = position.chunks(held).zip(position.chunks(held).skip(1)).filter(|(a, b)| a[0] != b[0]);
+        assert!(changes.count() > position.len() / held / 2);
+    });
+}
+
+#[test]
+fn a_push_is_felt_while_it_lasts_and_at_no_other_time() {
+    check(Situation::Pushes, |case, _| {
+        let pushes = &case.sensors.logging.as_ref().expect("a wide case").pushes;
+        assert!(!pushes.is_empty());
+        for (motion, _) in case.motions.iter().zip(0..2) {
+            let times = even_times(motion, 200.0);
+            let secrets: Vec<&Secret> = case.plant.iter().collect();
+            let record = record(&case.robot.tree, &case.ordinary, &secrets, motion, &times);
+            let joints = case.robot.joints();
+            for push in pushes {
+                let mut added = vec![0.0; record.torque.len()];
+                push.add_torque(&case.robot.tree, &record, &mut added);
+                for (t, row) in times.iter().zip(added.chunks_exact(joints)) {
+                    let lasts = (push.start_s..push.start_s + push.duration_s).contains(t);
+                    assert!(lasts || row.iter().all(|torque| *torque == 0.0), "{t}");
+                }
+            }
+        }
+    });
+}
+
+#[test]
 fn a_rough_clock_rounds_stamps_and_loses_rows() {
     check(Situation::RoughClock, |case, log| {
         let rough = case.sensors.logging.as_ref().and_then(|logging| logging.rough.clone());

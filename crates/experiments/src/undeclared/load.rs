@@ -1,7 +1,7 @@
 //! What changes the rigid body itself: a payload, a tilted base, a load picked up on the way; and forces on
 //! links.
 
-use super::plant::Scene;
+use super::plant::{Scene, States};
 use super::secret::{Form, Secret};
 use phiw_dynamics::inertia::Inertia;
 use phiw_dynamics::{Mat3, Placement, Tree, Vec3};
@@ -88,13 +88,28 @@ pub struct WorldForce {
 impl WorldForce {
     /// Adds what the joints must deliver against the force: −Jᵀf.
     pub fn add_torque(&self, scene: &Scene, force: f64, torque: &mut [f64]) {
-        let joints = scene.tree.joint_count();
-        let mut placements = vec![Placement::identity(); scene.tree.bodies().len()];
+        self.add_torque_along(scene.tree, &scene.link, |_| force, torque);
+    }
+
+    /// The same of a force that is another in each sample of `states`.
+    pub fn add_torque_along(
+        &self,
+        tree: &Tree,
+        states: &States,
+        force: impl Fn(usize) -> f64,
+        torque: &mut [f64],
+    ) {
+        let joints = tree.joint_count();
+        let mut placements = vec![Placement::identity(); tree.bodies().len()];
         let mut jacobian = vec![0.0; 6 * joints];
         for (sample, torque) in torque.chunks_exact_mut(joints).enumerate() {
-            let [q, ..] = scene.link.at(sample);
-            let placed = scene.tree.forward_kinematics(q, &mut placements);
-            let moved = scene.tree.point_jacobian(&placements, self.body, Vec3(self.point), &mut jacobian);
+            let force = force(sample);
+            if force == 0.0 {
+                continue;
+            }
+            let [q, ..] = states.at(sample);
+            let placed = tree.forward_kinematics(q, &mut placements);
+            let moved = tree.point_jacobian(&placements, self.body, Vec3(self.point), &mut jacobian);
             debug_assert!(placed.is_ok() && moved.is_ok(), "the sizes come from the tree itself");
             for (joint, torque) in torque.iter_mut().enumerate() {
                 let along: f64 = (0..3).map(|row| jacobian[row * joints + joint] * self.direction[row]).sum();

@@ -2,6 +2,7 @@
 //! a velocity that is late.
 
 use super::plant::Record;
+use super::push::Push;
 use super::rng::CaseRng;
 use super::sensors::{Clock, Sensors};
 use super::situation::Situation;
@@ -75,6 +76,12 @@ pub struct Logging {
     /// Standard deviation of the zeros of each log's torques \[N·m, N\], joint by joint; empty for none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub torque_zero: Vec<f64>,
+    /// Samples for which each joint's position is held until it is read anew; empty for none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub held_positions: Vec<usize>,
+    /// Who pushes the robot meanwhile.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub pushes: Vec<Push>,
     /// What its clock and its memory do.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rough: Option<RoughClock>,
@@ -207,6 +214,14 @@ impl Logging {
                 if joint == one || rng.chance(0.6) { share * torque } else { 0.0 }
             }));
         }
+        let mut held_positions = Vec::new();
+        if situation == Situation::HeldPositions {
+            let held = 2 + rng.index((sensors.rate / 40.0) as usize - 1).min(8);
+            let all = rng.chance(0.5);
+            let first = rng.index(joints);
+            held_positions.extend((0..joints).map(|joint| if all || joint >= first { held } else { 1 }));
+        }
+        let pushes = if situation == Situation::Pushes { Push::draw(rng) } else { Vec::new() };
         Logging {
             tails,
             filter,
@@ -216,6 +231,8 @@ impl Logging {
             torque_step,
             held_samples,
             torque_zero,
+            held_positions,
+            pushes,
             rough,
         }
     }
@@ -231,7 +248,8 @@ impl Logging {
         rng: &mut CaseRng,
     ) -> String {
         let joints = tree.joint_count();
-        let torque = self.torque(sensors, record, rng);
+        let torque = self.torque(sensors, tree, record, rng);
+        let mut read = vec![0.0; joints];
         let mut text = String::with_capacity(record.times.len() * (12 + 32 * joints));
         text.push('t');
         let prefixes: &[&str] = if self.velocity.is_some() { &["q", "qd", "tau"] } else { &["q", "tau"] };
@@ -248,7 +266,10 @@ impl Logging {
             for joint in 0..joints {
                 let quantum = sensors.quantum[joint];
                 let seen = record.states.q(sample, joint) / quantum + sensors.angle_noise * rng.normal();
-                let _ = write!(text, ",{:.9}", seen.round() * quantum);
+                if self.held_positions.get(joint).is_none_or(|held| sample.is_multiple_of(*held)) {
+                    read[joint] = seen.round() * quantum;
+                }
+                let _ = write!(text, ",{:.9}", read[joint]);
             }
             if let Some(velocity) = &self.velocity {
                 for joint in 0..joints {
@@ -270,9 +291,10 @@ impl Logging {
     }
 
     /// The torque as logged, samples × joints: noise, filter, dead band and steps, in this order.
-    fn torque(&self, sensors: &Sensors, record: &Record, rng: &mut CaseRng) -> Vec<f64> {
+    fn torque(&self, sensors: &Sensors, tree: &Tree, record: &Record, rng: &mut CaseRng) -> Vec<f64> {
         let joints = sensors.torque_noise.len();
         let mut torque = record.torque.clone();
+        self.pushes.iter().for_each(|push| push.add_torque(tree, record, &mut torque));
         for joint in 0..joints {
             let noise = self.noise(&record.times, sensors.correlation_time, rng);
             // Drawn only where there is one, so that logs of other situations stay what they were.

@@ -59,6 +59,7 @@ mod logging;
 mod mechanism;
 mod plant;
 mod profile;
+mod push;
 pub(crate) mod report_file;
 mod rng;
 mod robot;

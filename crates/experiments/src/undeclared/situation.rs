@@ -63,11 +63,15 @@ pub enum Situation {
     ShiftingZeros,
     /// Joints move one after the other, each two to four times in a log, while all others rest.
     InTurn,
+    /// Positions of some joints, or of all, are read less often than the torques, and held in between.
+    HeldPositions,
+    /// Somebody pushes the robot once or a few times while the training logs are taken.
+    Pushes,
 }
 
 impl Situation {
     /// All situations.
-    pub const ALL: [Situation; 25] = [
+    pub const ALL: [Situation; 27] = [
         Situation::White,
         Situation::ShortColour,
         Situation::Colour,
@@ -93,11 +97,14 @@ impl Situation {
         Situation::SmoothedTorque,
         Situation::ShiftingZeros,
         Situation::InTurn,
+        Situation::HeldPositions,
+        Situation::Pushes,
     ];
     /// Those of the first cases of each suite: so many there were when these were drawn first.
     pub const FIRST: usize = Situation::BLOCKS[0].1;
     /// Situations that came together: the index of their first case, and how many they are.
-    const BLOCKS: [(usize, usize); 5] = [(0, 15), (50_000, 7), (60_000, 1), (70_000, 1), (80_000, 1)];
+    const BLOCKS: [(usize, usize); 6] =
+        [(0, 15), (50_000, 7), (60_000, 1), (70_000, 1), (80_000, 1), (90_000, 2)];
 
     /// The situation of the case of this index: those of its block in turn.
     pub fn of_index(index: usize) -> Self {

@@ -41,6 +41,8 @@ fn logging() -> Logging {
         torque_step: vec![0.0; 2],
         held_samples: 1,
         torque_zero: Vec::new(),
+        held_positions: Vec::new(),
+        pushes: Vec::new(),
         rough: None,
     }
 }

@@ -72,7 +72,7 @@ impl Search<'_> {
     }
 
     /// The place of the effect that makes the errors on motion held out larger by most, if that is by more
-    /// than `largest_harm`: in their geometric mean over the torques, or all together. A drift that one log
+    /// than `same_error`: in their geometric mean over the torques, or all together. A drift that one log
     /// seems to show may be a disaster in the next.
     pub(super) fn misleading(&self, trial: &Trial) -> Option<usize> {
         let present = trial.held_out_squares(&trial.fit);
@@ -90,13 +90,13 @@ impl Search<'_> {
             (mean.max((together(&present) / together(&without)).ln()), place)
         });
         let worst = growth.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))?;
-        (0.5 * worst.0 > self.options.thresholds.largest_harm.ln()).then_some(worst.1)
+        (0.5 * worst.0 > self.options.thresholds.same_error.ln()).then_some(worst.1)
     }
 
     /// The sum of what is left of the torques held out, where what is as good as none counts as the largest
     /// such.
     fn counted_squares(&self, trial: &Trial, squares: &[f64]) -> f64 {
-        let least = self.options.thresholds.negligible_share.powi(2);
+        let least = self.options.thresholds.negligible_share().powi(2);
         let torques = trial.held_out.iter().map(Products::right_hand_side);
         squares.iter().zip(torques).map(|(squares, torque)| squares.max(least * torque)).sum()
     }

@@ -16,10 +16,9 @@ impl Search<'_> {
     /// Which residuals have structure, and what they follow.
     ///
     /// Structure is what motion foretells on data that were not fitted; what wanders, with a correlation over
-    /// seconds that no sensor's noise has; what hangs together on one joint and not on others; what a
-    /// training log by itself tells otherwise (`changes`); and an error on motion held out that no model at
-    /// all would not have. A residual that is larger than noise and none of these is a slow disturbance that
-    /// follows nothing measured; it accuses nobody.
+    /// seconds that no sensor's noise has; what a training log by itself tells otherwise (`changes`); and an
+    /// error on motion held out that no model at all would not have. A residual that is larger than noise and
+    /// none of these is a slow disturbance that follows nothing measured; it accuses nobody.
     pub(super) fn remaining(
         &self,
         held_out: &[GroupedFactor],
@@ -56,25 +55,10 @@ impl Search<'_> {
             false_alarm: self.options.thresholds.false_structure_probability,
         };
         let following = probe::following(fit, &large)?;
-        let over = |row: usize| error.rmse[row] / self.input.noise_floor[row];
-        let nearest = (0..error.rmse.len()).map(over).fold(f64::INFINITY, f64::min).max(1.0);
-        let hangs_together =
-            |row: usize| shape.autocorrelation[row].abs() > self.options.thresholds.structured_correlation;
-        // Where most torques hang together, that is the colour of the sensors' noise.
-        let coloured = 2 * (0..error.rmse.len()).filter(|&row| hangs_together(row)).count();
-        let stands_out = |row: usize| {
-            over(row) > self.options.thresholds.structured_ratio * nearest
-                && hangs_together(row)
-                && coloured < error.rmse.len()
-        };
         let wanders = |row: usize| shape.wander[row] > self.options.thresholds.wander;
         let differs = |row: usize| changes.iter().any(|change| change.row == row);
         let is_structured = |row: &usize| {
-            following.contains(row)
-                || wanders(*row)
-                || stands_out(*row)
-                || differs(*row)
-                || worse_than_none.contains(row)
+            following.contains(row) || wanders(*row) || differs(*row) || worse_than_none.contains(row)
         };
         let (structured, colour): (Vec<usize>, Vec<usize>) = large.into_iter().partition(is_structured);
         let name = |row: usize| self.fixed.tree.joint(row).joint.clone();

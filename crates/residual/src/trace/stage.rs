@@ -65,7 +65,7 @@ impl<'a> Fixed<'a> {
             data,
             prior,
             rows_per_independent: input.rows_per_independent,
-            negligible_share: options.thresholds.negligible_share,
+            negligible_share: options.thresholds.negligible_share(),
             not_judged: Mutex::default(),
         })
     }

@@ -47,7 +47,7 @@ impl Search<'_> {
             return Ok(None);
         }
         let with = self.fitted_with(model, specs, &deviations)?;
-        let margin = self.options.thresholds.largest_harm;
+        let margin = self.options.thresholds.same_error;
         let is_worse = self.counted(&with.model.held_out) > margin * self.counted(&model.held_out);
         Ok((!is_worse).then_some(with))
     }

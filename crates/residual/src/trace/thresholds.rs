@@ -29,31 +29,18 @@ pub struct Thresholds {
     /// effects took; for a form of something simpler, of the simpler's squares, times what the simpler leaves
     /// over what is left with the form. How exactly a sign turns is no effect of its own.
     pub least_of_others: f64,
-    /// RMS of what an effect takes over the RMS of its torque, at least, to have a name.
+    /// RMS of what an effect takes over the RMS of its torque, at least, to have a name. Half of it is as
+    /// good as nothing ([`Self::negligible_share`]).
     pub least_size: f64,
     /// Share of a torque (RMS) that is seen by itself: what an effect is where the other parameters have
-    /// taken up most of it, to have a name, and what is left of a right model by filters and encoders at
-    /// most.
+    /// taken up most of it, to have a name; what is left of a right model by filters and encoders at most;
+    /// and what an effect must take not to be asked whether other constants of the other effects could do its
+    /// work.
     pub least_visible: f64,
-    /// Share of a torque (RMS) below which it is asked whether other constants of the other effects could do
-    /// an effect's work. To ask it of all effects names the same and takes two thirds more time.
-    pub small_size: f64,
-    /// A residual below this share of its torque (RMS) is as good as none: nothing is sought in it, and it
-    /// does no harm to be larger than it was.
-    pub negligible_share: f64,
-    /// Factor on the RMS error on motion held out by which an effect may make it larger, in the mean of the
-    /// torques or all together.
-    pub largest_harm: f64,
-    /// Factor between two residuals (RMS) up to which they are the same: between one and the noise floor, and
-    /// between one and what a held model left when it was identified.
+    /// Factor between two errors (RMS) up to which they are the same: between a residual and the noise floor,
+    /// between one and what a held model left when it was identified, and between the errors on motion held
+    /// out with and without an effect, in the mean of the torques or all together.
     pub same_error: f64,
-    /// Residual over noise floor of one torque, over the same of the one nearest to its floor, from which on
-    /// it is structure if its samples hang together (`structured_correlation`): the noise of a robot's
-    /// sensors is of one colour, and raises all residuals over their floors alike.
-    pub structured_ratio: f64,
-    /// Correlation of a residual's samples a quarter to half a second apart, less what the filter gives to
-    /// noise, from which on they hang together.
-    pub structured_correlation: f64,
     /// Correlation of a residual's samples 2.5 s apart from which on it wanders, whatever it follows: noise
     /// of up to 1 s of correlation has less than a tenth.
     pub wander: f64,
@@ -69,13 +56,8 @@ impl Default for Thresholds {
             least_of_others: 0.02,
             least_size: 0.01,
             least_visible: 0.03,
-            small_size: 0.05,
-            negligible_share: 0.005,
-            largest_harm: 1.05,
-            same_error: 1.15,
-            structured_ratio: 8.0,
-            structured_correlation: 0.3,
-            wander: 0.5,
+            same_error: 1.05,
+            wander: 0.3,
         }
     }
 }
@@ -105,7 +87,14 @@ impl Thresholds {
         Err(UnknownThreshold { name: name.to_owned(), known })
     }
 
-    fn by_name(&mut self) -> [(&'static str, &mut f64); 14] {
+    /// A residual below this share of its torque (RMS) is as good as none: nothing is sought in it, and it
+    /// does no harm to be larger than it was. What is left of an effect of `least_size` where the other
+    /// parameters have taken up a part of it is above.
+    pub fn negligible_share(&self) -> f64 {
+        0.5 * self.least_size
+    }
+
+    fn by_name(&mut self) -> [(&'static str, &mut f64); 9] {
         [
             ("false_name_probability", &mut self.false_name_probability),
             ("false_structure_probability", &mut self.false_structure_probability),
@@ -114,12 +103,7 @@ impl Thresholds {
             ("least_of_others", &mut self.least_of_others),
             ("least_size", &mut self.least_size),
             ("least_visible", &mut self.least_visible),
-            ("small_size", &mut self.small_size),
-            ("negligible_share", &mut self.negligible_share),
-            ("largest_harm", &mut self.largest_harm),
             ("same_error", &mut self.same_error),
-            ("structured_ratio", &mut self.structured_ratio),
-            ("structured_correlation", &mut self.structured_correlation),
             ("wander", &mut self.wander),
         ]
     }

@@ -45,7 +45,7 @@ impl Search<'_> {
     /// The error of all torques together, over them, where one that is as good as none counts as the largest
     /// such: a joint of large torques would hide by its noise what is won on all others.
     pub(super) fn counted(&self, error: &TorqueError) -> f64 {
-        error.relative_from(self.options.thresholds.negligible_share)
+        error.relative_from(self.options.thresholds.negligible_share())
     }
 
     /// Of the other ways to end the search the first that is no worse there than the declared model, whose
