@@ -74,8 +74,10 @@ struct Window {
     states: Vec<[f64; 3]>,
 }
 
-/// The disturbances in some folds, in the order of their logs; none where rows of the design are not one for
-/// each joint, or for nothing usual in too few windows.
+/// The disturbances in some folds, in the order of their logs. None are told of a robot whose torques are not
+/// one for each joint, nor of motion that is too short to have a usual residual (5 s).
+///
+/// A window takes some 200 bytes, and of long logs they are made longer, so that memory stays flat.
 ///
 /// # Errors
 /// A log cannot be read, or `parameters` are not of the design.
@@ -86,15 +88,17 @@ pub fn disturbances(
     sources: &[&dyn BlockSource],
     settings: &DisturbanceSettings,
 ) -> Result<Vec<Disturbance>, IdentificationError> {
+    let time_s: f64 = folds.iter().map(|fold| fold.end - fold.start).filter(|time| time.is_finite()).sum();
+    let window_s = settings.window_s.max(time_s / MOST_WINDOWS);
     let mut windows: Vec<Window> = Vec::new();
     predict(design, parameters, sources, &mut |prediction| {
         let is_inside = folds.iter().any(|fold| fold.contains(prediction.log, prediction.t));
         if is_inside && prediction.q.len() == prediction.measured.len() {
-            take(&mut windows, prediction, settings.window_s);
+            take(&mut windows, prediction, window_s);
         }
     })?;
     windows.iter_mut().for_each(Window::finish);
-    Ok(found(&windows, settings))
+    Ok(found(&windows, &DisturbanceSettings { window_s, ..*settings }))
 }
 
 fn take(windows: &mut Vec<Window>, prediction: &Prediction<'_>, window_s: f64) {
@@ -135,6 +139,8 @@ impl Window {
 
 /// Fewer windows than this have nothing usual.
 const FEWEST_WINDOWS: usize = 50;
+/// So many windows, some six hours of them, are kept at most.
+const MOST_WINDOWS: f64 = 200_000.0;
 
 fn found(windows: &[Window], settings: &DisturbanceSettings) -> Vec<Disturbance> {
     let torques = windows.first().map_or(0, |window| window.squares.len());

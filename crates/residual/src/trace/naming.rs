@@ -16,9 +16,9 @@ use std::collections::BTreeMap;
 pub const LEAST_RIVAL: f64 = 0.05;
 
 /// The odds that an effect's work is done by none of the forms that were compared, against the chosen one. Of
-/// the names of which the compared forms left no doubt, 97.0 % were true (`cargo xtask undeclared --suite
-/// wide_effects` prints how often names of each confidence are).
-const OF_NO_KNOWN_FORM: f64 = 0.03;
+/// 395 names of which the compared forms left no doubt, 94.9 % were true (`cargo xtask undeclared --suite
+/// wide_effects` prints how often names of each confidence are; 36 development and 30 reporting cases).
+const OF_NO_KNOWN_FORM: f64 = 0.05;
 
 /// The model without the forms of something simpler from a level on, constants refined.
 struct Simpler {
