@@ -101,7 +101,8 @@ fn results_knowing(
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
     let Traced { start, declared, floor, mut tracing } = traced(arguments, &excluded, &session, &data)?;
-    if let Some(corner_hz) = low_passed_in_band(arguments, &session, &tracing) {
+    let least_share = thresholds(arguments)?.least_share;
+    if let Some(corner_hz) = low_passed_in_band(arguments, &session, &tracing, least_share) {
         let corner = significant(corner_hz, 3);
         let warning = format!(
             "the torque was low-passed before it was logged, at about {corner} Hz: columns and torque are \
@@ -208,9 +209,21 @@ fn held_out_had_a_say(left_out: &[EffectSpec]) -> String {
 const MOST_LEFT_OUT: usize = 6;
 
 /// The corner of the filter that the torque went through before it was logged \[Hz\], if that is below the
-/// cut-off of columns and torque and nobody asked for this one.
-fn low_passed_in_band(arguments: &ExplainArguments, session: &Session, tracing: &Tracing) -> Option<f64> {
+/// cut-off of columns and torque and nobody asked for this one. What is low-passed takes its share of what is
+/// left, as what has a name does: a filter of two joints that polishes them is no reason to see less of all.
+fn low_passed_in_band(
+    arguments: &ExplainArguments,
+    session: &Session,
+    tracing: &Tracing,
+    least_share: f64,
+) -> Option<f64> {
     if arguments.model.is_some() || arguments.session.parallel_cutoff_hz.is_some() {
+        return None;
+    }
+    let found = tracing.effects.iter().chain(&tracing.refinements);
+    let filters = found.filter(|effect| smoothing_corner_hz(&effect.spec).is_some());
+    let left = filters.map(|effect| 1.0 - effect.explains).product::<f64>();
+    if 1.0 - left < least_share {
         return None;
     }
     let corners = tracing.specs.iter().filter_map(smoothing_corner_hz);
