@@ -1,7 +1,7 @@
 //! Moments in which something else acted on the robot: a push, a collision, a cable that caught.
 //!
-//! A model cannot know of them, and a second of them is enough to spoil it: one push of the weight of an arm
-//! took the names from the frictions of five joints. They are told by two things: what is left of a torque is
+//! A model cannot know of them, and a second of them is enough to spoil it: two pushes in 75 s took the names
+//! from the frictions of five joints. They are told by two things: what is left of a torque is
 //! large there and small at nearly all other times, and in the same state of the joint at other times it is
 //! small as well, so that no function of the motion is missing.
 

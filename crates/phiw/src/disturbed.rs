@@ -45,8 +45,8 @@ impl DisturbedLogs {
         if found.is_empty() {
             return Ok(None);
         }
-        let of_log = |found: Disturbance| (session.arguments.train[found.log].clone(), found);
-        let found = self.found.iter().cloned().chain(found.into_iter().map(of_log)).collect();
+        let of_log = |found: Disturbance| Some((session.arguments.train.get(found.log)?.clone(), found));
+        let found = self.found.iter().cloned().chain(found.into_iter().filter_map(of_log)).collect();
         Ok(Some(DisturbedLogs { found, traces: self.traces + 1 }))
     }
 

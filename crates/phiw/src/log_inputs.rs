@@ -47,8 +47,8 @@ pub fn train_and_validate(
     given: &InMemory,
 ) -> [Vec<LogSource>; 2] {
     let undisturbed = |source: LogSource| {
-        let left_out = given.disturbed.get(&source.path).cloned().unwrap_or_default();
-        LogSource { left_out, ..source }
+        let disturbed = given.disturbed.get(&source.path).cloned().unwrap_or_default();
+        LogSource { disturbed, ..source }
     };
     let Some(map) = map else {
         let training = sources(train, None, given).into_iter().map(undisturbed).collect();

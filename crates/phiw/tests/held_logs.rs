@@ -74,8 +74,8 @@ fn a_held_log_gives_the_model_of_the_log_that_it_was_made_of() {
     assert!(warnings.iter().any(|warning| warning.contains("the repeats are left out")), "{warnings:?}");
 }
 
-/// Positions of two joints that were read at a quarter of the log's rate were named elasticities of their
-/// drives.
+/// On an arm of six joints, positions of the wrist that were read at a quarter of the log's rate were named
+/// elasticities of its drives.
 #[test]
 fn held_positions_name_what_fresh_ones_do() {
     let logs = || [synthetic::recording(1, 30.0), synthetic::recording(2, 20.0)];

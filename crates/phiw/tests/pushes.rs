@@ -42,8 +42,8 @@ fn said(found: &Results) -> Option<&String> {
     found.warnings.iter().find(|warning| warning.contains("something else acted on the robot"))
 }
 
-/// The frictions of all joints that were pushed lost their names, and three to four times as much of the
-/// torque was left.
+/// On an arm of six joints that was pushed twice in 75 s, the frictions of five had lost their names, and
+/// four times as much of the torque was left.
 #[test]
 fn a_push_is_said_and_takes_no_names() {
     let undisturbed = explained([&[], &[]]);

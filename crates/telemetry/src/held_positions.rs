@@ -53,7 +53,7 @@ impl HeldPosition {
         }
     }
 
-    /// The position at a stamp, which no later one is before.
+    /// The position at a stamp. Stamps are asked for in ascending order.
     fn at(&mut self, t: f64, value: f64) -> f64 {
         while self.readings.len() > 3 && self.readings[3].0 <= t {
             self.readings.pop_front();

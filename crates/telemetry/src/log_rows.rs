@@ -23,7 +23,7 @@ pub(crate) struct LogRows {
     last: Vec<f64>,
     /// Which stretches are read; `None` where all are.
     facts: Option<LogFacts>,
-    /// [`LogSource::left_out`].
+    /// [`LogSource::disturbed`].
     disturbed: Vec<[f64; 2]>,
     part: LogPart,
     first_stamp: Option<f64>,
@@ -44,7 +44,7 @@ pub(crate) fn open_log_of(
     joints: &[String],
     torque: (TorqueColumns, Signal),
 ) -> Result<LogRows, LogError> {
-    let LogSource { path, map, part, columns: in_memory, left_out, .. } = source;
+    let LogSource { path, map, part, columns: in_memory, disturbed, .. } = source;
     let map = map.as_deref();
     let options = OpenOptions { topic: map.and_then(|map| map.topic()).map(str::to_owned) };
     let mut table = match in_memory {
@@ -78,7 +78,7 @@ pub(crate) fn open_log_of(
         columns,
         is_plain,
         facts,
-        disturbed: left_out.clone(),
+        disturbed: disturbed.clone(),
         part: *part,
         first_stamp: None,
     })

@@ -18,7 +18,7 @@ pub struct LogSource {
     pub columns: Option<Arc<NamedColumns>>,
     /// Stretches in which something else acted on the robot, first and last stamp each \[s\]: they are left
     /// out.
-    pub left_out: Vec<[f64; 2]>,
+    pub disturbed: Vec<[f64; 2]>,
     /// What the map calls it, where that is not the name it has now.
     pub name_in_map: Option<PathBuf>,
 }
@@ -36,7 +36,7 @@ impl LogSource {
             map,
             part: LogPart::All,
             columns: None,
-            left_out: Vec::new(),
+            disturbed: Vec::new(),
             name_in_map: None,
         }
     }
