@@ -69,7 +69,7 @@ pub mod fitting {
     pub use crate::free_constants::{ByConstant, FreeConstant, free_constants};
     pub use crate::held_out_change::{HeldOutChange, held_out_change};
     pub use crate::identify::Declared;
-    pub use crate::log_change::{LogChange, log_changes};
+    pub use crate::log_change::{LogChange, log_changes, odd_log};
     pub use crate::own_torque::{OwnTorqueFit, fit_with_own_torque};
 }
 

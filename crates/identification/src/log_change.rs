@@ -1,8 +1,8 @@
 //! Whether the training logs are of one robot.
 
-use crate::IdentificationError;
 use crate::accumulate::Fold;
-use crate::fit::Fit;
+use crate::fit::{Fit, fit};
+use crate::{Design, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, leave_one_out};
 use phiw_regressor::least_squares::GroupedFactor;
@@ -82,4 +82,34 @@ pub fn log_changes(
     }
     changes.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
     Ok(changes)
+}
+
+/// The training log that is not of the robot of all others: with it the logs are not of one robot, without it
+/// they are, and that is so of no other log. None where there are fewer than three logs: of two that differ
+/// nobody knows which is the robot's.
+///
+/// # Errors
+/// The factors are not of the design, or all logs together do not tell its parameters.
+pub fn odd_log(
+    design: &Design,
+    train: &[Fold],
+    folds: &[GroupedFactor],
+) -> Result<Option<usize>, IdentificationError> {
+    let mut logs: Vec<usize> = train.iter().map(|fold| fold.log).collect();
+    logs.dedup();
+    if logs.len() < 3 || log_changes(&fit(design, folds)?, train, folds)?.is_empty() {
+        return Ok(None);
+    }
+    let mut odd = Vec::new();
+    for log in logs {
+        let others = train.iter().zip(folds).filter(|(fold, _)| fold.log != log);
+        let (train, folds): (Vec<Fold>, Vec<GroupedFactor>) =
+            others.map(|(fold, factor)| (*fold, factor.clone())).unzip();
+        // What the others do not tell without it may be the robot's.
+        let Ok(of_others) = fit(design, &folds) else { continue };
+        if log_changes(&of_others, &train, &folds)?.is_empty() {
+            odd.push(log);
+        }
+    }
+    Ok(if let [only] = odd[..] { Some(only) } else { None })
 }

@@ -4,7 +4,7 @@ mod synthetic;
 
 use phiw_dynamics::Tree;
 use phiw_dynamics::random_tree::RandomNumbers;
-use phiw_identification::fitting::{LogChange, fit, log_changes};
+use phiw_identification::fitting::{LogChange, fit, log_changes, odd_log};
 use phiw_identification::{Fold, identify};
 use phiw_regressor::factor::FactorBuilder;
 use phiw_regressor::least_squares::{Group, GroupedFactor};
@@ -34,6 +34,37 @@ fn a_tool_that_one_training_log_has_is_told() {
         let largest = changes.first().unwrap_or_else(|| panic!("robot {seed}: nothing is said"));
         assert!(changes.iter().all(|change| change.ratio <= largest.ratio), "{changes:?}");
     }
+}
+
+/// Of three logs the one with a tool, wherever it stands; of logs of one robot none, and of two none.
+#[test]
+fn the_log_of_another_robot_is_the_one_without_which_the_others_are_of_one() {
+    for seed in 0..3 {
+        let tree = synthetic::robot(seed, JOINTS);
+        for odd in 0..3 {
+            let robots =
+                [0, 1, 2].map(|log| if log == odd { synthetic::with_tool(&tree) } else { tree.clone() });
+            assert_eq!(odd_of(&robots, seed), Some(odd), "robot {seed}");
+            assert_eq!(odd_of(&robots[odd.min(1)..][..2], seed), None, "robot {seed}");
+        }
+        assert_eq!(odd_of(&[tree.clone(), tree.clone(), tree], seed), None, "robot {seed}");
+    }
+}
+
+/// The odd one of logs of these robots, one after the other.
+fn odd_of(robots: &[Tree], seed: u64) -> Option<usize> {
+    let (mut train, mut factors, mut design) = (Vec::new(), Vec::new(), None);
+    for (log, robot) in robots.iter().enumerate() {
+        let recorded = synthetic::recording_that_changes(robot, robot, LOG_S, LOG_S, 10 * seed + log as u64);
+        let blocks = synthetic::blocks(&recorded, 4096);
+        let data = synthetic::data(&blocks, synthetic::folds(LOG_S, 8), Vec::new());
+        let effects = (0..JOINTS).map(|joint| vec![synthetic::Viscous::on(robot, joint)]).collect();
+        let identified = identify(robot, effects, &data).unwrap();
+        train.extend(data.train.iter().map(|fold| Fold { log, ..*fold }));
+        factors.extend(identified.train_folds);
+        design = Some(identified.design);
+    }
+    odd_log(&design.unwrap(), &train, &factors).unwrap()
 }
 
 /// A parameter that one log tells and the other does not: beside the other log's rows, its own were lost in

@@ -9,14 +9,15 @@ use crate::draws::Draws;
 use crate::explain_page;
 use crate::held_out_reproduction::HeldOutReproduction;
 use crate::identify::{Outcome, Results, outputs};
-use crate::log_apart::what_differs;
+use crate::log_apart::{changes_in, what_differs};
 use crate::model_file::ModelFile;
+use crate::odd_log::without_odd_log;
 use crate::output::take_folder;
 use crate::possible_bodies::PossibleBodies;
 use crate::report_json::{by_joint, report_json};
 use crate::session::{Session, read_robot};
 use crate::torque_zeros::ZerosOfLogs;
-use crate::{Error, bandwidth, refuted, summary};
+use crate::{Error, bandwidth, odd_log, refuted, summary};
 use indexmap::IndexMap;
 use phiw_effects::{Catalogue, SignalRanges, smoothing_corner_hz};
 use phiw_identification::fitting::TorqueError;
@@ -31,6 +32,7 @@ use phiw_residual::trace::{
     self, HeldModel, ScannedConstant, Thresholds, TraceInput, TraceOptions, Tracing, trace,
 };
 use std::fmt::Write;
+use std::path::PathBuf;
 
 /// A model to start from: its effects' specs, its parameters, and what was known if it is held.
 struct Start {
@@ -76,6 +78,8 @@ struct OfTheLogs {
     traced_for_zeros: usize,
     /// Moments in which something else acted on the robot, which are left out.
     disturbed: DisturbedLogs,
+    /// A training log of another robot, which is left out.
+    odd_log: Option<PathBuf>,
 }
 
 /// Traces that seek zeros of torques: a zero that is small beside others is found once these are off.
@@ -100,6 +104,13 @@ fn results_knowing(
     };
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
+    if arguments.model.is_none()
+        && known.odd_log.is_none()
+        && let Some((session, odd)) = without_odd_log(&session, &data)?
+    {
+        let others = ExplainArguments { session, ..arguments.clone() };
+        return results_knowing(&others, console, &OfTheLogs { odd_log: Some(odd), ..known.clone() });
+    }
     let Traced { start, declared, floor, mut tracing } = traced(arguments, &excluded, &session, &data)?;
     let least_share = thresholds(arguments)?.least_share;
     if let Some(corner_hz) = low_passed_in_band(arguments, &session, &tracing, least_share) {
@@ -154,6 +165,12 @@ fn results_knowing(
         // Logs that are too short to say what differs say nothing of it.
         let differs = analysis.odd_log.and_then(|odd| what_differs(arguments, odd).ok().flatten());
         analysis.warnings.extend(differs);
+    }
+    if let Some(odd) = &known.odd_log {
+        let model = serde_json::to_string(&analysis.model)
+            .map_err(|source| Error::Json { file: "model.json", source })?;
+        let differs = changes_in(arguments, model, odd).ok().flatten();
+        analysis.warnings.push(odd_log::warning(odd, differs.as_deref()));
     }
     analysis.noise_floor = floor;
     analysis.warnings.extend(known.low_passed.clone());

@@ -37,6 +37,7 @@ mod model_file;
 mod model_use;
 pub mod next;
 mod not_identified;
+mod odd_log;
 pub mod output;
 pub mod page;
 mod parameters;

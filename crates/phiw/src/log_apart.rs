@@ -7,7 +7,7 @@ use crate::warnings::file_name;
 use crate::{Error, explain, identify};
 use phiw_report::json::EffectJson;
 use phiw_report::number::significant;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Says by which effects the training log `odd` differs from the others: the model of these is held, and what
 /// has changed is sought in it. Nothing where nothing is found.
@@ -22,9 +22,20 @@ pub fn what_differs(arguments: &ExplainArguments, odd: usize) -> Result<Option<S
     let model = identify::results(&SessionArguments { train: others, ..session.clone() }, &console)?;
     let Some(model) = model.files.iter().find(|file| file.name == "model.json") else { return Ok(None) };
     let model = String::from_utf8_lossy(&model.content).into_owned();
+    let differs = changes_in(arguments, model, log)?;
+    Ok(differs.map(|differs| format!("{} differs from the other training logs by {differs}", file_name(log))))
+}
+
+/// The effects that have changed in `log` where the `model` (as in `model.json`) is held; nothing where none
+/// is found.
+///
+/// # Errors
+/// The log holds too little.
+pub fn changes_in(arguments: &ExplainArguments, model: String, log: &Path) -> Result<Option<String>, Error> {
+    let session = &arguments.session;
     let held = ExplainArguments {
         session: SessionArguments {
-            train: vec![log.clone()],
+            train: vec![log.to_owned()],
             validate: Vec::new(),
             declare: Vec::new(),
             in_memory: InMemory { model: Some(model), ..session.in_memory.clone() },
@@ -34,11 +45,9 @@ pub fn what_differs(arguments: &ExplainArguments, odd: usize) -> Result<Option<S
         draws: 0,
         ..arguments.clone()
     };
-    let found = explain::results(&held, &console)?;
+    let found = explain::results(&held, &Console::silent())?;
     let effects: Vec<String> = found.report.effects.iter().map(in_words).collect();
-    Ok((!effects.is_empty()).then(|| {
-        format!("{} differs from the other training logs by {}", file_name(log), effects.join("; "))
-    }))
+    Ok((!effects.is_empty()).then(|| effects.join("; ")))
 }
 
 /// An effect with its first parameter on each joint.

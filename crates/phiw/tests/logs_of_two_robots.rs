@@ -7,15 +7,22 @@ use phiw::explain::results;
 use phiw::identify::Results;
 use phiw_report::json::Verdict;
 use std::fs;
+use std::path::PathBuf;
 use tempfile::TempDir;
 
-/// Explains three logs of the right model, viscous friction declared; in the second the last link has `tool`
-/// times its own mass more.
-fn explained(tool: f64) -> Results {
+/// Explains logs of the right model, viscous friction declared, of which the last is held out; in the second
+/// the last link has `tool` times its own mass more.
+fn explained(training: usize, tool: f64) -> Results {
     let folder = TempDir::new().unwrap();
+    let (logs, arguments) = logs(training, tool, &folder);
+    results(&synthetic::explain_arguments(folder.path(), logs, &arguments), &Console::silent()).unwrap()
+}
+
+/// Writes these logs: those of training, and the one held out; and what is declared.
+fn logs(training: usize, tool: f64, folder: &TempDir) -> ([Vec<PathBuf>; 2], [&'static str; 1]) {
     let path = |index: usize| folder.path().join(format!("log_{index}.csv"));
     fs::write(folder.path().join("robot.urdf"), synthetic::URDF).unwrap();
-    for index in 0..3 {
+    for index in 0..=training {
         let mut tree = synthetic::tree();
         if index == 1 {
             let mut parameters = tree.inertial_parameters();
@@ -26,9 +33,7 @@ fn explained(tool: f64) -> Results {
         let log = synthetic::recording_of_tree(&tree, 50 + index as u64, 30.0);
         fs::write(path(index), synthetic::csv(&log)).unwrap();
     }
-    let logs = [vec![path(0), path(1)], vec![path(2)]];
-    let arguments = synthetic::explain_arguments(folder.path(), logs, &["viscous_friction"]);
-    results(&arguments, &Console::silent()).unwrap()
+    ([(0..training).map(path).collect(), vec![path(training)]], ["viscous_friction"])
 }
 
 /// The sentence about robots that differ, if there is one.
@@ -38,7 +43,7 @@ fn said(found: &Results) -> Option<&String> {
 
 #[test]
 fn logs_that_differ_are_said_and_leave_structure() {
-    let found = explained(2.0);
+    let found = explained(2, 2.0);
     let warning = said(&found).unwrap();
     assert!(
         warning.contains("log_1.csv") && warning.contains("phiw explain --model model.json"),
@@ -58,7 +63,41 @@ fn logs_that_differ_are_said_and_leave_structure() {
 
 #[test]
 fn logs_of_one_robot_are_not() {
-    let found = explained(0.0);
+    let found = explained(2, 0.0);
+    assert_eq!(said(&found), None);
+    assert_eq!(found.report.verdict, Some(Verdict::Sufficient));
+}
+
+/// Of three logs one that is of another robot can be told: a saturation had a name of the model of all three,
+/// and the log that was said to differ was not always the one with the tool.
+#[test]
+fn one_of_three_logs_with_a_tool_is_left_out_and_its_tool_is_weighed() {
+    let found = explained(3, 2.0);
+    let left_out = |found: &[String]| {
+        found
+            .iter()
+            .find(|warning| warning.contains("is not of the robot of the other training logs"))
+            .cloned()
+    };
+    let warning = left_out(&found.warnings).unwrap();
+    assert!(
+        warning.starts_with("log_1.csv") && warning.contains("it differs by payload of joint_3"),
+        "{warning}"
+    );
+    assert_eq!(said(&found), None);
+    assert_eq!(found.report.verdict, Some(Verdict::Sufficient));
+
+    // `identify` leaves it out, too, so that the error before is the same.
+    let folder = TempDir::new().unwrap();
+    let (logs, declared) = logs(3, 2.0, &folder);
+    let arguments = synthetic::explain_arguments(folder.path(), logs, &declared);
+    let identified = phiw::identify::results(&arguments.session, &Console::silent()).unwrap();
+    assert!(left_out(&identified.warnings).unwrap().starts_with("log_1.csv"));
+    let before = |error: &Results| error.report.before.validate.relative.unwrap();
+    assert!((before(&identified) - before(&found)).abs() < 1e-12);
+
+    let found = explained(3, 0.0);
+    assert_eq!(left_out(&found.warnings), None);
     assert_eq!(said(&found), None);
     assert_eq!(found.report.verdict, Some(Verdict::Sufficient));
 }

@@ -178,7 +178,7 @@ impl<'a> Case<'a> {
             }
         }
         let visible = absorber.visible(&records);
-        let enough = if self.spec.suite == Suite::Outside { VISIBLE_OUTSIDE } else { VISIBLE };
+        let enough = if matches!(name, Name::Outside(_)) { VISIBLE_OUTSIDE } else { VISIBLE };
         (visible >= enough && felt_in_every_log(&secret, tree, ordinary, &self.motions, times))
             .then(|| Drawn { material: secret.joints.clone(), secret, size, visible })
     }

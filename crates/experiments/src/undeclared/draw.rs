@@ -1,5 +1,6 @@
 //! Draws the form of an effect: which joints, which constants.
 
+use super::distortion::Distortion;
 use super::friction::Friction;
 use super::kind::{Kind, Stranger};
 use super::load::{HeldBody, WorldForce};
@@ -219,7 +220,7 @@ pub fn outside(
             Some((vec![joint], Form::LoadStep { held: held_body(joint, rng), when }, 1.0))
         }
         Stranger::SpeedProduct => {
-            let other = (joint + 1 + rng.index((joints - 1).max(1))) % joints;
+            let other = another(joint, joints, rng)?;
             let pair = vec![joint.min(other), joint.max(other)];
             Some((pair, Form::Mechanism(Mechanism::SpeedProduct { felt: joint, other }), rng.sign()))
         }
@@ -227,7 +228,32 @@ pub fn outside(
             let cycles = TAU * rng.uniform(1.5, 4.0) / survey.travel(joint);
             mechanism(Mechanism::PositionFriction { cycles, phase: rng.uniform(0.0, TAU) })
         }
+        Stranger::LoadRipple => {
+            let cycles = TAU * rng.log_uniform(3.0, 20.0) / survey.travel(joint);
+            distortion(joint, Distortion::Ripple { cycles, phase: rng.uniform(0.0, TAU) })
+        }
+        Stranger::FallingTorqueConstant => {
+            distortion(joint, Distortion::OfTorque { large: survey.torque[joint] })
+        }
+        Stranger::SpeedGain => distortion(joint, Distortion::OfSpeed { fast: survey.speed[joint] }),
+        Stranger::Crosstalk => {
+            distortion(joint, Distortion::Crosstalk { other: another(joint, joints, rng)? })
+        }
+        Stranger::FrictionJump => {
+            let after = |[from, to]: &[f64; 2]| [rng.uniform(from + 5.0, to - 5.0), *to + 1.0];
+            mechanism(Mechanism::FrictionJump { when: survey.spans.iter().map(after).collect() })
+        }
+        Stranger::ClockDrift => Some(((0..joints).collect(), Form::ClockDrift, 1.0)),
     }
+}
+
+fn distortion(joint: usize, distortion: Distortion) -> Option<(Vec<usize>, Form, f64)> {
+    Some((vec![joint], Form::Distortion(distortion), 1.0))
+}
+
+/// Another joint than this one; `None` if there is none.
+fn another(joint: usize, joints: usize, rng: &mut CaseRng) -> Option<usize> {
+    (joints > 1).then(|| (joint + 1 + rng.index(joints - 1)) % joints)
 }
 
 fn hysteresis(joint: usize, survey: &Survey, rng: &mut CaseRng) -> Friction {

@@ -60,6 +60,36 @@ pub enum Stranger {
     SpeedProduct,
     /// Friction that comes and goes around the turn.
     PositionFriction,
+    /// Ripple that grows with the load: teeth that mesh badly, or a motor's commutation.
+    LoadRipple,
+    /// A torque constant that falls with the current, as iron saturates.
+    FallingTorqueConstant,
+    /// A torque constant that falls with the speed.
+    SpeedGain,
+    /// A torque sensor that also feels another joint's torque.
+    Crosstalk,
+    /// Friction that jumps in mid-log and stays: a brake that drags, a seal that slips.
+    FrictionJump,
+    /// Torques whose clock is not that of the positions: a delay that grows over each log.
+    ClockDrift,
+}
+
+impl Stranger {
+    /// Strangers that have a suite of their own: the cases of the others stay what they were.
+    pub const NEW: [Stranger; 6] = [
+        Stranger::LoadRipple,
+        Stranger::FallingTorqueConstant,
+        Stranger::SpeedGain,
+        Stranger::Crosstalk,
+        Stranger::FrictionJump,
+        Stranger::ClockDrift,
+    ];
+
+    /// All others.
+    pub fn of_other_suites() -> Vec<Stranger> {
+        let all = <Stranger as clap::ValueEnum>::value_variants().iter();
+        all.copied().filter(|stranger| !Stranger::NEW.contains(stranger)).collect()
+    }
 }
 
 /// What a secret is called.

@@ -43,6 +43,8 @@ pub enum Mechanism {
     SpeedProduct { felt: usize, other: usize },
     /// (1 + sin(Nq + φ))·sign(q̇).
     PositionFriction { cycles: f64, phase: f64 },
+    /// sign(q̇) in these parts of the session \[s\].
+    FrictionJump { when: Vec<[f64; 2]> },
 }
 
 impl Mechanism {
@@ -99,6 +101,11 @@ impl Mechanism {
             Mechanism::SpeedProduct { .. } => 0.0,
             Mechanism::PositionFriction { cycles, phase } => {
                 (1.0 + (cycles * q + phase).sin()) * scene.ordinary.sign(v)
+            }
+            Mechanism::FrictionJump { when } => {
+                let time = scene.times[sample];
+                let has_jumped = when.iter().any(|[from, to]| (*from..*to).contains(&time));
+                if has_jumped { scene.ordinary.sign(v) } else { 0.0 }
             }
         }
     }

@@ -47,6 +47,7 @@
 // wide_table.rs, are each one subject in two files: the ordinary part, and what the wide suites add to it.
 mod case;
 mod certainty;
+mod distortion;
 mod draw;
 mod elasticity;
 mod family;
@@ -99,7 +100,7 @@ pub struct Arguments {
     #[arg(long)]
     all: bool,
     /// Suites, separated by commas: one, two, three, control, outside (together: old), wide_right,
-    /// wide_effects, wide_outside (together: wide), new_kinds, large_gains.
+    /// wide_effects, wide_outside (together: wide), new_kinds, large_gains, new_strangers.
     #[arg(long, value_name = "SUITE", default_value = "old", value_parser = suites)]
     suite: std::sync::Arc<Suites>,
     /// Only cases in this situation (wide suites).
@@ -172,7 +173,7 @@ fn suites(text: &str) -> Result<std::sync::Arc<Suites>, String> {
                 format!(
                     "no suite {name:?}; there are old and wide, or single ones of them: one, two, \
                      three, control, outside, wide_right, wide_effects, wide_outside, new_kinds, \
-                     large_gains"
+                     large_gains, new_strangers"
                 )
             })?),
         }

@@ -168,8 +168,25 @@ pub fn record(
             }
         }
     }
+    for secret in secrets.iter().filter(|secret| matches!(secret.form, Form::ClockDrift)) {
+        let earlier: Vec<f64> =
+            times.iter().map(|time| time - secret.scale * (time - motion.start)).collect();
+        let (_, delayed) = true_torque(tree, ordinary, secrets, motion, &earlier);
+        for sample in 0..times.len() {
+            for &joint in &secret.joints {
+                torque[sample * joints + joint] = delayed[sample * joints + joint];
+            }
+        }
+    }
     for secret in secrets {
-        match secret.form {
+        match &secret.form {
+            Form::Distortion(distortion) => {
+                for (sample, row) in torque.chunks_exact_mut(joints).enumerate() {
+                    for &joint in &secret.joints {
+                        row[joint] += secret.scale * distortion.added(&states, sample, joint, row);
+                    }
+                }
+            }
             Form::Gain => over(&mut torque, joints, &secret.joints, |torque| torque * (1.0 + secret.scale)),
             Form::DeadBand => {
                 over(&mut torque, joints, &secret.joints, |torque| {

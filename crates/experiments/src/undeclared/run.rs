@@ -111,7 +111,8 @@ fn run_one(spec: &Spec, robots: &[Robot], tracer: &Tracer, options: &Options) ->
         | Suite::WideEffects
         | Suite::WideOutside
         | Suite::NewKinds
-        | Suite::LargeGains => tracer
+        | Suite::LargeGains
+        | Suite::NewStrangers => tracer
             .remainder(&case.without_secrets(), &temporary.path().join("twin"))
             .inspect_err(|error| eprintln!("{}: no noise floor: {error:#}", spec.seed))
             .ok(),

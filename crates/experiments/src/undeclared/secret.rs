@@ -1,5 +1,6 @@
 //! A secret: one undeclared effect with its form, its joints and its size.
 
+use super::distortion::Distortion;
 use super::elasticity::softest;
 use super::family::Family;
 use super::friction::Friction;
@@ -45,6 +46,11 @@ pub enum Form {
     EncoderOffset,
     /// The sensor reads 0 below this torque \[N·m\].
     DeadBand,
+    /// The logged torque is too large by a share that follows the state.
+    Distortion(Distortion),
+    /// The logged torque's clock is this much slower than the positions' \[s/s\]: a delay that grows from the
+    /// beginning of each log.
+    ClockDrift,
     /// The actuator delivers no more than this \[N·m\].
     Saturation,
 }
@@ -70,6 +76,7 @@ impl Form {
             Form::EncoderOffset => [0.003, 0.35],
             Form::Tilt { .. } => [0.005, 0.35],
             Form::Gain => [0.02, 0.4],
+            Form::ClockDrift => [1e-4, 1e-2],
             Form::Payload(_) | Form::LoadStep { .. } => [1e-3, 30.0],
             // Its softest depends on what it carries: see [`super::elasticity::softest`].
             Form::Elasticity => [1e-7, 0.2],

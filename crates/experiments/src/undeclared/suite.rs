@@ -32,6 +32,8 @@ pub enum Suite {
     /// A torque that is logged at a third to 0.6 or 1.6 to 3 times what it is, in one case of three beside
     /// another effect.
     LargeGains,
+    /// One of [`Stranger::NEW`], effects that are not in the catalogue and were found last.
+    NewStrangers,
 }
 
 /// Development seeds are for looking at; reporting seeds only for reporting.
@@ -46,7 +48,7 @@ pub enum Seeds {
 
 impl Suite {
     /// All suites.
-    pub const ALL: [Suite; 10] = [
+    pub const ALL: [Suite; 11] = [
         Suite::One,
         Suite::Two,
         Suite::Three,
@@ -57,6 +59,7 @@ impl Suite {
         Suite::WideOutside,
         Suite::NewKinds,
         Suite::LargeGains,
+        Suite::NewStrangers,
     ];
     /// One to three effects on an otherwise right model, well excited.
     pub const OLD: [Suite; 5] = [Suite::One, Suite::Two, Suite::Three, Suite::Control, Suite::Outside];
@@ -81,6 +84,7 @@ impl Suite {
             Suite::WideOutside => 120,
             Suite::NewKinds => 120,
             Suite::LargeGains => 120,
+            Suite::NewStrangers => 120,
         }
     }
 
@@ -100,7 +104,9 @@ impl Suite {
             Seeds::Dev => 1,
             Seeds::Report => 2,
         };
-        phase * 1_000_000 + self as u64 * 100_000 + index as u64
+        // Ten suites to a million: the first ten keep their seeds.
+        let suite = self as u64;
+        (phase + suite / 10 * 10) * 1_000_000 + suite % 10 * 100_000 + index as u64
     }
 }
 
@@ -128,7 +134,8 @@ pub struct Spec {
 impl Spec {
     /// The case of a seed; `None` if no suite has it.
     pub fn of_seed(seed: u64, robots: usize) -> Option<Spec> {
-        let suite = *Suite::ALL.get((seed % 1_000_000 / 100_000) as usize)?;
+        let suite = seed / 10_000_000 * 10 + seed % 1_000_000 / 100_000;
+        let suite = *Suite::ALL.get(suite as usize)?;
         let index = (seed % 100_000) as usize;
         let rng = &mut CaseRng::new(seed, u64::MAX >> 8, Stream::Secret);
         let kinds = Kind::of_other_suites();
@@ -152,8 +159,12 @@ impl Spec {
             Suite::Three => spec.draw_several(3, rng),
             Suite::Control => spec.held = rng.chance(0.2),
             Suite::Outside => {
-                let strangers = Stranger::value_variants();
+                let strangers = Stranger::of_other_suites();
                 spec.secrets = vec![Name::Outside(strangers[index % strangers.len()])];
+            }
+            Suite::NewStrangers => {
+                spec.robot = index / Stranger::NEW.len() % robots;
+                spec.secrets = vec![Name::Outside(Stranger::NEW[index % Stranger::NEW.len()])];
             }
             Suite::WideRight | Suite::WideEffects | Suite::WideOutside => spec.draw_wide(index, robots, rng),
             Suite::NewKinds => {
@@ -177,7 +188,7 @@ impl Spec {
             Suite::WideEffects => rng.chance(0.3),
             _ => true,
         };
-        let strangers = Stranger::value_variants();
+        let strangers = Stranger::of_other_suites();
         let count = match self.suite {
             Suite::WideRight => 0,
             Suite::WideOutside => {

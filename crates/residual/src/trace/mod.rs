@@ -23,7 +23,6 @@ mod residuals;
 mod sample;
 mod scanned;
 mod search;
-mod signal_shapes;
 mod stage;
 mod textbook;
 mod thresholds;

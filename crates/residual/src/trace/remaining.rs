@@ -47,7 +47,7 @@ impl Search<'_> {
         let folds = [data.train.as_slice(), &data.held_out].concat();
         let shape = residual_shape(&self.design()?, &self.parameters, &folds, &data.sources, &positions)?;
         let fit = probe::Fit {
-            lines: &shape.time_frequencies,
+            peaks: &shape,
             fixed: self.fixed,
             specs: &self.specs,
             parameters: &self.parameters,

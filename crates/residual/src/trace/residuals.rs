@@ -18,6 +18,10 @@ pub struct ResidualShape {
     /// For each joint, spatial frequencies \[periods·2π over the unit of position\] at which its residual has
     /// peaks, strongest first.
     pub ripple_frequencies: Vec<Vec<f64>>,
+    /// The same of its residual times the torque of the model.
+    pub load_ripple_frequencies: Vec<Vec<f64>>,
+    /// The same of its residual with the sign of the speed.
+    pub friction_ripple_frequencies: Vec<Vec<f64>>,
     /// For each joint, angular frequencies \[rad/s\] at which its residual has peaks over the time of the
     /// session, strongest first.
     pub time_frequencies: Vec<Vec<f64>>,
@@ -63,8 +67,21 @@ struct Collector {
     /// For each torque: sum of the squares, rows that count.
     squares: Vec<(f64, f64)>,
     grids: Vec<Grid>,
-    /// The same over the time.
+    /// The same of the residual times the torque of the model.
+    loads: Vec<Grid>,
+    /// The same with the sign of the speed.
+    frictions: Vec<Grid>,
+    /// Over the time.
     times: Vec<Grid>,
+}
+
+/// One filtered row.
+#[derive(Default)]
+struct FilteredRow {
+    /// What the model leaves of each torque; nothing where the row does not count.
+    residual: Vec<f64>,
+    /// The torques of the model.
+    fitted: Vec<f64>,
 }
 
 /// Fourier sums of a residual over the position.
@@ -135,11 +152,13 @@ pub fn residual_shape(
         products: vec![Default::default(); torques],
         squares: vec![(0.0, 0.0); torques],
         grids: ranges.iter().map(|&range| Grid::new(range)).collect(),
+        loads: ranges.iter().map(|&range| Grid::new(range)).collect(),
+        frictions: ranges.iter().map(|&range| Grid::new(range)).collect(),
         times: ranges.iter().map(|_| Grid::new((0.0, duration))).collect(),
     };
     let mut scratch = design.scratch();
     let mut filter = FilterScratch::default();
-    let mut residual = vec![0.0; torques];
+    let mut filtered = FilteredRow { residual: vec![0.0; torques], fitted: vec![0.0; torques] };
     let mut failure = None;
     let mut rows = 0;
     for source in sources {
@@ -174,8 +193,9 @@ pub fn residual_shape(
                         return collector.begin(collector.lags, false);
                     }
                     rows += 1;
-                    residual_of_row(design, parameters, row, &mut residual);
-                    collector.add(&residual, &block.q[block.row(outputs[output])], t + block.session_offset);
+                    filtered.set(design, parameters, row);
+                    let [q, qd] = [&block.q, &block.qd].map(|signal| &signal[block.row(outputs[output])]);
+                    collector.add(&filtered, q, qd, t + block.session_offset);
                 },
             );
             if let Err(error) = evaluated {
@@ -189,15 +209,17 @@ pub fn residual_shape(
     Ok(collector.shape(rows))
 }
 
-/// What the parameters leave of each torque in one row; nothing where the row does not count.
-fn residual_of_row(design: &Design, parameters: &[f64], row: &[f64], residual: &mut [f64]) {
-    for (torque, layout) in design.rows().iter().enumerate() {
-        let columns = &row[layout.range.clone()];
-        let value = |parameter: usize| parameters.get(parameter).copied().unwrap_or_default();
-        let own = layout.parameters.iter().zip(columns);
-        let fitted: f64 = own.map(|(&parameter, column)| value(parameter) * column).sum();
-        let measured = columns[layout.parameters.len()];
-        residual[torque] = if design.counts(row, torque) { measured - fitted } else { 0.0 };
+impl FilteredRow {
+    fn set(&mut self, design: &Design, parameters: &[f64], row: &[f64]) {
+        for (torque, layout) in design.rows().iter().enumerate() {
+            let columns = &row[layout.range.clone()];
+            let value = |parameter: usize| parameters.get(parameter).copied().unwrap_or_default();
+            let own = layout.parameters.iter().zip(columns);
+            let fitted: f64 = own.map(|(&parameter, column)| value(parameter) * column).sum();
+            let measured = columns[layout.parameters.len()];
+            self.fitted[torque] = fitted;
+            self.residual[torque] = if design.counts(row, torque) { measured - fitted } else { 0.0 };
+        }
     }
 }
 
@@ -214,6 +236,8 @@ impl Collector {
             autocorrelation: self.products.iter().map(largest).collect(),
             wander: self.products.iter().map(|sums| correlation(&sums[STRUCTURE_LAGS.len()])).collect(),
             ripple_frequencies: self.grids.iter().map(Grid::peaks).collect(),
+            load_ripple_frequencies: self.loads.iter().map(Grid::peaks).collect(),
+            friction_ripple_frequencies: self.frictions.iter().map(Grid::peaks).collect(),
             time_frequencies: self.times.iter().map(Grid::peaks).collect(),
             rows,
         }
@@ -230,13 +254,17 @@ impl Collector {
         }
     }
 
-    fn add(&mut self, residual: &[f64], positions: &[f64], time: f64) {
-        for (joint, grid) in self.grids.iter_mut().enumerate() {
-            if residual[joint] != 0.0 {
-                self.squares[joint].0 += residual[joint] * residual[joint];
+    fn add(&mut self, row: &FilteredRow, positions: &[f64], speeds: &[f64], time: f64) {
+        let residual = &row.residual;
+        for (joint, &left) in residual.iter().enumerate() {
+            if left != 0.0 {
+                self.squares[joint].0 += left * left;
                 self.squares[joint].1 += 1.0;
-                grid.add(positions[joint], residual[joint]);
-                self.times[joint].add(time, residual[joint]);
+                let position = positions[joint];
+                self.grids[joint].add(position, left);
+                self.loads[joint].add(position, left * row.fitted[joint]);
+                self.frictions[joint].add(position, left * speeds[joint].signum());
+                self.times[joint].add(time, left);
             }
         }
         let size = self.ring.len();

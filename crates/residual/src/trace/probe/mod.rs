@@ -1,8 +1,13 @@
 //! What a residual follows, without a name: shapes over each signal, fitted on some folds, judged on the
 //! others.
 
+mod others;
+mod own;
+mod shape;
+mod swings;
+
 use super::folds::split_by_motion;
-use super::signal_shapes::{SWINGS, Shape, neighbours, other_shapes, own_shapes};
+use super::residuals::ResidualShape;
 use super::stage::{Fixed, Stage};
 use crate::selection::students_tail;
 use phiw_effects::SignalRanges;
@@ -11,6 +16,7 @@ use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, FactorBuilder, ROUNDING};
 use phiw_regressor::least_squares::GroupedFactor;
 use rayon::prelude::*;
+use shape::{Shape, Torque};
 
 /// A residual that follows a signal.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,12 +31,6 @@ pub struct Dependence {
     pub share: f64,
 }
 
-/// A residual follows a signal that foretells this share of its variance on other folds. Shapes over noise
-/// foretell less than nothing: they were fitted on other noise.
-const LEAST_SHARE: f64 = 0.05;
-/// The same share for swings over the time, whose frequencies are those at which the residual itself is
-/// largest.
-const LEAST_SHARE_OF_SWINGS: f64 = 0.25;
 /// Parts that take turns in being left out.
 const PARTS: usize = 5;
 /// A shape's height is drawn to nothing as if this share of all rows had said so: where few rows are, it does
@@ -49,63 +49,68 @@ pub(super) struct Fit<'a> {
     pub specs: &'a [EffectSpec],
     pub parameters: &'a [f64],
     pub ranges: &'a SignalRanges,
-    /// For each torque the angular frequencies \[rad/s\] at which its residual swings over the time.
-    pub lines: &'a [Vec<f64>],
-    /// Probability that a torque's residual of noise seems to follow any signal.
+    /// Over what the residuals swing.
+    pub peaks: &'a ResidualShape,
+    /// Probability that a residual of noise, of any torque, seems to follow any signal.
     pub false_alarm: f64,
 }
 
 /// Which signals the residuals of the torques `rows` follow, strongest first.
 pub(super) fn probe(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<Dependence>, IdentificationError> {
-    let shapes = |row| {
-        let mut shapes = own_shapes(fit.fixed, row, fit.ranges, &fit.lines[row]);
-        let others = (0..fit.fixed.tree.joint_count()).filter(|&other| other != row);
-        shapes.extend(other_shapes(fit.fixed, row, others, fit.ranges));
-        shapes
-    };
-    let joint = |row: usize| fit.fixed.tree.joint(row).joint.clone();
-    let of_probe =
-        |probe: Probe| Dependence { joint: joint(probe.row), signal: probe.signal, share: probe.share };
-    let mut found: Vec<Dependence> = probes(fit, rows, shapes)?.into_iter().map(of_probe).collect();
+    let all = |row: usize| (0..fit.fixed.tree.joint_count()).filter(|&other| other != row).collect();
+    let mut found = Vec::new();
+    for probe in probes(fit, rows, all)? {
+        for signal in probe.signals {
+            let joint = fit.fixed.tree.joint(probe.row).joint.clone();
+            found.push(Dependence { joint, signal, share: probe.share });
+        }
+    }
     found.sort_by(|a, b| b.share.total_cmp(&a.share));
     Ok(found)
 }
 
-/// Those of the torques `rows` whose residual follows the motion of the joint or of its neighbours. Noise
-/// that does not know the motion foretells nothing, whatever its colour.
+/// Those of the torques `rows` whose residual follows the motion of the joint or of its neighbours, or a
+/// torque. Noise that does not know the motion foretells nothing, whatever its colour.
 pub(super) fn following(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<usize>, IdentificationError> {
-    let shapes = |row| {
-        let mut shapes = own_shapes(fit.fixed, row, fit.ranges, &fit.lines[row]);
-        shapes.extend(other_shapes(fit.fixed, row, neighbours(fit.fixed.tree, row), fit.ranges));
-        shapes
-    };
-    let probes = probes(fit, rows, shapes)?;
+    let probes = probes(fit, rows, |row| others::neighbours(fit.fixed.tree, row))?;
     let mut rows: Vec<usize> = probes.iter().map(|probe| probe.row).collect();
     rows.dedup();
     Ok(rows)
 }
 
-/// Shapes over one signal that foretell a residual.
+/// Shapes over some signals that foretell a residual.
 struct Probe {
     row: usize,
-    signal: String,
+    signals: Vec<String>,
     share: f64,
+}
+
+/// All shapes in the torque of `row`, those over the motion of the `moving` joints among them.
+fn shapes(fit: Fit<'_>, row: usize, moving: &[usize]) -> Vec<Shape> {
+    let torque = Torque { fixed: fit.fixed, row, ranges: fit.ranges, peaks: fit.peaks };
+    let mut shapes = own::single(&torque);
+    shapes.extend(own::products(&torque));
+    shapes.extend(swings::swings(&torque));
+    shapes.extend(moving.iter().flat_map(|&other| others::motion_of(&torque, other)));
+    let others = (0..fit.fixed.tree.joint_count()).filter(|&other| other != row);
+    shapes.extend(others.map(|other| others::torque_of_joint(&torque, other)));
+    shapes
 }
 
 /// The shapes that foretell something, torque by torque.
 fn probes(
     fit: Fit<'_>,
     rows: &[usize],
-    shapes: impl Fn(usize) -> Vec<Shape>,
+    moving: impl Fn(usize) -> Vec<usize>,
 ) -> Result<Vec<Probe>, IdentificationError> {
     if rows.is_empty() {
         return Ok(Vec::new());
     }
-    let (mut effects, mut signals) = (Vec::new(), Vec::new());
+    let (mut effects, mut looked_at) = (Vec::new(), Vec::new());
     for &row in rows {
-        for (signal, effect) in shapes(row) {
+        for Shape { signals, effect, least_share } in shapes(fit, row, &moving(row)) {
             effects.push(effect);
-            signals.push((row, signal));
+            looked_at.push((row, signals, least_share));
         }
     }
     let Fit { fixed, specs, parameters, .. } = fit;
@@ -116,15 +121,13 @@ fn probes(
     let free = if fixed.prior.is_some() { 0 } else { stage.model_size() };
     let mut parameters = parameters.to_vec();
     parameters.resize(stage.design.parameter_count(), 0.0);
-    let signals_of_torque = signals.len().max(1) as f64 / rows.len() as f64;
-    let limit = fit.false_alarm / signals_of_torque;
+    let limit = fit.false_alarm / looked_at.len().max(1) as f64;
     let of_row = |&row: &usize| {
-        let own = signals.iter().enumerate().filter(|(_, (of, _))| *of == row);
-        let own: Vec<(usize, &String)> = own.map(|(candidate, (_, signal))| (candidate, signal)).collect();
         let residual = Residual::new(&stage, &parameters, free, row);
         let alone = residual.left_over(&[])?;
         let mut found = Vec::new();
-        for (candidate, signal) in own {
+        let own = looked_at.iter().enumerate().filter(|(_, (of, ..))| *of == row);
+        for (candidate, (_, signals, least_share)) in own {
             let shape = stage.design.effect_parameters(stage.model_effects + candidate);
             let after = residual.left_over(&shape.collect::<Vec<usize>>())?;
             let share = 1.0 - after.iter().sum::<f64>() / alone.iter().sum::<f64>().max(f64::MIN_POSITIVE);
@@ -135,10 +138,8 @@ fn probes(
             let (alone, after): (Vec<f64>, Vec<f64>) = moving.unzip();
             let t = paired_t(&logarithms(&alone), &logarithms(&after));
             let tail = students_tail(t, (alone.len() as f64 - 1.0).max(1.0));
-            let least = if signal == SWINGS { LEAST_SHARE_OF_SWINGS } else { LEAST_SHARE };
-            if share >= least && tail <= limit {
-                let signal = if signal == SWINGS { "t" } else { signal };
-                found.push(Probe { row, signal: signal.to_owned(), share });
+            if share >= *least_share && tail <= limit {
+                found.push(Probe { row, signals: signals.clone(), share });
             }
         }
         Ok(found)
