@@ -6,6 +6,7 @@ use crate::{Design, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, leave_one_out};
 use phiw_regressor::least_squares::GroupedFactor;
+use std::collections::BTreeSet;
 
 /// A torque that a log by itself tells otherwise than all training logs together.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,22 +87,24 @@ pub fn log_changes(
 
 /// The training log that is not of the robot of all others: with it the logs are not of one robot, without it
 /// they are, and that is so of no other log. None where there are fewer than three logs: of two that differ
-/// nobody knows which is the robot's.
+/// nobody knows which is the robot's. `common` is the fit to all.
 ///
 /// # Errors
-/// The factors are not of the design, or all logs together do not tell its parameters.
+/// The factors are not of the fitted design.
 pub fn odd_log(
     design: &Design,
+    common: &Fit,
     train: &[Fold],
     folds: &[GroupedFactor],
 ) -> Result<Option<usize>, IdentificationError> {
-    let mut logs: Vec<usize> = train.iter().map(|fold| fold.log).collect();
-    logs.dedup();
-    if logs.len() < 3 || log_changes(&fit(design, folds)?, train, folds)?.is_empty() {
+    let logs: BTreeSet<usize> = train.iter().map(|fold| fold.log).collect();
+    if logs.len() < 3 {
         return Ok(None);
     }
+    let differing = log_changes(common, train, folds)?;
+    let differing: BTreeSet<usize> = differing.iter().map(|change| change.log).collect();
     let mut odd = Vec::new();
-    for log in logs {
+    for log in differing {
         let others = train.iter().zip(folds).filter(|(fold, _)| fold.log != log);
         let (train, folds): (Vec<Fold>, Vec<GroupedFactor>) =
             others.map(|(fold, factor)| (*fold, factor.clone())).unzip();

@@ -64,7 +64,8 @@ fn odd_of(robots: &[Tree], seed: u64) -> Option<usize> {
         factors.extend(identified.train_folds);
         design = Some(identified.design);
     }
-    odd_log(&design.unwrap(), &train, &factors).unwrap()
+    let design = design.unwrap();
+    odd_log(&design, &fit(&design, &factors).unwrap(), &train, &factors).unwrap()
 }
 
 /// A parameter that one log tells and the other does not: beside the other log's rows, its own were lost in

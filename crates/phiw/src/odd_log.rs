@@ -5,7 +5,7 @@ use crate::arguments::SessionArguments;
 use crate::session::Session;
 use crate::warnings::file_name;
 use phiw_identification::fitting::odd_log;
-use phiw_identification::{Data, EffectCatalogue, EffectSpec, Variants, identify};
+use phiw_identification::{Data, EffectCatalogue, EffectSpec, Identified, Variants, identify};
 use std::path::{Path, PathBuf};
 
 /// The training log that is of another robot than the others, and the arguments without it; nothing where
@@ -26,7 +26,8 @@ pub fn without_odd_log(
     }
     // Logs that tell no textbook model say nothing of each other.
     let Ok(identified) = identify(&session.tree, textbook(session, data)?, data) else { return Ok(None) };
-    let odd = odd_log(&identified.design, &data.train, &identified.train_folds)?;
+    let Identified { design, fit, train_folds, .. } = &identified;
+    let odd = odd_log(design, fit, &data.train, train_folds)?;
     let Some(odd) = odd.and_then(|odd| session.arguments.train.get(odd)) else { return Ok(None) };
     let mut others = session.arguments.clone();
     others.train.retain(|log| log != odd);
