@@ -433,9 +433,9 @@ fn report(analysis: &Analysis<'_>, tracing: &Tracing) -> ReportJson {
         }
     };
     let mut depends_on: Vec<String> = Vec::new();
-    for dependence in &tracing.remaining.depends_on {
-        if !depends_on.contains(&dependence.signal) {
-            depends_on.push(dependence.signal.clone());
+    for signal in tracing.remaining.depends_on.iter().flat_map(|dependence| &dependence.signals) {
+        if !depends_on.contains(signal) {
+            depends_on.push(signal.clone());
         }
     }
     let base = report_json(analysis);

@@ -1,6 +1,7 @@
 //! The report page of a traced residual: the page of an identification, and what was found.
 
 use crate::analysis::Analysis;
+use crate::remaining_in_words::{follows, remaining_in_words};
 use crate::{Error, page as identified_page, possible_bodies};
 use phiw_effects::Signal;
 use phiw_identification::fitting::TorqueError;
@@ -93,7 +94,7 @@ pub fn headline(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<String> {
         }
     }
     if !tracing.remaining.joints.is_empty() {
-        lines.push(describe(tracing));
+        lines.push(remaining_in_words(&tracing.remaining));
     }
     lines.extend(disturbances(tracing));
     lines
@@ -160,48 +161,6 @@ fn sentences(analysis: &Analysis<'_>, tracing: &Tracing) -> Vec<String> {
         });
     }
     lines
-}
-
-fn describe(tracing: &Tracing) -> String {
-    let remaining = &tracing.remaining;
-    let mut text = format!("What is left on {} is more than noise", remaining.joints.join(", "));
-    let mut follows: Vec<String> = Vec::new();
-    for joint in &remaining.joints {
-        let best = remaining.depends_on.iter().find(|dependence| &dependence.joint == joint);
-        if let Some(best) = best {
-            follows.push(format!(
-                "{} follows {} ({} % of its variance)",
-                joint,
-                signal_in_words(&best.signal),
-                percent(best.share)
-            ));
-        }
-    }
-    if !remaining.by_log.is_empty() {
-        follows.push(format!("{} is told otherwise by one log than by all", remaining.by_log.join(", ")));
-    }
-    if follows.is_empty() {
-        text.push_str(", and follows none of the signals that were tried");
-    } else {
-        text.push_str(": ");
-        text.push_str(&follows.join("; "));
-    }
-    text.push('.');
-    text
-}
-
-fn signal_in_words(signal: &str) -> String {
-    match signal.split_once('.') {
-        Some((signal, joint)) => format!("{} of {joint}", signal_in_words(signal)),
-        None => match signal {
-            "q" => "its position".to_owned(),
-            "qd" => "its velocity".to_owned(),
-            "qdd" => "its acceleration".to_owned(),
-            "tau" => "its load".to_owned(),
-            "t" => "time".to_owned(),
-            other => other.to_owned(),
-        },
-    }
 }
 
 /// Place of a found effect among those of the model.
@@ -281,19 +240,11 @@ fn candidates(ranking: &[Ranked]) -> Vec<CandidateRow> {
 
 fn remaining(analysis: &Analysis<'_>, tracing: &Tracing) -> Remaining {
     let structured = !tracing.remaining.joints.is_empty();
-    let follows = |dependence: &trace::Dependence| {
-        format!(
-            "{}: {} % of the held-out residual's variance follows {}",
-            dependence.joint,
-            percent(dependence.share),
-            signal_in_words(&dependence.signal)
-        )
-    };
     Remaining {
         structured,
         joints: tracing.remaining.joints.clone(),
         depends_on: tracing.remaining.depends_on.iter().take(12).map(follows).collect(),
-        description: if structured { vec![describe(tracing)] } else { Vec::new() },
+        description: if structured { vec![remaining_in_words(&tracing.remaining)] } else { Vec::new() },
         candidates: candidates(&tracing.remaining.ranking),
         pictures: Vec::new(),
         unidentifiable: unidentifiable(analysis, tracing)

@@ -44,6 +44,7 @@ mod parameters;
 pub mod possible_bodies;
 pub mod predict;
 mod refuted;
+mod remaining_in_words;
 pub mod report_json;
 pub mod retarget;
 pub mod robot_file;

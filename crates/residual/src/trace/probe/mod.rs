@@ -18,16 +18,16 @@ use phiw_regressor::least_squares::GroupedFactor;
 use rayon::prelude::*;
 use shape::{Shape, Torque};
 
-/// A residual that follows a signal.
+/// A residual that follows a signal, or two together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dependence {
     /// The joint whose residual it is.
     pub joint: String,
-    /// The signal, as in `report.json`: `q`, `qd`, `qdd`, `tau`, `t`, or another joint's `q.<joint>`,
-    /// `qd.<joint>`.
-    pub signal: String,
-    /// Share of the residual variance that shapes over the signal predict on folds that they were not fitted
-    /// on.
+    /// The signals, as in `report.json`: `q`, `qd`, `qdd`, `tau`, `t`, or another joint's `q.<joint>`,
+    /// `qd.<joint>`, `tau.<joint>`; two where it follows their product.
+    pub signals: Vec<String>,
+    /// Share of the residual variance that columns over the signals predict on folds that they were not
+    /// fitted on.
     pub share: f64,
 }
 
@@ -58,13 +58,10 @@ pub(super) struct Fit<'a> {
 /// Which signals the residuals of the torques `rows` follow, strongest first.
 pub(super) fn probe(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<Dependence>, IdentificationError> {
     let all = |row: usize| (0..fit.fixed.tree.joint_count()).filter(|&other| other != row).collect();
-    let mut found = Vec::new();
-    for probe in probes(fit, rows, all)? {
-        for signal in probe.signals {
-            let joint = fit.fixed.tree.joint(probe.row).joint.clone();
-            found.push(Dependence { joint, signal, share: probe.share });
-        }
-    }
+    let joint = |row: usize| fit.fixed.tree.joint(row).joint.clone();
+    let of_probe =
+        |probe: Probe| Dependence { joint: joint(probe.row), signals: probe.signals, share: probe.share };
+    let mut found: Vec<Dependence> = probes(fit, rows, all)?.into_iter().map(of_probe).collect();
     found.sort_by(|a, b| b.share.total_cmp(&a.share));
     Ok(found)
 }
