@@ -59,8 +59,9 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
 ///
 /// Where the torque was low-passed before it was logged, it is traced again in the band that this has left:
 /// above its corner a filter's form decides, and what is not known of it looks like effects. Where its zero
-/// differs from log to log, it is traced again without these zeros: they belong to logs, not to a model. And
-/// where something else acted on the robot for a moment, it is traced again without that moment.
+/// differs from log to log, it is traced again without these zeros: they belong to logs, not to a model. Where
+/// something else acted on the robot for a moment, it is traced again without that moment. And a training log
+/// of another robot than all others is left out before anything is traced.
 ///
 /// # Errors
 /// An input is wrong.
@@ -80,6 +81,8 @@ struct OfTheLogs {
     disturbed: DisturbedLogs,
     /// A training log of another robot, which is left out.
     odd_log: Option<PathBuf>,
+    /// Whether the logs have been compared.
+    compared: bool,
 }
 
 /// Traces that seek zeros of torques: a zero that is small beside others is found once these are off.
@@ -105,12 +108,14 @@ fn results_knowing(
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
     if arguments.model.is_none()
-        && known.odd_log.is_none()
+        && !known.compared
         && let Some((session, odd)) = without_odd_log(&session, &data)?
     {
         let others = ExplainArguments { session, ..arguments.clone() };
-        return results_knowing(&others, console, &OfTheLogs { odd_log: Some(odd), ..known.clone() });
+        let known = OfTheLogs { odd_log: Some(odd), compared: true, ..known.clone() };
+        return results_knowing(&others, console, &known);
     }
+    let known = &OfTheLogs { compared: true, ..known.clone() };
     let Traced { start, declared, floor, mut tracing } = traced(arguments, &excluded, &session, &data)?;
     let least_share = thresholds(arguments)?.least_share;
     if let Some(corner_hz) = low_passed_in_band(arguments, &session, &tracing, least_share) {
