@@ -6,7 +6,6 @@ use crate::console::Console;
 use crate::exported::Carried;
 use crate::identified_mjcf::{self, identified_mjcf};
 use crate::identified_urdf::identified_urdf;
-use crate::odd_log::{self, without_odd_log};
 use crate::output::take_folder;
 use crate::possible_bodies::PossibleBodies;
 use crate::report_json::report_json;
@@ -69,25 +68,11 @@ pub fn identify(arguments: &SessionArguments, console: &Console) -> Result<Outco
 /// # Errors
 /// An input is wrong.
 pub fn results(arguments: &SessionArguments, console: &Console) -> Result<Results, Error> {
-    results_knowing(arguments, None, console)
-}
-
-/// The same where `odd` is a training log of another robot that was left out.
-fn results_knowing(
-    arguments: &SessionArguments,
-    odd: Option<&Path>,
-    console: &Console,
-) -> Result<Results, Error> {
     let progress = |what: &str, done: u64, total: u64| console.progress(what, done, total);
     let session = Session::open(arguments, &progress)?;
     let bandwidth = bandwidth::of_session(&session, &progress)?;
     let sources = session.logs.sources(&progress);
     let data = session.data(&sources);
-    if odd.is_none()
-        && let Some((others, odd)) = without_odd_log(&session, &data)?
-    {
-        return results_knowing(&others, Some(&odd), console);
-    }
     let effects = session.effects(&data)?;
     let (identified, at_rest) = phiw_identification::identify_with_rests(&session.tree, effects, &data)
         .map_err(|error| session.of_training_logs(error))?;
@@ -96,8 +81,7 @@ fn results_knowing(
     let is_as_reduced = !identified.design.needs().of_reference();
     let with_rests = is_as_reduced.then(|| at_rest.added_to(&identified)).transpose()?;
     let analysis = Analysis::new(&session, Rows::Logs(&data), &identified, possible, with_rests)?;
-    let mut analysis = analysis.with_bandwidth(bandwidth).with_logs_compared()?;
-    analysis.warnings.extend(odd.map(|odd| odd_log::warning(odd, None)));
+    let analysis = analysis.with_bandwidth(bandwidth).with_logs_compared()?;
     console.finish();
 
     let report = report_json(&analysis);

@@ -4,6 +4,7 @@ use crate::Error;
 use crate::arguments::SessionArguments;
 use crate::session::Session;
 use crate::warnings::file_name;
+use phiw_effects::SignalRanges;
 use phiw_identification::fitting::odd_log;
 use phiw_identification::{Data, EffectCatalogue, EffectSpec, Identified, Variants, identify};
 use std::path::{Path, PathBuf};
@@ -47,17 +48,18 @@ pub fn warning(odd: &Path, differs: Option<&str>) -> String {
     )
 }
 
-/// What is declared, and the frictions, rotor inertias and offsets of all joints beside.
+/// What is declared; the frictions and rotor inertias of all joints beside; and what may be another in each log
+/// of one robot: frictions that warm up, and zeros of torques.
 fn textbook(session: &Session, data: &Data<'_>) -> Result<Vec<Variants>, Error> {
     let mut effects = session.effects(data)?;
     let spec = |variants: &Variants| variants.first().map(|effect| site(&effect.spec()));
     let declared: Vec<Option<(String, Vec<String>)>> = effects.iter().map(spec).collect();
-    let ranges = phiw_effects::SignalRanges::of_surveys(session.logs.training());
-    let kinds = session.catalogue.kinds().map(|kind| kind.name());
+    let ranges = SignalRanges::of_surveys(session.logs.training());
     let is_textbook = |kind: &&str| {
-        let spec = EffectSpec { kind: (*kind).to_owned(), joints: Vec::new(), constants: Default::default() };
-        session.catalogue.joint_property(&spec).is_some() || *kind == OFFSET
+        let spec = EffectSpec::new(kind, &[]);
+        session.catalogue.joint_property(&spec).is_some() || [DRIFT, ZEROS].contains(kind)
     };
+    let kinds = session.catalogue.kinds().map(|kind| kind.name());
     let kinds: Vec<&str> = kinds.filter(is_textbook).collect();
     for kind in kinds {
         let all = session.catalogue.declare(kind, &session.tree, &ranges)?;
@@ -66,7 +68,8 @@ fn textbook(session: &Session, data: &Data<'_>) -> Result<Vec<Variants>, Error> 
     Ok(effects)
 }
 
-const OFFSET: &str = "torque_offset";
+const DRIFT: &str = "thermal_drift";
+const ZEROS: &str = "torque_zero_by_log";
 
 fn site(spec: &EffectSpec) -> (String, Vec<String>) {
     (spec.kind.clone(), spec.joints.clone())
