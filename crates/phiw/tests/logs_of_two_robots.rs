@@ -6,12 +6,18 @@ use phiw::console::Console;
 use phiw::explain::results;
 use phiw::identify::Results;
 use phiw_report::json::Verdict;
+use phiw_telemetry::Recording;
 use std::fs;
 use tempfile::TempDir;
 
 /// Explains logs of the right model, viscous friction declared, of which the last is held out; in the second
 /// the last link has `tool` times its own mass more.
 fn explained(training: usize, tool: f64) -> Results {
+    explained_after(training, tool, |_, _| ())
+}
+
+/// The same logs, each changed by `change`, which is told its number.
+fn explained_after(training: usize, tool: f64, change: impl Fn(usize, &mut Recording)) -> Results {
     let folder = TempDir::new().unwrap();
     let path = |index: usize| folder.path().join(format!("log_{index}.csv"));
     fs::write(folder.path().join("robot.urdf"), synthetic::URDF).unwrap();
@@ -23,7 +29,8 @@ fn explained(training: usize, tool: f64) -> Results {
             parameters[last..].iter_mut().for_each(|own| *own *= 1.0 + tool);
             tree.set_inertial_parameters(&parameters).unwrap();
         }
-        let log = synthetic::recording_of_tree(&tree, 50 + index as u64, 30.0);
+        let mut log = synthetic::recording_of_tree(&tree, 50 + index as u64, 30.0);
+        change(index, &mut log);
         fs::write(path(index), synthetic::csv(&log)).unwrap();
     }
     let logs = [(0..training).map(path).collect(), vec![path(training)]];
@@ -86,4 +93,29 @@ fn one_of_three_logs_with_a_tool_is_left_out_and_its_tool_is_weighed() {
     assert_eq!(left_out(&found.warnings), None);
     assert_eq!(said(&found), None);
     assert_eq!(found.report.verdict, Some(Verdict::Sufficient));
+}
+
+/// A log whose torques have another zero was left out, and so was the last of three in which frictions warm up.
+#[test]
+fn zeros_of_torques_and_frictions_that_warm_up_are_no_other_robot() {
+    let zeros = |index: usize, log: &mut Recording| {
+        if index == 1 {
+            log.tau.iter_mut().for_each(|torque| *torque += 0.5);
+        }
+    };
+    let warms_up = |index: usize, log: &mut Recording| {
+        log.t.iter_mut().for_each(|t| *t += 40.0 * index as f64);
+        let joints = log.joints.len();
+        for row in 1..log.t.len() {
+            let cold = 0.6 * (-log.t[row] / 40.0).exp();
+            for joint in row * joints..(row + 1) * joints {
+                let speed = (log.q[joint] - log.q[joint - joints]) / (log.t[row] - log.t[row - 1]);
+                log.tau[joint] += cold * (speed / 0.05).tanh();
+            }
+        }
+    };
+    for found in [explained_after(3, 0.0, zeros), explained_after(3, 0.0, warms_up)] {
+        let other = found.warnings.iter().find(|warning| warning.contains("is not of the robot"));
+        assert_eq!(other, None);
+    }
 }
