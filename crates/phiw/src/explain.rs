@@ -59,9 +59,9 @@ pub fn explain(arguments: &ExplainArguments, console: &Console) -> Result<Outcom
 ///
 /// Where the torque was low-passed before it was logged, it is traced again in the band that this has left:
 /// above its corner a filter's form decides, and what is not known of it looks like effects. Where its zero
-/// differs from log to log, it is traced again without these zeros: they belong to logs, not to a model. Where
-/// something else acted on the robot for a moment, it is traced again without that moment. And a training log
-/// of another robot than all others is left out before anything is traced.
+/// differs from log to log, it is traced again without these zeros: they belong to logs, not to a model.
+/// Where something else acted on the robot for a moment, it is traced again without that moment. And a
+/// training log of another robot than all others is left out before anything is traced.
 ///
 /// # Errors
 /// An input is wrong.

@@ -48,8 +48,8 @@ pub fn warning(odd: &Path, differs: Option<&str>) -> String {
     )
 }
 
-/// What is declared; the frictions and rotor inertias of all joints beside; and what may be another in each log
-/// of one robot: frictions that warm up, and zeros of torques.
+/// What is declared; the frictions and rotor inertias of all joints beside; and what may be another in each
+/// log of one robot: frictions that warm up, and zeros of torques.
 fn textbook(session: &Session, data: &Data<'_>) -> Result<Vec<Variants>, Error> {
     let mut effects = session.effects(data)?;
     let spec = |variants: &Variants| variants.first().map(|effect| site(&effect.spec()));

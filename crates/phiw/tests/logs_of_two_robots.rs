@@ -95,7 +95,8 @@ fn one_of_three_logs_with_a_tool_is_left_out_and_its_tool_is_weighed() {
     assert_eq!(found.report.verdict, Some(Verdict::Sufficient));
 }
 
-/// A log whose torques have another zero was left out, and so was the last of three in which frictions warm up.
+/// A log whose torques have another zero was left out, and so was the last of three in which frictions warm
+/// up.
 #[test]
 fn zeros_of_torques_and_frictions_that_warm_up_are_no_other_robot() {
     let zeros = |index: usize, log: &mut Recording| {
