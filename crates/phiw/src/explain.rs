@@ -17,7 +17,7 @@ use crate::possible_bodies::PossibleBodies;
 use crate::report_json::{by_joint, report_json};
 use crate::session::{Session, read_robot};
 use crate::torque_zeros::ZerosOfLogs;
-use crate::{Error, bandwidth, odd_log, refuted, summary};
+use crate::{Error, bandwidth, odd_log, refuted, summary, warnings};
 use indexmap::IndexMap;
 use phiw_effects::{Catalogue, SignalRanges, smoothing_corner_hz};
 use phiw_identification::fitting::TorqueError;
@@ -188,7 +188,7 @@ fn results_knowing(
     }));
     analysis.warnings.extend(refuted::sentences(&tracing.withdrawn));
     if tracing.held_out_had_a_say {
-        analysis.warnings.push(held_out_had_a_say(&tracing.left_out_by_held_out));
+        analysis.warnings.push(warnings::held_out_had_a_say(&tracing.left_out_by_held_out));
     }
     let reproduction = HeldOutReproduction::of(&analysis)?;
     analysis.warnings.extend(reproduction.warnings());
@@ -210,25 +210,6 @@ fn results_knowing(
     summary.push_str(&summary::summary(&analysis, &arguments.session.out, &files));
     Ok(Results { files, summary, warnings: analysis.warnings, report })
 }
-
-/// What is said where motion held out decided what is in the model.
-fn held_out_had_a_say(left_out: &[EffectSpec]) -> String {
-    let mut named: Vec<String> =
-        left_out.iter().map(|spec| format!("{} of {}", spec.kind, spec.joints.join("+"))).collect();
-    let more = named.len().saturating_sub(MOST_LEFT_OUT);
-    named.truncate(MOST_LEFT_OUT);
-    if more > 0 {
-        named.push(format!("{more} more"));
-    }
-    let named = if named.is_empty() { String::new() } else { format!(" ({})", named.join(", ")) };
-    format!(
-        "of what the training logs alone would have chosen, something made the error on the motion held out larger \
-         and was left out{named}: the error after is not blind, and training logs with more kinds of motion would help"
-    )
-}
-
-/// Effects that are named of those that were left out.
-const MOST_LEFT_OUT: usize = 6;
 
 /// The corner of the filter that the torque went through before it was logged \[Hz\], if that is below the
 /// cut-off of columns and torque and nobody asked for this one. What is low-passed takes its share of what is

@@ -2,8 +2,8 @@
 
 use crate::robot_file;
 use crate::session::Session;
-use phiw_identification::Identified;
 use phiw_identification::fitting::{HeldOutChange, LogChange};
+use phiw_identification::{EffectSpec, Identified};
 use phiw_report::number::significant;
 use phiw_telemetry::segments::GapReason;
 use phiw_telemetry::{Payload, Survey};
@@ -127,6 +127,25 @@ pub fn of_another_robot(session: &Session, odd: usize, changes: &[LogChange]) ->
 
 /// Joints that a warning of many names.
 const JOINTS_NAMED: usize = 3;
+
+/// What is said where motion held out decided what is in the model.
+pub fn held_out_had_a_say(left_out: &[EffectSpec]) -> String {
+    let mut named: Vec<String> =
+        left_out.iter().map(|spec| format!("{} of {}", spec.kind, spec.joints.join("+"))).collect();
+    let more = named.len().saturating_sub(MOST_LEFT_OUT);
+    named.truncate(MOST_LEFT_OUT);
+    if more > 0 {
+        named.push(format!("{more} more"));
+    }
+    let named = if named.is_empty() { String::new() } else { format!(" ({})", named.join(", ")) };
+    format!(
+        "of what the training logs alone would have chosen, something made the error on the motion held out larger \
+         and was left out{named}: the error after is not blind, and training logs with more kinds of motion would help"
+    )
+}
+
+/// Effects that are named of those that were left out.
+const MOST_LEFT_OUT: usize = 6;
 
 /// File name of a log.
 pub fn file_name(path: &Path) -> String {

@@ -159,18 +159,12 @@ pub fn record(
     let joints = tree.joint_count();
     let (mut states, mut torque) = true_torque(tree, ordinary, secrets, motion, times);
     // The sensor is late first, then wrong.
-    for secret in secrets.iter().filter(|secret| matches!(secret.form, Form::Delay)) {
-        let earlier: Vec<f64> = times.iter().map(|time| time - secret.scale).collect();
-        let (_, delayed) = true_torque(tree, ordinary, secrets, motion, &earlier);
-        for sample in 0..times.len() {
-            for &joint in &secret.joints {
-                torque[sample * joints + joint] = delayed[sample * joints + joint];
-            }
-        }
-    }
-    for secret in secrets.iter().filter(|secret| matches!(secret.form, Form::ClockDrift)) {
-        let earlier: Vec<f64> =
-            times.iter().map(|time| time - secret.scale * (time - motion.start)).collect();
+    for secret in secrets.iter().filter(|secret| matches!(secret.form, Form::Delay | Form::ClockDrift)) {
+        let late = |time: f64| match secret.form {
+            Form::ClockDrift => secret.scale * (time - motion.start),
+            _ => secret.scale,
+        };
+        let earlier: Vec<f64> = times.iter().map(|&time| time - late(time)).collect();
         let (_, delayed) = true_torque(tree, ordinary, secrets, motion, &earlier);
         for sample in 0..times.len() {
             for &joint in &secret.joints {

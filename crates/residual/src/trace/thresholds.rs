@@ -8,7 +8,7 @@ use thiserror::Error;
 /// `cargo xtask undeclared --suite wide_right,wide_effects --seeds dev --threshold NAME=VALUE,VALUE…`, which
 /// prints for every value what is named falsely, what is called sufficient, and how many effects are named.
 ///
-/// What a probe must foretell (`probe.rs`), how much error parameters may make (`remaining.rs`), when a value
+/// What a probe must foretell (`probe/`), how much error parameters may make (`remaining.rs`), when a value
 /// is beyond its bounds by chance (`admissible.rs`) and when an effect is a rival (`naming.rs`) stand as
 /// constants where they are used.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,8 +16,8 @@ pub struct Thresholds {
     /// Probability of naming anything on a right model, for all candidates of a run together; and that at
     /// which one refinement is in the model, if it were not there.
     pub false_name_probability: f64,
-    /// Probability that a torque's residual of noise seems to follow any signal. At that of a name, a spring
-    /// that is smaller than coloured noise is not seen.
+    /// Probability that a residual of noise, of any torque, seems to follow any signal. At that of a name, a
+    /// spring that is smaller than coloured noise is not seen.
     pub false_structure_probability: f64,
     /// Share of a torque's residual, where training motion is foretold from its other parts, that an effect
     /// on it must take away to have a name.
