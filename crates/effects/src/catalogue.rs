@@ -46,6 +46,7 @@ impl Default for Catalogue {
                 Box::new(position_map::PositionMap),
                 Box::new(logged_torque::TorqueSmoothing),
                 Box::new(torque_zero::TorqueZeroByLog),
+                Box::new(logged_torque::ClockDrift),
             ],
         }
     }

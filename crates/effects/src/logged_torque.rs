@@ -1,6 +1,6 @@
-//! What becomes of a torque on its way into the log: it is stamped late, or low-passed.
+//! What becomes of a torque on its way into the log: it is stamped late, by a clock that drifts, or low-passed.
 //!
-//! Both are undone in the log itself, and their columns are linear about what is undone already.
+//! All of it is undone in the log itself, and their columns are linear about what is undone already.
 
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Signal, constant};
@@ -48,6 +48,46 @@ impl EffectKind for TimeDelay {
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         LATE.effect(self.name(), tree, site, constants)
+    }
+}
+
+/// The torques are stamped by a clock that runs faster (positive) or slower than that of the positions: a
+/// delay that is nothing where a log begins and grows with it, alike on all joints.
+///
+/// Linear in the rate about the one that has been corrected for already; a fitted rate really moves each
+/// torque to its time.
+pub struct ClockDrift;
+
+impl EffectKind for ClockDrift {
+    fn name(&self) -> &str {
+        "clock_drift"
+    }
+    fn sites(&self, tree: &Tree) -> Vec<Vec<usize>> {
+        vec![(0..tree.joint_count()).collect()]
+    }
+    fn acts_on(&self) -> &'static str {
+        "all joints"
+    }
+    fn telling_motion(&self) -> &'static str {
+        "quick reversals of the torque at the beginning and at the end of a long log"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let rate = DRIFT.value(found);
+        let (runs, stamped) = if rate < 0.0 { ("slow", "early") } else { ("fast", "late") };
+        let (ppm, late_ms) = (1e6 * rate.abs(), 1e4 * rate.abs());
+        format!(
+            "The clock of the torques runs {ppm:.0} ppm {runs}: ten seconds into a log they are stamped \
+             {late_ms:.2} ms {stamped}."
+        )
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Time
+    }
+    fn mechanisms(&self, _found: &FittedEffect<'_>) -> Mechanisms {
+        of_the_log("a clock of the torques that drifts")
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        DRIFT.effect(self.name(), tree, site, constants)
     }
 }
 
@@ -137,8 +177,17 @@ static LATE: Way = Way {
     constant: "delay",
     unit: "s",
     bounds: (-0.1, 0.1),
-    column: |sample, joint| -sample.total_torque_rate().get(joint).copied().unwrap_or_default(),
-    undo: advance,
+    column: |sample, joint| -rate_of_torque(sample, joint),
+    undo: |block, joint, delay| advance(block, joint, |_| delay),
+};
+
+/// A clock that is further off is that of another sample rate.
+static DRIFT: Way = Way {
+    constant: "rate",
+    unit: "s/s",
+    bounds: (-0.02, 0.02),
+    column: |sample, joint| -sample.time_in_log() * rate_of_torque(sample, joint),
+    undo: |block, joint, rate| advance(block, joint, |time_in_log| rate * time_in_log),
 };
 
 /// τ/(1 + T²ω²) ≈ τ + T²·τ̈. A torque that is smoothed over more than 60 ms is no measurement of a motion's
@@ -150,6 +199,10 @@ static SMOOTHED: Way = Way {
     column: |sample, joint| sample.total_torque_second_rate(joint),
     undo: sharpen,
 };
+
+fn rate_of_torque(sample: &Sample<'_>, joint: usize) -> f64 {
+    sample.total_torque_rate().get(joint).copied().unwrap_or_default()
+}
 
 impl Way {
     /// The value that was fitted: what has been corrected for, and the rest.
@@ -237,18 +290,19 @@ fn sharpen(block: &mut Block, joint: usize, square: f64) {
     own.zip(rates).for_each(|(torque, rate)| *torque -= square * rate);
 }
 
-/// Shifts a joint's torque earlier by `delay`, by cubic interpolation; the ends keep their last value.
-fn advance(block: &mut Block, joint: usize, delay: f64) {
+/// Shifts a joint's torque earlier by what `delay` gives for the time since the log's first sample, by cubic
+/// interpolation; the ends keep their last value.
+fn advance(block: &mut Block, joint: usize, delay: impl Fn(f64) -> f64) {
     let samples = block.t.len();
     if samples < 4 {
         return;
     }
     let period = (block.t[samples - 1] - block.t[0]) / (samples - 1) as f64;
-    let shift = delay / period;
     let joints = block.joints;
     let original: Vec<f64> = (0..samples).map(|sample| block.tau[sample * joints + joint]).collect();
     let last = (samples - 1) as f64;
     for sample in 0..samples {
+        let shift = delay(block.t[sample] - block.log_start) / period;
         let place = (sample as f64 + shift).clamp(0.0, last);
         let before = (place.floor() as usize).clamp(1, samples - 3);
         let u = place - before as f64;

@@ -70,6 +70,10 @@ const SENTENCES: &[(&str, &str)] = &[
     ),
     ("torque_smoothing", "The torque of shoulder is low-passed before it is logged, at about 0.2 Hz."),
     ("torque_zero_by_log", "The zero of the torque of shoulder differs from log to log, by up to 1.00 N·m."),
+    (
+        "clock_drift",
+        "The clock of the torques runs 500000 ppm fast: ten seconds into a log they are stamped 5000.00 ms late.",
+    ),
 ];
 
 /// The kind on its first site, with the last of its constants and parameters 0.5, 0.25, 0.125, …

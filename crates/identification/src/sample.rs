@@ -91,6 +91,10 @@ impl<'a> Sample<'a> {
     pub fn time(&self) -> f64 {
         self.block.t[self.index] + self.block.session_offset
     }
+    /// Time since the log's first sample \[s\].
+    pub fn time_in_log(&self) -> f64 {
+        self.block.t[self.index] - self.block.log_start
+    }
     /// Step to the next sample \[s\].
     pub fn period(&self) -> f64 {
         match self.block.t.as_slice() {

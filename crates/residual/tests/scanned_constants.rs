@@ -21,31 +21,31 @@ struct Case {
     kind: &'static str,
     truth: &'static [(&'static str, f64)],
     torque: fn(f64, f64) -> f64,
-    /// How late the torque is logged \[s\].
-    late: f64,
+    /// How late a torque is logged at a time \[s\].
+    late: fn(f64) -> f64,
     sought: &'static [&'static str],
 }
 
-const CASES: [Case; 4] = [
+const CASES: [Case; 5] = [
     Case {
         kind: "stribeck_friction",
         truth: &[("stribeck_velocity", 0.3), ("exponent", 2.0), ("sign_width", 0.05)],
         torque: |_, v| 3.0 * (-(v / 0.3_f64).powi(2)).exp() * (v / 0.05).tanh(),
-        late: 0.0,
+        late: |_| 0.0,
         sought: &["stribeck_velocity"],
     },
     Case {
         kind: "torque_ripple",
         truth: &[("periods", 7.0), ("harmonics", 1.0)],
         torque: |q, _| 0.4 * (7.0 * q).sin() + 0.3 * (7.0 * q).cos(),
-        late: 0.0,
+        late: |_| 0.0,
         sought: &["periods"],
     },
     Case {
         kind: "end_stop",
         truth: &[("stop", 0.3), ("side", 1.0)],
         torque: |q, _| 8.0 * (q - 0.3).max(0.0),
-        late: 0.0,
+        late: |_| 0.0,
         sought: &["stop"],
     },
     // Linearised: its constant is what has been corrected for, and its parameter the rest.
@@ -53,12 +53,19 @@ const CASES: [Case; 4] = [
         kind: "time_delay",
         truth: &[("delay", 0.008)],
         torque: |_, _| 0.0,
-        late: 0.008,
+        late: |_| 0.008,
         sought: &["delay"],
+    },
+    Case {
+        kind: "clock_drift",
+        truth: &[("rate", 4e-4)],
+        torque: |_, _| 0.0,
+        late: |t| 4e-4 * t,
+        sought: &["rate"],
     },
 ];
 
-fn log(tree: &Tree, seed: u64, noise: f64, late: f64, more: fn(f64, f64) -> f64) -> Recording {
+fn log(tree: &Tree, seed: u64, noise: f64, late: fn(f64) -> f64, more: fn(f64, f64) -> f64) -> Recording {
     let mut random = RandomNumbers::new(seed);
     let sines: [[f64; 3]; 4] = std::array::from_fn(|k| {
         [
@@ -84,7 +91,7 @@ fn log(tree: &Tree, seed: u64, noise: f64, late: f64, more: fn(f64, f64) -> f64)
                 sum(&|[a, w, p]| -a * w * w * (w * t + p).sin()),
             ]
         };
-        let [q, v, a] = at(t - late);
+        let [q, v, a] = at(t - late(t));
         tree.inverse_dynamics(&[q], &[v], &[a], &mut workspace, &mut torque).unwrap();
         let radius = (-2.0 * random.uniform(f64::MIN_POSITIVE, 1.0).ln()).sqrt();
         let gauss = radius * random.uniform(0.0, TAU).cos();
@@ -171,7 +178,7 @@ fn intervals_hold_constants_that_were_scanned_for() {
 #[test]
 fn a_model_without_such_constants_costs_no_pass() {
     let tree = read_urdf(URDF, &UrdfOptions::default()).unwrap().tree;
-    let recording = log(&tree, 1, 0.3, 0.0, |_, _| 0.0);
+    let recording = log(&tree, 1, 0.3, |_| 0.0, |_, _| 0.0);
     let conditioning =
         Conditioning::choose(&[recording.survey().unwrap()], &ConditioningOptions::default()).unwrap();
     let blocks = recording.blocks(&conditioning).unwrap();
@@ -197,7 +204,7 @@ fn a_model_without_such_constants_costs_no_pass() {
 fn the_way_in_which_a_sign_turns_is_no_constant_with_an_interval() {
     let tree = read_urdf(URDF, &UrdfOptions::default()).unwrap().tree;
     let catalogue = Catalogue::default();
-    let recording = log(&tree, 3, 0.3, 0.0, |_, v| 3.0 * v / v.hypot(0.2));
+    let recording = log(&tree, 3, 0.3, |_| 0.0, |_, v| 3.0 * v / v.hypot(0.2));
     let conditioning =
         Conditioning::choose(&[recording.survey().unwrap()], &ConditioningOptions::default()).unwrap();
     let blocks = recording.blocks(&conditioning).unwrap();

@@ -21,6 +21,8 @@ pub struct Block {
     pub segment: usize,
     /// What to add to `t` to get the session's time, in seconds.
     pub session_offset: f64,
+    /// Time of the log's first usable sample, in seconds.
+    pub log_start: f64,
     /// Joints in a row.
     pub joints: usize,
     /// Time of each sample, in seconds.
@@ -77,6 +79,7 @@ impl Block {
             log: 0,
             segment: 0,
             session_offset: 0.0,
+            log_start: t.first().copied().unwrap_or_default(),
             joints,
             outputs: (0..t.len()).collect(),
             t,

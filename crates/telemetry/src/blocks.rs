@@ -2,7 +2,7 @@
 
 use crate::columns::Layout;
 use crate::differentiator::Differentiator;
-use crate::{Block, LogPlan, Session};
+use crate::{Block, LogPlan, Session, Survey};
 
 /// Takes the evenly spaced samples of a log and makes blocks of them, holding no more than one block and the
 /// filters' reach.
@@ -10,6 +10,7 @@ pub(crate) struct BlockMaker<'a> {
     plan: &'a LogPlan,
     layout: Layout,
     session: Session,
+    log_start: f64,
     differentiator: Differentiator,
     signals: Vec<Signal>,
     /// Samples at hand, row-major; the first is sample `first` of the segment.
@@ -24,11 +25,12 @@ pub(crate) struct BlockMaker<'a> {
 }
 
 impl<'a> BlockMaker<'a> {
-    pub fn new(plan: &'a LogPlan, layout: &Layout, session: Session) -> Self {
+    pub fn new(plan: &'a LogPlan, layout: &Layout, survey: &Survey) -> Self {
         BlockMaker {
             plan,
             layout: layout.clone(),
-            session,
+            session: survey.session,
+            log_start: survey.time_range().0,
             signals: signals(plan, layout),
             differentiator: Differentiator::new(plan.kernel.clone()),
             window: Vec::new(),
@@ -123,6 +125,7 @@ impl<'a> BlockMaker<'a> {
             log: self.session.log,
             segment: self.segment,
             session_offset: self.session.offset,
+            log_start: self.log_start,
             joints: n,
             t: rows_at_hand().map(|row| row[0]).collect(),
             temp: has_temp.then(|| rows_at_hand().flat_map(temps).collect()),

@@ -60,7 +60,7 @@ pub(crate) fn stream_rows(
     let plan = conditioning.plan(survey)?;
     let mut streamer = Streamer {
         resampler: plan.resample.then(|| Resampler::new(plan.period, rows.layout())),
-        maker: BlockMaker::new(&plan, rows.layout(), survey.session),
+        maker: BlockMaker::new(&plan, rows.layout(), survey),
         plan: &plan,
         outlet: Outlet { sink, summary: StreamSummary::default() },
         progress,

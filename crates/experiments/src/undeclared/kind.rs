@@ -70,7 +70,8 @@ pub enum Stranger {
     Crosstalk,
     /// Friction that jumps in mid-log and stays: a brake that drags, a seal that slips.
     FrictionJump,
-    /// Torques whose clock is not that of the positions: a delay that grows over each log.
+    /// Torques whose clock is not that of the positions: a delay that grows over each log. The catalogue has
+    /// had a kind of this name since.
     ClockDrift,
 }
 

@@ -1,4 +1,4 @@
-//! Torques that a drive, or whoever published the log, has low-passed.
+//! Torques that a drive, a logger, or whoever published the log has changed.
 
 mod synthetic;
 
@@ -53,8 +53,8 @@ fn log(seed: u64) -> Recording {
     log
 }
 
-/// Explains two logs of a robot whose frictions are declared, and whose torques were low-passed.
-fn explained(low_passed: impl Fn(&[f64]) -> Vec<f64>) -> ReportJson {
+/// Explains two logs of a robot whose frictions are declared, and whose torques were changed in the log.
+fn explained(logged: impl Fn(&[f64]) -> Vec<f64>) -> ReportJson {
     let folder = TempDir::new().unwrap();
     let path = |name: &str| folder.path().join(name);
     fs::write(path("robot.urdf"), synthetic::URDF).unwrap();
@@ -63,7 +63,7 @@ fn explained(low_passed: impl Fn(&[f64]) -> Vec<f64>) -> ReportJson {
         for joint in 0..JOINTS {
             let torque: Vec<f64> = log.tau.iter().skip(joint).step_by(JOINTS).copied().collect();
             let own = log.tau.iter_mut().skip(joint).step_by(JOINTS);
-            own.zip(low_passed(&torque)).for_each(|(own, value)| *own = value);
+            own.zip(logged(&torque)).for_each(|(own, value)| *own = value);
         }
         fs::write(path(name), synthetic::csv(&log)).unwrap();
     }
@@ -127,4 +127,28 @@ fn a_torque_that_was_low_passed_as_it_came_is_late_by_the_filters_delay() {
     let delay = report.effects[0].parameters["joint_1"]["delay"].value;
     // The filter's delay is 2T, less where it takes more: π/2·T at the corner.
     assert!((1.5..2.1).contains(&(delay / time_constant)), "{delay} s, T {time_constant} s");
+}
+
+/// Torques stamped by a clock of their own were called explained by a delay, and 18 times the noise was left at
+/// the ends of the logs.
+#[test]
+fn a_clock_of_the_torques_that_drifts_is_named_with_its_rate() {
+    let rate = 1.5e-3;
+    let report = explained(|values| {
+        let at = |row: usize| {
+            let place = row as f64 * (1.0 - rate);
+            let before = place.floor();
+            let after = (before as usize + 1).min(values.len() - 1);
+            values[before as usize] + (place - before) * (values[after] - values[before as usize])
+        };
+        (0..values.len()).map(at).collect()
+    });
+    let named: Vec<(&str, usize)> =
+        report.effects.iter().map(|found| (found.kind.as_str(), found.joints.len())).collect();
+    assert_eq!(named, [("clock_drift", JOINTS)]);
+    assert_eq!(report.verdict, Some(Verdict::Explained));
+    let found = &report.effects[0].parameters["joint_1"]["rate"];
+    assert!((found.value / rate - 1.0).abs() < 0.02, "{found:?}");
+    let (before, after) = (report.before.validate.relative.unwrap(), report.after.validate.relative.unwrap());
+    assert!(after < 0.02 && after < 0.2 * before, "{before} {after}");
 }
