@@ -54,13 +54,14 @@ impl Scalar for f64 {
 #[repr(align(32))]
 pub struct Lanes<const N: usize>(pub [f64; N]);
 
-/// A value and its derivative along one direction (forward-mode differentiation).
+/// A value and its derivative along one direction, or along several side by side where `D` is [`Lanes`]
+/// (forward-mode differentiation).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Dual {
+pub struct Dual<D = f64> {
     /// The value.
     pub value: f64,
     /// Its derivative.
-    pub derivative: f64,
+    pub derivative: D,
 }
 
 macro_rules! lanes_operator {
@@ -114,56 +115,58 @@ impl Dual {
         Dual { value, derivative: 1.0 }
     }
 }
-impl Add for Dual {
+impl<D: Scalar> Add for Dual<D> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
         Dual { value: self.value + other.value, derivative: self.derivative + other.derivative }
     }
 }
-impl Sub for Dual {
+impl<D: Scalar> Sub for Dual<D> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Dual { value: self.value - other.value, derivative: self.derivative - other.derivative }
     }
 }
-impl Mul for Dual {
+impl<D: Scalar> Mul for Dual<D> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         Dual {
             value: self.value * other.value,
-            derivative: self.derivative * other.value + self.value * other.derivative,
+            derivative: self.derivative * D::constant(other.value)
+                + D::constant(self.value) * other.derivative,
         }
     }
 }
-impl Div for Dual {
+impl<D: Scalar> Div for Dual<D> {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
         let value = self.value / other.value;
-        Dual { value, derivative: (self.derivative - value * other.derivative) / other.value }
+        let rest = self.derivative - D::constant(value) * other.derivative;
+        Dual { value, derivative: rest / D::constant(other.value) }
     }
 }
-impl Neg for Dual {
+impl<D: Scalar> Neg for Dual<D> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
         Dual { value: -self.value, derivative: -self.derivative }
     }
 }
-impl Scalar for Dual {
+impl<D: Scalar> Scalar for Dual<D> {
     #[inline(always)]
     fn constant(value: f64) -> Self {
-        Dual { value, derivative: 0.0 }
+        Dual { value, derivative: D::zero() }
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         let (sine, cosine) = self.value.sin_cos();
         (
-            Dual { value: sine, derivative: cosine * self.derivative },
-            Dual { value: cosine, derivative: -sine * self.derivative },
+            Dual { value: sine, derivative: D::constant(cosine) * self.derivative },
+            Dual { value: cosine, derivative: D::constant(-sine) * self.derivative },
         )
     }
 }
@@ -184,4 +187,4 @@ macro_rules! assigning_operators {
         }
     )*};
 }
-assigning_operators!([const N: usize] Lanes<N>, [] Dual);
+assigning_operators!([const N: usize] Lanes<N>, [D: Scalar] Dual<D>);

@@ -67,4 +67,26 @@ proptest! {
         let derivative: Vec<f64> = force.iter().map(|f| f.derivative).collect();
         assert_close(&derivative, &quotient, 1e-6);
     }
+
+    #[test]
+    fn derivatives_side_by_side_equal_single_ones(robot in robot(), seed in any::<u64>()) {
+        let (tree, RandomState { q, v, a }) = robot.build();
+        let random = &mut RandomNumbers::new(seed);
+        let mut directions = |values: &[f64]| -> Vec<(f64, [f64; 3])> {
+            values.iter().map(|&value| (value, [0; 3].map(|_| random.uniform(-1.0, 1.0)))).collect()
+        };
+        let state = [directions(&q), directions(&v), directions(&a)];
+        let [q, v, a] = state.each_ref().map(|part| -> Vec<Dual<Lanes<3>>> {
+            part.iter().map(|&(value, along)| Dual { value, derivative: Lanes(along) }).collect()
+        });
+        let together = run(&tree, &q, &v, &a);
+        for lane in 0..3 {
+            let [q, v, a] = state.each_ref().map(|part| -> Vec<Dual> {
+                part.iter().map(|&(value, along)| Dual { value, derivative: along[lane] }).collect()
+            });
+            let alone: Vec<f64> = run(&tree, &q, &v, &a).iter().map(|value| value.derivative).collect();
+            let found: Vec<f64> = together.iter().map(|value| value.derivative.0[lane]).collect();
+            assert_close(&found, &alone, 1e-12);
+        }
+    }
 }

@@ -87,7 +87,7 @@ const BLOCKS_PER_THREAD: usize = 2;
 ///
 /// # Errors
 /// A log cannot be read; what `take` returns.
-pub(crate) fn try_for_each_batch<E: From<LogError>>(
+pub fn try_for_each_batch<E: From<LogError>>(
     sources: &[&dyn BlockSource],
     mut take: impl FnMut(Vec<Block>) -> Result<(), E>,
 ) -> Result<(), E> {

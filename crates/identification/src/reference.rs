@@ -4,7 +4,7 @@
 use crate::Effect;
 use crate::rates::{LocalRates, WindowsByWidth, interpolate};
 use crate::sample::{BlockReference, Needs, Sample};
-use phiw_dynamics::scalar::Dual;
+use phiw_dynamics::scalar::{Dual, Lanes, Scalar};
 use phiw_dynamics::{DimensionError, Tree, Workspace};
 use phiw_telemetry::Block;
 use std::sync::Arc;
@@ -224,17 +224,22 @@ enum Along {
     Acceleration,
 }
 
-/// A state that carries a derivative.
+/// Joints along which is differentiated at a time.
+const DIRECTIONS: usize = 8;
+
+type Derivatives = Dual<Lanes<DIRECTIONS>>;
+
+/// A state that carries derivatives.
 struct DualState {
-    q: Vec<Dual>,
-    v: Vec<Dual>,
-    a: Vec<Dual>,
-    torque: Vec<Dual>,
+    q: Vec<Derivatives>,
+    v: Vec<Derivatives>,
+    a: Vec<Derivatives>,
+    torque: Vec<Derivatives>,
 }
 
 impl DualState {
     fn new(joints: usize) -> Self {
-        let zero = vec![Dual { value: 0.0, derivative: 0.0 }; joints];
+        let zero = vec![Derivatives::zero(); joints];
         DualState { q: zero.clone(), v: zero.clone(), a: zero.clone(), torque: zero }
     }
 
@@ -242,7 +247,7 @@ impl DualState {
         let row = block.row(sample);
         for (dual, values) in [(&mut self.q, &block.q), (&mut self.v, &block.qd), (&mut self.a, &block.qdd)] {
             for (dual, value) in dual.iter_mut().zip(&values[row.clone()]) {
-                *dual = Dual { value: *value, derivative: 0.0 };
+                *dual = Derivatives::constant(*value);
             }
         }
     }
@@ -251,23 +256,25 @@ impl DualState {
     fn derivatives(
         &mut self,
         tree: &Tree,
-        workspace: &mut Workspace<Dual>,
+        workspace: &mut Workspace<Derivatives>,
         along: Along,
         out: &mut [f64],
     ) -> Result<(), DimensionError> {
         let joints = self.q.len();
-        for joint in 0..joints {
-            self.variable(along, joint).derivative = 1.0;
+        for first in (0..joints).step_by(DIRECTIONS) {
+            let some = first..(first + DIRECTIONS).min(joints);
+            some.clone().for_each(|joint| self.variable(along, joint).derivative.0[joint - first] = 1.0);
             tree.inverse_dynamics(&self.q, &self.v, &self.a, workspace, &mut self.torque)?;
-            self.variable(along, joint).derivative = 0.0;
+            some.clone().for_each(|joint| self.variable(along, joint).derivative = Lanes::zero());
             for (row, torque) in self.torque.iter().enumerate() {
-                out[row * joints + joint] = torque.derivative;
+                let along = &torque.derivative.0[..some.len()];
+                out[row * joints..][some.clone()].copy_from_slice(along);
             }
         }
         Ok(())
     }
 
-    fn variable(&mut self, along: Along, joint: usize) -> &mut Dual {
+    fn variable(&mut self, along: Along, joint: usize) -> &mut Derivatives {
         match along {
             Along::Position => &mut self.q[joint],
             Along::Velocity => &mut self.v[joint],

@@ -5,6 +5,7 @@ use crate::fit::solve_determined;
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, FactorBuilder};
 use phiw_regressor::least_squares::{GroupedFactor, WeightedSolution};
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::ops::Range;
 
@@ -51,8 +52,11 @@ pub(crate) fn choose(
                 Columns::new(columns(&trial, Some(slot)), design.effect_parameters(variant))
             };
             let rest = Rest::new(design, factors, &solution, &with(chosen[slot]), variants.clone())?;
-            let merits: Result<Vec<f64>, RegressorError> =
-                variants.clone().map(|variant| rest.log_error(factors, &with(variant))).collect();
+            let merits: Result<Vec<f64>, RegressorError> = variants
+                .clone()
+                .into_par_iter()
+                .map(|variant| rest.log_error(factors, &with(variant)))
+                .collect();
             let merits = merits?;
             let best = merits.iter().copied().fold(f64::INFINITY, f64::min);
             let margin = 0.5 * rest.own_rows(factors) * WORTH_A_VARIANT;

@@ -177,7 +177,7 @@ fn results_knowing(
         let differs = changes_in(arguments, model, odd).ok().flatten();
         analysis.warnings.push(odd_log::warning(odd, differs.as_deref()));
     }
-    analysis.noise_floor = floor;
+    analysis.noise_floor = with_disturbances(floor, &tracing);
     analysis.warnings.extend(known.low_passed.clone());
     analysis.warnings.extend(known.disturbed.warning(&session));
     if let Some(zeros) = &known.torque_zeros {
@@ -209,6 +209,17 @@ fn results_knowing(
     let mut summary = story(&analysis, &tracing, in_draws);
     summary.push_str(&summary::summary(&analysis, &arguments.session.out, &files));
     Ok(Results { files, summary, warnings: analysis.warnings, report })
+}
+
+/// The noise floor of torques whose disturbance follows nothing that was measured is what the model leaves of
+/// them in training: noise that hangs together over time is far less from sample to sample than in the band
+/// of the motion.
+fn with_disturbances(mut floor: Vec<f64>, tracing: &Tracing) -> Vec<f64> {
+    let Tracing { model, remaining, .. } = tracing;
+    for disturbance in &remaining.disturbances {
+        floor[disturbance.row] = floor[disturbance.row].max(model.fit.residual_std[disturbance.row]);
+    }
+    floor
 }
 
 /// The corner of the filter that the torque went through before it was logged \[Hz\], if that is below the

@@ -241,6 +241,11 @@ fn noise_that_hangs_together_over_a_quarter_of_a_second_is_no_structure() {
     let logs = [1, 2, 3].map(|seed| log(&tree, &frictions, &Motion { seed, ..slow }, &|_, _, _| ()));
     let report = explained(synthetic::URDF, &logs, &["viscous_friction", "coulomb_friction"]);
     assert_eq!((report.effects.len(), report.verdict), (0, Some(Verdict::Sufficient)));
+    // The floor was that of white noise, 4 to 20 times too low.
+    for (joint, rmse) in &report.after.validate.rmse {
+        let floor = report.noise_floor[joint];
+        assert!((0.6..1.6).contains(&(floor / rmse)), "{joint}: {floor} N·m, {rmse} N·m left");
+    }
 }
 
 /// 60 of 80 right models that were trained slowly and validated fast were called structured.

@@ -149,6 +149,16 @@ impl Block {
         runs.filter_map(|run| self.cut(run, warm_up)).collect()
     }
 
+    /// The same outputs in `parts` blocks of about as many each, with the samples that they need as in
+    /// [`narrowed`](Block::narrowed).
+    pub fn in_parts(self, parts: usize, warm_up: usize) -> Vec<Self> {
+        if parts < 2 || self.outputs.len() < parts {
+            return vec![self];
+        }
+        let outputs = self.outputs.chunks(self.outputs.len().div_ceil(parts));
+        outputs.filter_map(|outputs| self.cut(outputs, warm_up)).collect()
+    }
+
     /// The samples that these of its outputs need.
     fn cut(&self, outputs: &[usize], warm_up: usize) -> Option<Self> {
         let reach = self.filter.half_length();

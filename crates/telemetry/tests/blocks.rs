@@ -142,6 +142,10 @@ proptest! {
             let span = part.outputs[part.outputs.len() - 1] - part.outputs[0];
             prop_assert!(part.len() <= span + 2 * reach + 1 + warm_up);
         }
+        let cut: Vec<Block> =
+            blocks.iter().flat_map(|block| block.clone().in_parts(pieces.len(), warm_up)).collect();
+        prop_assert!(cut.len() >= blocks.len() && cut.len() <= pieces.len() * blocks.len());
+        assert_same(&outputs(&cut), &outputs(&blocks));
     }
 
     #[test]

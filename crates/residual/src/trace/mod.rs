@@ -34,7 +34,7 @@ pub use floor::{noise_floor, noise_floor_at, poses};
 pub use input::{HeldModel, TraceInput, TraceOptions};
 pub use naming::LEAST_RIVAL;
 pub use probe::Dependence;
-pub use residuals::{ResidualShape, ranges_of_residual, residual_shape};
+pub use residuals::{Peaks, ResidualShape, ranges_of_residual, residual_shape};
 pub use scanned::{ScannedConstant, scanned_constants};
 pub use search::trace;
 pub use thresholds::{Thresholds, UnknownThreshold};

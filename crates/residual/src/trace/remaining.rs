@@ -1,7 +1,7 @@
 //! What the final model leaves: whether it has structure, and what it follows.
 
 use super::probe;
-use super::residuals::residual_shape;
+use super::residuals::{Peaks, residual_shape};
 use super::search::Search;
 use super::tracing::{Disturbance, Remaining};
 use crate::selection::Products;
@@ -45,7 +45,8 @@ impl Search<'_> {
             self.input.ranges.joints.iter().map(|joint| joint.position).collect();
         let data = self.fixed.data;
         let folds = [data.train.as_slice(), &data.held_out].concat();
-        let shape = residual_shape(&self.design()?, &self.parameters, &folds, &data.sources, &positions)?;
+        let shape =
+            residual_shape(&self.design()?, &self.parameters, &folds, &data.sources, &positions, Peaks::All)?;
         let fit = probe::Fit {
             peaks: &shape,
             fixed: self.fixed,
@@ -63,6 +64,7 @@ impl Search<'_> {
         let (structured, colour): (Vec<usize>, Vec<usize>) = large.into_iter().partition(is_structured);
         let name = |row: usize| self.fixed.tree.joint(row).joint.clone();
         let disturbance = |&row: &usize| Disturbance {
+            row,
             joint: name(row),
             rmse: error.rmse[row],
             noise_floor: self.input.noise_floor[row],

@@ -1,8 +1,12 @@
-//! One pass over the logs with a fitted model: what it leaves, sample by sample, in constant memory.
+//! One pass over the logs with a fitted model: what it leaves, sample by sample, in the memory of a few blocks.
 
 use phiw_effects::SignalRanges;
+use phiw_identification::block_source::try_for_each_batch;
+use phiw_identification::design::DesignScratch;
 use phiw_identification::{BlockSource, Data, Design, Fold, IdentificationError};
+use phiw_telemetry::Block;
 use phiw_telemetry::filter::FilterScratch;
+use rayon::prelude::*;
 
 /// What the residual of each torque looks like on some folds.
 #[derive(Clone, Debug, Default)]
@@ -49,39 +53,54 @@ pub fn ranges_of_residual(
     mut ranges: SignalRanges,
 ) -> Result<SignalRanges, IdentificationError> {
     let positions: Vec<(f64, f64)> = ranges.joints.iter().map(|joint| joint.position).collect();
-    let shape = residual_shape(design, parameters, &data.train, &data.sources, &positions)?;
+    let shape =
+        residual_shape(design, parameters, &data.train, &data.sources, &positions, Peaks::OverPosition)?;
     ranges.ripple_frequencies = shape.ripple_frequencies;
     ranges.joints.iter_mut().zip(shape.rms).for_each(|(joint, rms)| joint.residual_rms = rms);
     Ok(ranges)
 }
 
+/// Which frequencies are looked for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Peaks {
+    /// Those over the position alone.
+    OverPosition,
+    /// All of [`ResidualShape`].
+    All,
+}
+
+/// What is gathered of one torque, row by row.
 struct Collector {
     /// Distances in outputs, ascending.
     lags: [usize; LAGS.len()],
     /// What noise has there after the filter.
     of_noise: [f64; LAGS.len()],
-    ring: Vec<Vec<f64>>,
+    ring: Vec<f64>,
     filled: usize,
-    /// For each torque and distance: sum of the products, sum of the squares.
-    products: Vec<[(f64, f64); LAGS.len()]>,
-    /// For each torque: sum of the squares, rows that count.
-    squares: Vec<(f64, f64)>,
-    grids: Vec<Grid>,
+    /// For each distance: sum of the products, sum of the squares.
+    products: [(f64, f64); LAGS.len()],
+    /// Sum of the squares, rows that count.
+    squares: (f64, f64),
+    positions: Grid,
     /// The same of the residual times the torque of the model.
-    loads: Vec<Grid>,
+    loads: Grid,
     /// The same with the sign of the speed.
-    frictions: Vec<Grid>,
+    frictions: Grid,
     /// Over the time.
-    times: Vec<Grid>,
+    times: Grid,
 }
 
-/// One filtered row.
-#[derive(Default)]
-struct FilteredRow {
-    /// What the model leaves of each torque; nothing where the row does not count.
-    residual: Vec<f64>,
-    /// The torques of the model.
-    fitted: Vec<f64>,
+/// The filtered rows of one block.
+struct FilteredRows {
+    /// Whether they are of a log and a segment that the block before was of.
+    continues: bool,
+    /// Distances in outputs, and what noise has there after the filter; none where there are not two rows.
+    lags: Option<([usize; LAGS.len()], [f64; LAGS.len()])>,
+    /// Session time \[s\]; none where the row is in no fold.
+    times: Vec<Option<f64>>,
+    /// What the model leaves of each torque, nothing where the row does not count; the torque of the model;
+    /// position; speed.
+    torques: Vec<[f64; 4]>,
 }
 
 /// Fourier sums of a residual over the position.
@@ -103,7 +122,15 @@ impl Grid {
         Grid { first, step, sums: vec![(0.0, 0.0); count.min(2000)] }
     }
 
+    /// Looks for nothing.
+    fn empty() -> Self {
+        Grid { first: 0.0, step: 0.0, sums: Vec::new() }
+    }
+
     fn add(&mut self, position: f64, residual: f64) {
+        if self.sums.is_empty() {
+            return;
+        }
         let (mut sine, mut cosine) = (self.first * position).sin_cos();
         let (step_sine, step_cosine) = (self.step * position).sin_cos();
         for sum in &mut self.sums {
@@ -141,112 +168,141 @@ pub fn residual_shape(
     folds: &[Fold],
     sources: &[&dyn BlockSource],
     ranges: &[(f64, f64)],
+    peaks: Peaks,
 ) -> Result<ResidualShape, IdentificationError> {
-    let torques = design.rows().len();
     let duration: f64 = folds.iter().map(|fold| fold.end - fold.start).sum();
-    let mut collector = Collector {
-        lags: Default::default(),
-        of_noise: Default::default(),
-        ring: Vec::new(),
-        filled: 0,
-        products: vec![Default::default(); torques],
-        squares: vec![(0.0, 0.0); torques],
-        grids: ranges.iter().map(|&range| Grid::new(range)).collect(),
-        loads: ranges.iter().map(|&range| Grid::new(range)).collect(),
-        frictions: ranges.iter().map(|&range| Grid::new(range)).collect(),
-        times: ranges.iter().map(|_| Grid::new((0.0, duration))).collect(),
-    };
-    let mut scratch = design.scratch();
-    let mut filter = FilterScratch::default();
-    let mut filtered = FilteredRow { residual: vec![0.0; torques], fitted: vec![0.0; torques] };
-    let mut failure = None;
-    let mut rows = 0;
-    for source in sources {
-        let mut last = None;
-        source.blocks(&mut |mut block| {
-            design.correct(&mut block);
-            if let Err(error) = scratch.begin(&block) {
-                failure.get_or_insert(error);
-                return;
-            }
-            let continues = last == Some((block.log, block.segment));
-            last = Some((block.log, block.segment));
-            let outputs = block.outputs.clone();
-            if let [first, second, ..] = outputs[..] {
-                let period = block.t[second] - block.t[first];
-                let lags = LAGS.map(|lag| (lag / period).round().max(1.0) as usize);
-                collector.begin(lags, continues);
-                let filter = block.parallel_filter();
-                collector.of_noise = lags.map(|lag| filter.noise_autocorrelation(lag * filter.decimation()));
-            }
-            let mut evaluated = Ok(());
-            block.filter(
-                design.evaluation_width(),
-                &mut filter,
-                |sample, row| {
-                    if evaluated.is_ok() {
-                        evaluated = scratch.evaluate(&block, sample, row);
-                    }
+    let mut collectors: Vec<Collector> =
+        ranges.iter().map(|&range| Collector::new(range, duration, peaks)).collect();
+    let (mut last, mut rows) = (None, 0);
+    try_for_each_batch(sources, |batch| {
+        let continues: Vec<bool> = batch
+            .iter()
+            .map(|block| last.replace((block.log, block.segment)) == Some((block.log, block.segment)))
+            .collect();
+        let filtered: Result<Vec<FilteredRows>, IdentificationError> = batch
+            .into_par_iter()
+            .zip(continues)
+            .map_init(
+                || (design.scratch(), FilterScratch::default()),
+                |scratch, (block, continues)| {
+                    FilteredRows::of(design, parameters, folds, block, continues, scratch)
                 },
-                |output, t, row| {
-                    if !folds.iter().any(|fold| fold.log == block.log && fold.start <= t && t < fold.end) {
-                        return collector.begin(collector.lags, false);
-                    }
-                    rows += 1;
-                    filtered.set(design, parameters, row);
-                    let [q, qd] = [&block.q, &block.qd].map(|signal| &signal[block.row(outputs[output])]);
-                    collector.add(&filtered, q, qd, t + block.session_offset);
-                },
-            );
-            if let Err(error) = evaluated {
-                failure.get_or_insert(error);
-            }
-        })?;
-    }
-    if let Some(error) = failure {
-        return Err(error.into());
-    }
-    Ok(collector.shape(rows))
+            )
+            .collect();
+        let filtered = filtered?;
+        rows += filtered.iter().flat_map(|block| &block.times).flatten().count() as u64;
+        let torques = collectors.len();
+        collectors.par_iter_mut().enumerate().for_each(|(torque, collector)| {
+            filtered.iter().for_each(|block| collector.take(block, torque, torques));
+        });
+        Ok::<(), IdentificationError>(())
+    })?;
+    Ok(shape(&collectors, rows))
 }
 
-impl FilteredRow {
-    fn set(&mut self, design: &Design, parameters: &[f64], row: &[f64]) {
-        for (torque, layout) in design.rows().iter().enumerate() {
-            let columns = &row[layout.range.clone()];
-            let value = |parameter: usize| parameters.get(parameter).copied().unwrap_or_default();
-            let own = layout.parameters.iter().zip(columns);
-            let fitted: f64 = own.map(|(&parameter, column)| value(parameter) * column).sum();
-            let measured = columns[layout.parameters.len()];
-            self.fitted[torque] = fitted;
-            self.residual[torque] = if design.counts(row, torque) { measured - fitted } else { 0.0 };
-        }
+impl FilteredRows {
+    fn of(
+        design: &Design,
+        parameters: &[f64],
+        folds: &[Fold],
+        mut block: Block,
+        continues: bool,
+        (scratch, filter): &mut (DesignScratch<'_>, FilterScratch),
+    ) -> Result<Self, IdentificationError> {
+        design.correct(&mut block);
+        scratch.begin(&block)?;
+        let outputs = block.outputs.clone();
+        let lags = match outputs[..] {
+            [first, second, ..] => {
+                let period = block.t[second] - block.t[first];
+                let lags = LAGS.map(|lag| (lag / period).round().max(1.0) as usize);
+                let parallel = block.parallel_filter();
+                Some((lags, lags.map(|lag| parallel.noise_autocorrelation(lag * parallel.decimation()))))
+            }
+            _ => None,
+        };
+        let mut rows = FilteredRows { continues, lags, times: Vec::new(), torques: Vec::new() };
+        block.try_filter(
+            design.evaluation_width(),
+            filter,
+            |sample, row| Ok(scratch.evaluate(&block, sample, row)?),
+            |output, t, row| {
+                let inside = folds.iter().any(|fold| fold.contains(block.log, t));
+                rows.times.push(inside.then_some(t + block.session_offset));
+                let [q, qd] = [&block.q, &block.qd].map(|signal| &signal[block.row(outputs[output])]);
+                for (torque, layout) in design.rows().iter().enumerate() {
+                    let columns = &row[layout.range.clone()];
+                    let value = |parameter: usize| parameters.get(parameter).copied().unwrap_or_default();
+                    let own = layout.parameters.iter().zip(columns);
+                    let fitted: f64 = own.map(|(&parameter, column)| value(parameter) * column).sum();
+                    let measured = columns[layout.parameters.len()];
+                    let left = if design.counts(row, torque) { measured - fitted } else { 0.0 };
+                    rows.torques.push([left, fitted, q[torque], qd[torque]]);
+                }
+                Ok::<(), IdentificationError>(())
+            },
+        )?;
+        Ok(rows)
+    }
+}
+
+fn shape(collectors: &[Collector], rows: u64) -> ResidualShape {
+    let correlation = |&(product, square): &(f64, f64)| if square > 0.0 { product / square } else { 0.0 };
+    let largest = |of: &Collector| {
+        let by_size = |a: &f64, b: &f64| a.abs().total_cmp(&b.abs());
+        of.products[..STRUCTURE_LAGS.len()].iter().map(correlation).max_by(by_size).unwrap_or_default()
+    };
+    let peaks =
+        |of: fn(&Collector) -> &Grid| collectors.iter().map(|collector| of(collector).peaks()).collect();
+    ResidualShape {
+        rms: collectors.iter().map(|of| (of.squares.0 / of.squares.1.max(1.0)).sqrt()).collect(),
+        autocorrelation: collectors.iter().map(largest).collect(),
+        wander: collectors.iter().map(|of| correlation(&of.products[STRUCTURE_LAGS.len()])).collect(),
+        ripple_frequencies: peaks(|of| &of.positions),
+        load_ripple_frequencies: peaks(|of| &of.loads),
+        friction_ripple_frequencies: peaks(|of| &of.frictions),
+        time_frequencies: peaks(|of| &of.times),
+        rows,
     }
 }
 
 impl Collector {
-    fn shape(&self, rows: u64) -> ResidualShape {
-        let correlation = |&(product, square): &(f64, f64)| if square > 0.0 { product / square } else { 0.0 };
-        let largest = |sums: &[(f64, f64); LAGS.len()]| {
-            let by_size = |a: &f64, b: &f64| a.abs().total_cmp(&b.abs());
-            sums[..STRUCTURE_LAGS.len()].iter().map(correlation).max_by(by_size).unwrap_or_default()
+    fn new(range: (f64, f64), duration: f64, peaks: Peaks) -> Self {
+        let grid = |range: (f64, f64)| match peaks {
+            Peaks::All => Grid::new(range),
+            Peaks::OverPosition => Grid::empty(),
         };
-        let rms = |&(sum, rows): &(f64, f64)| (sum / rows.max(1.0)).sqrt();
-        ResidualShape {
-            rms: self.squares.iter().map(rms).collect(),
-            autocorrelation: self.products.iter().map(largest).collect(),
-            wander: self.products.iter().map(|sums| correlation(&sums[STRUCTURE_LAGS.len()])).collect(),
-            ripple_frequencies: self.grids.iter().map(Grid::peaks).collect(),
-            load_ripple_frequencies: self.loads.iter().map(Grid::peaks).collect(),
-            friction_ripple_frequencies: self.frictions.iter().map(Grid::peaks).collect(),
-            time_frequencies: self.times.iter().map(Grid::peaks).collect(),
-            rows,
+        Collector {
+            lags: Default::default(),
+            of_noise: Default::default(),
+            ring: Vec::new(),
+            filled: 0,
+            products: Default::default(),
+            squares: (0.0, 0.0),
+            positions: Grid::new(range),
+            loads: grid(range),
+            frictions: grid(range),
+            times: grid((0.0, duration)),
+        }
+    }
+
+    /// The rows of a block, of which this is the `torque`-th of `torques`.
+    fn take(&mut self, block: &FilteredRows, torque: usize, torques: usize) {
+        if let Some((lags, of_noise)) = block.lags {
+            self.begin(lags, block.continues);
+            self.of_noise = of_noise;
+        }
+        for (row, time) in block.times.iter().enumerate() {
+            match time {
+                Some(time) => self.add(block.torques[row * torques + torque], *time),
+                None => self.begin(self.lags, false),
+            }
         }
     }
 
     fn begin(&mut self, lags: [usize; LAGS.len()], continues: bool) {
         if lags != self.lags {
-            let longest = lags.into_iter().max().unwrap_or_default();
-            self.ring = vec![vec![0.0; self.products.len()]; longest];
+            self.ring = vec![0.0; lags.into_iter().max().unwrap_or_default()];
             self.lags = lags;
             self.filled = 0;
         } else if !continues {
@@ -254,31 +310,26 @@ impl Collector {
         }
     }
 
-    fn add(&mut self, row: &FilteredRow, positions: &[f64], speeds: &[f64], time: f64) {
-        let residual = &row.residual;
-        for (joint, &left) in residual.iter().enumerate() {
-            if left != 0.0 {
-                self.squares[joint].0 += left * left;
-                self.squares[joint].1 += 1.0;
-                let position = positions[joint];
-                self.grids[joint].add(position, left);
-                self.loads[joint].add(position, left * row.fitted[joint]);
-                self.frictions[joint].add(position, left * speeds[joint].signum());
-                self.times[joint].add(time, left);
-            }
+    fn add(&mut self, [left, fitted, position, speed]: [f64; 4], time: f64) {
+        if left != 0.0 {
+            self.squares.0 += left * left;
+            self.squares.1 += 1.0;
+            self.positions.add(position, left);
+            self.loads.add(position, left * fitted);
+            self.frictions.add(position, left * speed.signum());
+            self.times.add(time, left);
         }
         let size = self.ring.len();
         if size == 0 {
             return;
         }
         for (place, lag) in self.lags.into_iter().enumerate().filter(|(_, lag)| *lag <= self.filled) {
-            let before = &self.ring[(self.filled - lag) % size];
-            for ((sums, before), now) in self.products.iter_mut().zip(before).zip(residual) {
-                sums[place].0 += before * now - self.of_noise[place] * now * now;
-                sums[place].1 += now * now;
-            }
+            let before = self.ring[(self.filled - lag) % size];
+            let sums = &mut self.products[place];
+            sums.0 += before * left - self.of_noise[place] * left * left;
+            sums.1 += left * left;
         }
-        self.ring[self.filled % size].copy_from_slice(residual);
+        self.ring[self.filled % size] = left;
         self.filled += 1;
     }
 }

@@ -10,6 +10,9 @@ const SEARCHED_SAMPLES: f64 = 30_000.0;
 const PIECE_S: f64 = 5.0;
 /// What comes before a piece, for effects with memory \[s\].
 const WARM_UP_S: f64 = 2.0;
+/// Blocks that short logs are cut into, at least, so that every processor has one; none is shorter than what
+/// comes before it.
+const LEAST_BLOCKS: usize = 4;
 /// Conditioned samples that are kept between passes; what does not fit is read again \[bytes\].
 const KEPT_BYTES: usize = 64 << 20;
 /// The same for pieces of long logs, which are as many as they are.
@@ -31,11 +34,13 @@ impl<'a> Sample<'a> {
         let length = |folds: &[Fold]| folds.iter().map(|fold| fold.end - fold.start).sum::<f64>();
         let samples = (length(&data.train) + length(&data.held_out)) / period_s;
         if samples.is_nan() || samples <= SEARCHED_SAMPLES {
-            return Ok(Sample {
-                train: data.train.clone(),
-                held_out: data.held_out.clone(),
-                kept: KeptBlocks::keep(&data.sources, KEPT_BYTES)?,
-            });
+            let warm_up = (WARM_UP_S / period_s).round() as usize;
+            let wanted = LEAST_BLOCKS.div_ceil(data.sources.len().max(1));
+            let kept = KeptBlocks::keep_parts(&data.sources, KEPT_BYTES, |block| {
+                let parts = wanted.min(block.len() / warm_up.max(1));
+                block.in_parts(parts, warm_up)
+            })?;
+            return Ok(Sample { train: data.train.clone(), held_out: data.held_out.clone(), kept });
         }
         let share = SEARCHED_SAMPLES / samples;
         let (train, held_out) = (pieces(&data.train, share), pieces(&data.held_out, share));

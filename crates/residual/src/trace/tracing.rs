@@ -67,9 +67,11 @@ pub struct FoundEffect {
 pub struct Disturbance {
     /// The joint whose residual it is.
     pub joint: String,
+    /// Which of the torques that is.
+    pub row: usize,
     /// Its RMS on motion held out \[N·m, N\].
     pub rmse: f64,
-    /// The joint's noise floor \[N·m, N\].
+    /// The joint's noise floor, that of white noise \[N·m, N\].
     pub noise_floor: f64,
     /// Correlation of samples a quarter to half a second apart.
     pub autocorrelation: f64,
