@@ -1,4 +1,5 @@
-//! What becomes of a torque on its way into the log: it is stamped late, by a clock that drifts, or low-passed.
+//! What becomes of a torque on its way into the log: it is stamped late, or by a clock that drifts, or it is
+//! low-passed.
 //!
 //! All of it is undone in the log itself, and their columns are linear about what is undone already.
 

@@ -8,6 +8,7 @@ use crate::arguments::CheckArguments;
 use crate::console::Console;
 use crate::log_inputs::{read_map, said_of_logs, sources};
 use crate::output::check_folder;
+use crate::page::counted;
 use crate::warnings::{file_name, of_log, snapped};
 use crate::{Error, robot_file, session};
 use phiw_dynamics::Tree;
@@ -144,12 +145,12 @@ fn summary(checked: &Checked<'_>) -> String {
     for survey in surveys {
         let _ = writeln!(
             text,
-            "{}: {} rows, {:.1} s at {:.1} Hz, {} segments",
+            "{}: {} rows, {:.1} s at {:.1} Hz, {}",
             file_name(&survey.path),
             survey.used_rows,
             survey.duration(),
             survey.rate_hz(),
-            survey.segments.len(),
+            counted(survey.segments.len(), "segment"),
         );
         for warning in of_log(survey) {
             let _ = writeln!(text, "  {warning}");

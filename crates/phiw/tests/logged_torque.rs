@@ -129,8 +129,8 @@ fn a_torque_that_was_low_passed_as_it_came_is_late_by_the_filters_delay() {
     assert!((1.5..2.1).contains(&(delay / time_constant)), "{delay} s, T {time_constant} s");
 }
 
-/// Torques stamped by a clock of their own were called explained by a delay, and 18 times the noise was left at
-/// the ends of the logs.
+/// Torques stamped by a clock of their own were called explained by a delay, though far more than noise was
+/// left at the ends of the logs.
 #[test]
 fn a_clock_of_the_torques_that_drifts_is_named_with_its_rate() {
     let rate = 1.5e-3;

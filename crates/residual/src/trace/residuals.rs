@@ -1,4 +1,5 @@
-//! One pass over the logs with a fitted model: what it leaves, sample by sample, in the memory of a few blocks.
+//! One pass over the logs with a fitted model: what it leaves, sample by sample, in the memory of a few
+//! blocks.
 
 use phiw_effects::SignalRanges;
 use phiw_identification::block_source::try_for_each_batch;
