@@ -32,7 +32,8 @@ pub struct Analysis<'a> {
     pub traces: Option<Traces>,
     /// What the rows at which joints rest add.
     pub with_rests: WithRests,
-    /// RMS of the noise in each joint's filtered torque \[N·m, N\].
+    /// RMS of the noise in each joint's filtered torque, disturbances that follow nothing measured included
+    /// where they were looked for \[N·m, N\].
     pub noise_floor: Vec<f64>,
     /// What other cut-offs would do, where it was asked.
     pub bandwidth: Option<Bandwidth>,
