@@ -60,7 +60,7 @@ impl FoldFactors {
     /// # Errors
     /// A parameter does not exist.
     pub fn select(&self, kept: &[usize]) -> Result<Self, RegressorError> {
-        let select = |folds: &[GroupedFactor]| folds.iter().map(|fold| fold.select(kept)).collect();
+        let select = |folds: &[GroupedFactor]| folds.par_iter().map(|fold| fold.select(kept)).collect();
         let (moving, at_rest): (Result<_, _>, Result<_, _>) = (select(&self.moving), select(&self.at_rest));
         Ok(FoldFactors { moving: moving?, at_rest: at_rest? })
     }

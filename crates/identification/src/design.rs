@@ -58,6 +58,8 @@ pub struct Design {
     rows: Vec<RowLayout>,
     width: usize,
     needs: Needs,
+    /// Whether some column is made of the regressor's pairs.
+    needs_pairs: bool,
     reference: Option<ReferenceModel>,
     rest_speeds: Vec<f64>,
     /// What each torque is multiplied by in the log.
@@ -91,6 +93,16 @@ impl Design {
     }
 
     fn of_shared(tree: Tree, base: BaseParameters, effects: Vec<Arc<dyn Effect>>) -> Self {
+        Self::of_columns(tree, base, effects, true)
+    }
+
+    /// Without the rigid body the base parameters have no columns.
+    fn of_columns(
+        tree: Tree,
+        base: BaseParameters,
+        effects: Vec<Arc<dyn Effect>>,
+        has_rigid_body: bool,
+    ) -> Self {
         let regressor = JointTorqueRegressor::new(&tree);
         let (mut effect_parameters, mut effect_columns) = (Vec::new(), Vec::new());
         let (mut parameter, mut column) = (base.count(), 0);
@@ -112,7 +124,7 @@ impl Design {
             let mut layout =
                 RowLayout { parameters: Vec::new(), range: 0..0, gather: Vec::new(), effects: Vec::new() };
             let pairs = regressor.row_range(row).step_by(PARAMETERS_PER_BODY);
-            for (pair, &body) in pairs.zip(regressor.row_bodies(row)) {
+            for (pair, &body) in pairs.zip(regressor.row_bodies(row)).filter(|_| has_rigid_body) {
                 let own = body * PARAMETERS_PER_BODY..(body + 1) * PARAMETERS_PER_BODY;
                 let first = base.independent().partition_point(|&column| column < own.start);
                 for (parameter, &column) in base.independent().iter().enumerate().skip(first) {
@@ -142,6 +154,7 @@ impl Design {
             tree,
             base,
             regressor,
+            needs_pairs: has_rigid_body || needs.statics,
             effects,
             effect_parameters,
             effect_columns,
@@ -294,6 +307,18 @@ impl Design {
         }
     }
 
+    /// The `chosen` effects alone, in that order, with the rigid body's columns or without them. It has no
+    /// reference model.
+    #[must_use]
+    pub fn part(&self, chosen: &[usize], has_rigid_body: bool) -> Self {
+        let effects = chosen.iter().filter_map(|&effect| self.effects.get(effect).cloned()).collect();
+        Design {
+            candidates_from: chosen.partition_point(|&effect| effect < self.candidates_from),
+            rest_speeds: self.rest_speeds.clone(),
+            ..Design::of_columns(self.tree.clone(), self.base.clone(), effects, has_rigid_body)
+        }
+    }
+
     /// The robot.
     pub fn tree(&self) -> &Tree {
         &self.tree
@@ -396,7 +421,9 @@ impl DesignScratch<'_> {
         let row = block.row(sample);
         let links = self.links.as_ref().unwrap_or(block);
         let regressor = &design.regressor;
-        self.pairs_of_block.put(regressor, &design.tree, links, sample, &mut self.pairs)?;
+        if design.needs_pairs {
+            self.pairs_of_block.put(regressor, &design.tree, links, sample, &mut self.pairs)?;
+        }
         let statics = self.statics.chunks_exact_mut(self.pairs.len().max(1));
         for ((tree, pairs_of_block), pairs) in self.unit_gravity.iter_mut().zip(statics) {
             pairs_of_block.put(regressor, tree, links, sample, pairs)?;

@@ -9,6 +9,7 @@ use crate::{Design, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::Factor;
 use phiw_regressor::least_squares::{GroupedFactor, WeightedSolution, weighted_least_squares};
+use rayon::prelude::*;
 
 /// A fitted design.
 #[derive(Clone, Debug)]
@@ -159,7 +160,7 @@ fn fit_without(
     let undetermined: Vec<usize> =
         (0..design.parameter_count()).filter(|parameter| !determined.contains(parameter)).collect();
     let own: Vec<GroupedFactor> =
-        folds.iter().map(|fold| fold.select(&determined)).collect::<Result<_, _>>()?;
+        folds.par_iter().map(|fold| fold.select(&determined)).collect::<Result<_, _>>()?;
     let weights = weights_of(&solution);
     let jackknife = Jackknife::of(&own, &weights)?;
     let base = determined.partition_point(|&parameter| parameter < design.base().count());
@@ -297,6 +298,6 @@ pub(crate) fn left_out(
     weights: &[f64],
 ) -> Result<Option<Vec<Vec<f64>>>, RegressorError> {
     let selected: Vec<GroupedFactor> =
-        folds.iter().map(|fold| fold.select(determined)).collect::<Result<_, _>>()?;
+        folds.par_iter().map(|fold| fold.select(determined)).collect::<Result<_, _>>()?;
     Ok(Jackknife::of(&selected, weights)?.map(Jackknife::into_solutions))
 }

@@ -3,6 +3,7 @@
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, leave_one_out};
 use phiw_regressor::least_squares::GroupedFactor;
+use rayon::prelude::*;
 
 /// The solutions of all folds but one.
 pub(crate) struct Jackknife {
@@ -24,10 +25,10 @@ impl Jackknife {
             return Ok(None);
         }
         let weighted: Result<Vec<Factor>, RegressorError> =
-            folds.iter().map(|fold| fold.combine(weights)).collect();
+            folds.par_iter().map(|fold| fold.combine(weights)).collect();
         let mut solutions = Vec::with_capacity(folds.len());
-        for factor in leave_one_out(&weighted?)? {
-            match factor.solve() {
+        for solution in leave_one_out(&weighted?)?.par_iter().map(Factor::solve).collect::<Vec<_>>() {
+            match solution {
                 Ok(solution) => solutions.push(solution.parameters),
                 Err(RegressorError::RankDeficient { .. }) => return Ok(None),
                 Err(error) => return Err(error),
@@ -96,7 +97,7 @@ impl Jackknife {
             let parameters = uncertain * (count - 1.0) / count;
             ((squares[torque] - parameters).max(0.0) / rows.max(1) as f64).sqrt()
         };
-        Ok((0..torques).map(of_torque).collect())
+        Ok((0..torques).into_par_iter().map(of_torque).collect())
     }
 }
 

@@ -18,6 +18,7 @@ mod drawn;
 mod effect_selector;
 mod error;
 mod factor_rows;
+mod filtered_rows;
 mod fit;
 mod free_constants;
 pub mod held_joints;
@@ -65,6 +66,7 @@ pub mod fitting {
     pub use crate::accumulate::{FoldFactors, Rests, accumulate, accumulate_folds};
     pub use crate::disturbances::{Disturbance, DisturbanceSettings, disturbances};
     pub use crate::factor_rows::FactorRows;
+    pub use crate::filtered_rows::{FilteredRows, map_filtered_rows};
     pub use crate::fit::{Fit, TorqueError, fit, merge, torque_error, torques_with_enough_rows};
     pub use crate::free_constants::{ByConstant, FreeConstant, free_constants};
     pub use crate::held_out_change::{HeldOutChange, held_out_change};

@@ -162,7 +162,8 @@ impl<'a> Sample<'a> {
     pub fn torque_by_gravity(&self) -> &'a [f64] {
         self.matrix(&self.reference.gravity, 3)
     }
-    /// The joint torque regressor's pairs of this sample (see `phiw_regressor::JointTorqueRegressor`).
+    /// The joint torque regressor's pairs of this sample (see `phiw_regressor::JointTorqueRegressor`), for
+    /// effects that need [`statics`](Needs::statics).
     pub fn regressor_pairs(&self) -> &'a [f64] {
         self.regressor
     }

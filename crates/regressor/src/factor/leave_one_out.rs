@@ -2,6 +2,7 @@
 
 use super::Factor;
 use crate::RegressorError;
+use rayon::prelude::*;
 
 /// For each block, the factor of all the others: 3·K merges for K blocks, whatever their number of rows.
 ///
@@ -9,16 +10,17 @@ use crate::RegressorError;
 /// The blocks have different numbers of columns.
 pub fn leave_one_out(blocks: &[Factor]) -> Result<Vec<Factor>, RegressorError> {
     let Some(first) = blocks.first() else { return Ok(Vec::new()) };
-    let empty = Factor::empty(first.columns());
-    let mut after = vec![empty.clone()];
-    for block in blocks.iter().skip(1).rev() {
-        after.push(after[after.len() - 1].merge(block)?);
-    }
-    let mut before = empty;
-    let mut left_out = Vec::with_capacity(blocks.len());
-    for (block, rest) in blocks.iter().zip(after.iter().rev()) {
-        left_out.push(before.merge(rest)?);
-        before = before.merge(block)?;
-    }
-    Ok(left_out)
+    let sums = |blocks: &mut dyn Iterator<Item = &Factor>| {
+        let mut sums = vec![Factor::empty(first.columns())];
+        for block in blocks {
+            sums.push(sums[sums.len() - 1].merge(block)?);
+        }
+        Ok::<_, RegressorError>(sums)
+    };
+    let last = blocks.len() - 1;
+    let (before, after) =
+        rayon::join(|| sums(&mut blocks[..last].iter()), || sums(&mut blocks[1..].iter().rev()));
+    let (before, mut after) = (before?, after?);
+    after.reverse();
+    before.par_iter().zip(&after).map(|(before, after)| before.merge(after)).collect()
 }

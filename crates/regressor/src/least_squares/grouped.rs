@@ -7,6 +7,7 @@
 use crate::RegressorError;
 use crate::factor::{Factor, FactorBuilder};
 use phiw_dynamics::check::{check_index, check_size};
+use rayon::prelude::*;
 
 /// The rows of one torque.
 #[derive(Clone, Debug)]
@@ -107,7 +108,7 @@ impl GroupedFactor {
                 columns.iter().map(|&(_, column)| column).chain([group.factor.parameters()]).collect();
             Ok(Group { parameters, factor: group.factor.select(&named)? })
         };
-        let groups: Result<Vec<Group>, RegressorError> = self.groups.iter().map(restrict).collect();
+        let groups: Result<Vec<Group>, RegressorError> = self.groups.par_iter().map(restrict).collect();
         Self::new(kept.len(), groups?)
     }
 
@@ -149,7 +150,7 @@ impl GroupedFactor {
         check_size("parameters", other.parameter_count, self.parameter_count)?;
         let groups: Result<Vec<Group>, RegressorError> = self
             .groups
-            .iter()
+            .par_iter()
             .zip(&other.groups)
             .map(|(mine, theirs)| {
                 check_size("parameters of a group", theirs.parameters.len(), mine.parameters.len())?;

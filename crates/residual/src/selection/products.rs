@@ -1,5 +1,7 @@
 //! Scalar products of columns: what is left of the rows of one torque.
 
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::{Accum, MatMut, MatRef, Par};
 use phiw_regressor::factor::{Factor, ROUNDING};
 
 /// ΦᵀΦ of some columns, the right-hand side as the last of them.
@@ -21,25 +23,51 @@ impl Products {
         Products { size, values: vec![0.0; size * size], rows: 0.0 }
     }
 
-    /// RᵀR. The factor of few rows has as few that are not zero. Columns of which there is nothing but what
-    /// rounding makes beside the largest are zero.
-    pub fn of_factor(factor: &Factor) -> Self {
-        let size = factor.columns();
-        let rows = usize::try_from(factor.rows()).map_or(size, |rows| rows.min(size));
-        let r = factor.as_mat().subrows(0, rows);
-        let product = r.transpose() * r;
-        let mut values: Vec<f64> =
-            (0..size).flat_map(|column| product.col_as_slice(column).to_vec()).collect();
-        let parameters = 0..factor.parameters();
-        let largest = parameters.clone().map(|column| product[(column, column)]).fold(0.0, f64::max);
-        let least = ROUNDING * ROUNDING * largest;
-        for column in parameters.filter(|&column| product[(column, column)] < least) {
-            (0..size).for_each(|other| {
-                values[column * size + other] = 0.0;
-                values[other * size + column] = 0.0;
-            });
+    /// Of some rows, the right-hand side as their last column.
+    pub fn of_rows(rows: MatRef<'_, f64>) -> Self {
+        let size = rows.ncols();
+        let mut values = vec![0.0; size * size];
+        matmul(
+            MatMut::from_column_major_slice_mut(&mut values, size, size),
+            BlockStructure::TriangularLower,
+            Accum::Replace,
+            rows.transpose(),
+            BlockStructure::Rectangular,
+            rows,
+            BlockStructure::Rectangular,
+            1.0,
+            Par::Seq,
+        );
+        for column in 0..size {
+            for row in 0..column {
+                values[column * size + row] = values[row * size + column];
+            }
         }
-        Products { size, values, rows: factor.rows() as f64 }
+        Products { size, values, rows: rows.nrows() as f64 }
+    }
+
+    /// RᵀR. The factor of few rows has as few that are not zero.
+    pub fn of_factor(factor: &Factor) -> Self {
+        let rows = usize::try_from(factor.rows()).map_or(factor.columns(), |rows| rows.min(factor.columns()));
+        let products = Products::of_rows(factor.as_mat().subrows(0, rows));
+        Products { rows: factor.rows() as f64, ..products }.without_rounding()
+    }
+
+    /// The same where columns of which there is nothing but what rounding makes beside the largest are zero.
+    #[must_use]
+    pub fn without_rounding(mut self) -> Self {
+        let size = self.size;
+        let square = |column: usize| self.values[column * size + column];
+        let parameters = 0..size.saturating_sub(1);
+        let least = ROUNDING * ROUNDING * parameters.clone().map(square).fold(0.0, f64::max);
+        let rounded: Vec<usize> = parameters.filter(|&column| square(column) < least).collect();
+        for column in rounded {
+            for other in 0..size {
+                self.values[column * size + other] = 0.0;
+                self.values[other * size + column] = 0.0;
+            }
+        }
+        self
     }
 
     /// The same with all columns but the right-hand side multiplied by a factor.
@@ -48,6 +76,13 @@ impl Products {
         let of = |column: usize| if column == last { 1.0 } else { factor };
         let value = |(at, value): (usize, &f64)| of(at / self.size) * of(at % self.size) * value;
         Products { values: self.values.iter().enumerate().map(value).collect(), ..*self }
+    }
+
+    /// Of all rows together.
+    pub fn sum(parts: &[Products]) -> Self {
+        let mut sum = Products::zero(parts.first().map_or(0, |part| part.size));
+        parts.iter().for_each(|part| sum.add(part));
+        sum
     }
 
     /// Adds the rows of another.

@@ -1,6 +1,7 @@
 //! Constants closer to the best, once an effect is in the model.
 
 use super::hypotheses::{Candidates, Present};
+use super::kept_columns::Keep;
 use super::search::Search;
 use crate::selection::{LEAST_STEP, choose_variants};
 use phiw_identification::{EffectSpec, IdentificationError};
@@ -15,13 +16,13 @@ impl Search<'_> {
     pub(super) fn refine(&mut self) -> Result<(), IdentificationError> {
         for step in 0..REFINEMENTS {
             let mut candidates = self.near(step)?;
-            let depends = self.fixed.build(&self.specs)?.iter().any(|effect| !effect.needs().is_empty());
+            let depends = self.fixed.build(&self.specs)?.iter().any(|effect| effect.needs().of_reference());
             if candidates.effects.is_empty() && !depends {
                 break;
             }
             let effects = std::mem::take(&mut candidates.effects);
-            let stage = self.pass(effects)?;
-            let mut problem = self.fixed.problem(&stage, &mut candidates)?;
+            let stage = self.pass(effects, Keep::No)?;
+            let mut problem = self.fixed.problem(stage, &mut candidates)?;
             problem.hypotheses.iter_mut().for_each(|hypothesis| hypothesis.declared = true);
             let outcome = choose_variants(&problem, candidates.present.clone(), self.policy());
             self.take(&problem, &candidates, &outcome.members, &outcome.fit.values);

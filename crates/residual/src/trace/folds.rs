@@ -1,5 +1,6 @@
 //! Stretches of motion whose residuals have nothing to do with each other.
 
+use super::kept_columns::Keep;
 use super::stage::Fixed;
 use phiw_identification::effect::ReferenceModel;
 use phiw_identification::{Fold, IdentificationError};
@@ -56,11 +57,10 @@ fn cut(folds: &[Fold], parts: usize) -> Vec<Fold> {
 
 /// For each fold, and each torque, whether it has rows there.
 fn torques_with_rows(fixed: &Fixed<'_>, folds: &[Fold]) -> Result<Vec<Vec<bool>>, IdentificationError> {
-    let stage = fixed.pass(&[], Vec::new(), ReferenceModel::new(fixed.tree.clone()), folds)?;
-    let of_fold = |fold: &phiw_regressor::least_squares::GroupedFactor| {
-        fold.groups().iter().map(|group| group.factor.rows() > 0).collect()
-    };
-    Ok(stage.folds.iter().map(of_fold).collect())
+    let reference = ReferenceModel::new(fixed.tree.clone());
+    let stage = fixed.pass(&[], Vec::new(), reference, folds, Keep::No)?;
+    let in_fold = |fold: usize| stage.torques.iter().map(|folds| folds[fold].rows() > 0.0).collect();
+    Ok((0..folds.len()).map(in_fold).collect())
 }
 
 /// The smallest number of `folds` in which a torque has rows, of those that have any; `finest` are the parts

@@ -14,6 +14,7 @@ mod harm;
 mod hypotheses;
 mod impossible;
 mod input;
+mod kept_columns;
 mod multiples;
 mod naming;
 mod of_training_logs;

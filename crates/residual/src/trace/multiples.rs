@@ -1,6 +1,7 @@
 //! Torques that are logged as another multiple of what they are than the others, put in force at the start.
 
 use super::hypotheses::{Candidates, Present};
+use super::kept_columns::Keep;
 use super::search::Search;
 use crate::selection::{Multiple, multiples};
 use phiw_effects::EffectKind;
@@ -62,8 +63,8 @@ impl Search<'_> {
         with_textbook.declared = with_textbook.specs.len();
         let present = Present { specs: &with_textbook.specs, declared: with_textbook.declared };
         let mut candidates = Candidates::of_model(self.fixed, present);
-        let stage = with_textbook.pass(Vec::new())?;
-        let problem = self.fixed.problem(&stage, &mut candidates)?;
+        let stage = with_textbook.pass(Vec::new(), Keep::No)?;
+        let problem = self.fixed.problem(stage, &mut candidates)?;
         let independent = |rows: f64| (rows / problem.rows_per_independent).max(2.0);
         let rows: Vec<f64> = problem.torques.iter().map(|torque| independent(torque.whole.rows())).collect();
         let least_share = self.options.thresholds.least_share;

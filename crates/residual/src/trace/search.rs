@@ -3,6 +3,7 @@
 use super::folds::{split, split_by_motion};
 use super::hypotheses::{Candidates, Present};
 use super::input::{TraceInput, TraceOptions};
+use super::kept_columns::Keep;
 use super::residuals::ranges_of_residual;
 use super::sample::Sample;
 use super::stage::{Fixed, Stage, specs_and_values};
@@ -183,9 +184,9 @@ impl Search<'_> {
     }
 
     /// One pass over the training motion with the model's columns and those of `effects`.
-    pub fn pass(&self, effects: Vec<Box<dyn Effect>>) -> Result<Stage, IdentificationError> {
+    pub fn pass(&self, effects: Vec<Box<dyn Effect>>, keep: Keep) -> Result<Stage, IdentificationError> {
         let reference = self.fixed.reference(&self.specs, &self.parameters)?;
-        self.fixed.pass(&self.specs, effects, reference, &self.folds)
+        self.fixed.pass(&self.specs, effects, reference, &self.folds, keep)
     }
 
     /// Chooses among all hypotheses, from the present model on.
@@ -197,9 +198,8 @@ impl Search<'_> {
             self.asks_of_logs || !kind.is_of_training_logs()
         })?;
         let effects = std::mem::take(&mut candidates.effects);
-        let stage = self.pass(effects)?;
-        let problem = self.fixed.problem(&stage, &mut candidates)?;
-        drop(stage);
+        let stage = self.pass(effects, Keep::Yes)?;
+        let problem = self.fixed.problem(stage, &mut candidates)?;
         let outcome = select(&problem, candidates.present.clone(), self.policy());
         let spec = |member: &Member| candidates.list[member.hypothesis].specs[member.variant].clone();
         let found = outcome.members.iter().zip(&outcome.alternatives);
@@ -285,8 +285,8 @@ impl Search<'_> {
     fn value(&self, rows: &[f64]) -> Result<f64, IdentificationError> {
         let mut candidates =
             Candidates::of_model(self.fixed, Present { specs: &self.specs, declared: self.declared });
-        let stage = self.pass(Vec::new())?;
-        let problem = self.fixed.problem(&stage, &mut candidates)?;
+        let stage = self.pass(Vec::new(), Keep::No)?;
+        let problem = self.fixed.problem(stage, &mut candidates)?;
         Ok(value(&problem, &candidates.present, rows))
     }
 

@@ -2,6 +2,7 @@
 
 use super::hypotheses::Candidates;
 use super::input::{TraceInput, TraceOptions};
+use super::kept_columns::{Keep, KeptColumns, Pass};
 use crate::selection::{self, Hypothesis, Member, Products, Torque, Variant};
 use phiw_dynamics::Tree;
 use phiw_effects::Catalogue;
@@ -29,6 +30,8 @@ pub(super) struct Fixed<'a> {
     pub negligible_share: f64,
     /// Hypotheses that could not be judged.
     pub not_judged: Mutex<BTreeSet<(String, Vec<String>)>>,
+    /// Columns that stay the same from pass to pass.
+    kept: Mutex<KeptColumns>,
 }
 
 /// A held model's factor, and the parameters that its columns stand for.
@@ -39,12 +42,17 @@ pub(super) struct Prior {
     pub weights: Vec<f64>,
 }
 
-/// Factors of a design over some folds.
+/// A design over some folds.
 pub(super) struct Stage {
     pub design: Design,
     /// Number of the model's effects; the candidates' follow.
-    pub model_effects: usize,
-    pub folds: Vec<GroupedFactor>,
+    model_effects: usize,
+    /// Candidates whose columns are not finite.
+    not_finite: Vec<usize>,
+    /// Parameters of the base and of a held model's effects that are there in any case.
+    always: Vec<usize>,
+    /// For each torque the products of each fold.
+    pub torques: Vec<Vec<Products>>,
 }
 
 impl<'a> Fixed<'a> {
@@ -67,6 +75,7 @@ impl<'a> Fixed<'a> {
             rows_per_independent: input.rows_per_independent,
             negligible_share: options.thresholds.negligible_share(),
             not_judged: Mutex::default(),
+            kept: Mutex::default(),
         })
     }
 
@@ -104,53 +113,86 @@ impl<'a> Fixed<'a> {
         Ok(ReferenceModel::new(tree).with_effects(effects))
     }
 
-    /// One pass over the logs: the model's columns, then the candidates'.
+    /// The model's columns, then the candidates'.
+    fn design(
+        &self,
+        specs: &[EffectSpec],
+        candidates: Vec<Box<dyn Effect>>,
+    ) -> Result<Design, IdentificationError> {
+        let mut effects = self.build(specs)?;
+        effects.extend(candidates);
+        Ok(Design::new(self.tree.clone(), self.base.clone(), effects)
+            .with_rest_speeds(self.data.rest_speeds.clone())
+            .with_candidates_from(specs.len()))
+    }
+
+    /// The factors of a model and candidates over some folds, and their design.
+    pub fn factors(
+        &self,
+        specs: &[EffectSpec],
+        candidates: Vec<Box<dyn Effect>>,
+        reference: ReferenceModel,
+        folds: &[Fold],
+    ) -> Result<(Design, Vec<GroupedFactor>), IdentificationError> {
+        let design = self.design(specs, candidates)?.with_reference(reference);
+        let folds = accumulate(&design, folds, &self.data.sources)?;
+        Ok((design, folds))
+    }
+
+    /// One pass over the logs: the model's columns, then the candidates'. `keep` says whether these come
+    /// again in other passes.
     pub fn pass(
         &self,
         specs: &[EffectSpec],
         candidates: Vec<Box<dyn Effect>>,
         reference: ReferenceModel,
         folds: &[Fold],
+        keep: Keep,
     ) -> Result<Stage, IdentificationError> {
-        let mut effects = self.build(specs)?;
-        let model_effects = effects.len();
-        effects.extend(candidates);
-        let design = Design::new(self.tree.clone(), self.base.clone(), effects)
-            .with_rest_speeds(self.data.rest_speeds.clone())
-            .with_candidates_from(model_effects)
-            .with_reference(reference);
-        let folds = accumulate(&design, folds, &self.data.sources)?;
-        Ok(Stage { model_effects, folds, design })
-    }
-
-    /// Parameters of the base and of a held model's effects that are there in any case.
-    fn always(&self, stage: &Stage) -> Result<Vec<usize>, RegressorError> {
-        let Some(prior) = &self.prior else { return Ok((0..self.base.count()).collect()) };
-        // A parameter that was not determined then would take up what has come since: it stays out.
-        let mut builder = FactorBuilder::new(prior.parameters.len() + 1);
-        let all: Vec<usize> = (0..=prior.parameters.len()).collect();
-        builder.push_factor(&prior.factor, &all, 1.0)?;
-        let folds: Result<Vec<GroupedFactor>, RegressorError> =
-            stage.folds.iter().map(|fold| fold.select(&prior.parameters)).collect();
-        for fold in folds? {
-            builder.push_factor(&fold.combine(&prior.weights)?, &all, 1.0)?;
+        if let Some(prior) = &self.prior {
+            let (design, folds) = self.factors(specs, candidates, reference, folds)?;
+            let of_torque = |torque: usize| {
+                folds.iter().map(|fold| Products::of_factor(&fold.groups()[torque].factor)).collect()
+            };
+            return Ok(Stage {
+                model_effects: specs.len(),
+                not_finite: design.not_finite(),
+                always: still_determined(prior, &folds)?,
+                torques: (0..design.rows().len()).into_par_iter().map(of_torque).collect(),
+                design,
+            });
         }
-        let undetermined = builder.factor().undetermined_columns();
-        let places = prior.parameters.iter().enumerate();
-        Ok(places
-            .filter(|(place, _)| !undetermined.contains(place))
-            .map(|(_, &parameter)| parameter)
-            .collect())
+        let design = self.design(specs, candidates)?;
+        let mut in_force = Vec::new();
+        for spec in specs {
+            if self.absent(spec)?.is_some() {
+                in_force.push(spec.clone());
+            }
+        }
+        // A pass beside this one evaluates all columns by itself.
+        let mut kept = self.kept.lock().map(|mut kept| std::mem::take(&mut *kept)).unwrap_or_default();
+        let pass = Pass { design: &design, in_force, reference, folds, sources: &self.data.sources, keep };
+        let products = kept.products(pass)?;
+        if let Ok(mut place) = self.kept.lock() {
+            *place = kept;
+        }
+        Ok(Stage {
+            model_effects: specs.len(),
+            not_finite: products.not_finite,
+            always: (0..self.base.count()).collect(),
+            torques: products.torques,
+            design,
+        })
     }
 
     /// What is to be chosen from, as plain data; hypotheses and their variants are those of `candidates`, in
     /// their order.
     pub fn problem(
         &self,
-        stage: &Stage,
+        stage: Stage,
         candidates: &mut Candidates,
     ) -> Result<selection::Problem, IdentificationError> {
-        self.leave_out_what_is_not_finite(stage, candidates);
+        self.leave_out_what_is_not_finite(&stage, candidates);
         let design = &stage.design;
         let mut absent = vec![0.0; design.parameter_count()];
         let mut hypotheses = Vec::with_capacity(candidates.list.len());
@@ -168,7 +210,7 @@ impl<'a> Fixed<'a> {
                     constants: spec.constants.len(),
                 });
             }
-            if effect_is_found(candidate, stage)
+            if effect_is_found(candidate, &stage)
                 && let Some(values) = self.absent(&candidate.specs[0])?
             {
                 design
@@ -190,15 +232,15 @@ impl<'a> Fixed<'a> {
                 made_of_model,
             });
         }
-        let torques = (0..design.rows().len()).into_par_iter().map(|row| {
-            let parameters = design.rows()[row].parameters.clone();
-            let of_fold = |fold: &GroupedFactor| Products::of_factor(&fold.groups()[row].factor);
-            Torque::new(parameters, stage.folds.iter().map(of_fold).collect(), self.negligible_share)
-        });
+        let torques = stage
+            .torques
+            .into_par_iter()
+            .zip(design.rows())
+            .map(|(folds, layout)| Torque::new(layout.parameters.clone(), folds, self.negligible_share));
         Ok(selection::Problem {
             torques: torques.collect(),
             parameters: design.parameter_count(),
-            model: self.always(stage)?,
+            model: stage.always,
             hypotheses,
             prior: self.prior.as_ref().map(|prior| selection::Prior {
                 parameters: prior.parameters.clone(),
@@ -228,7 +270,7 @@ impl<'a> Fixed<'a> {
     }
 
     fn leave_out_what_is_not_finite(&self, stage: &Stage, candidates: &mut Candidates) {
-        let not_finite = stage.design.not_finite();
+        let not_finite = &stage.not_finite;
         if not_finite.is_empty() {
             return;
         }
@@ -254,14 +296,18 @@ fn effect_is_found(candidate: &super::hypotheses::Candidate, stage: &Stage) -> b
     !candidate.declared && candidate.effects[0] < stage.model_effects
 }
 
-impl Stage {
-    /// Number of the model's parameters.
-    pub fn model_size(&self) -> usize {
-        match self.model_effects {
-            0 => self.design.base().count(),
-            count => self.design.effect_parameters(count - 1).end,
-        }
+/// Parameters of a held model that its own rows and these determine. One that was not determined then would
+/// take up what has come since: it stays out.
+fn still_determined(prior: &Prior, folds: &[GroupedFactor]) -> Result<Vec<usize>, RegressorError> {
+    let mut builder = FactorBuilder::new(prior.parameters.len() + 1);
+    let all: Vec<usize> = (0..=prior.parameters.len()).collect();
+    builder.push_factor(&prior.factor, &all, 1.0)?;
+    for fold in folds {
+        builder.push_factor(&fold.select(&prior.parameters)?.combine(&prior.weights)?, &all, 1.0)?;
     }
+    let undetermined = builder.factor().undetermined_columns();
+    let places = prior.parameters.iter().enumerate();
+    Ok(places.filter(|(place, _)| !undetermined.contains(place)).map(|(_, &parameter)| parameter).collect())
 }
 
 /// Specs of the members, and the values of the base parameters and of theirs, in that order.

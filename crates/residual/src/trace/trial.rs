@@ -1,11 +1,10 @@
 //! A model on trial: what it foretells of training motion that it was not fitted to.
 
 use super::hypotheses::{Candidates, Present};
+use super::kept_columns::Keep;
 use super::search::Search;
-use super::stage::Stage;
 use crate::selection::{Fit, Foretelling, Member, Parts, Problem, Products};
 use phiw_identification::IdentificationError;
-use phiw_regressor::least_squares::GroupedFactor;
 
 /// The chosen model, fitted to the training motion.
 ///
@@ -38,12 +37,14 @@ impl Search<'_> {
         let mut candidates = Candidates::of_model(self.fixed, present);
         let folds: Vec<_> = self.folds.iter().chain(&self.fixed.data.held_out).copied().collect();
         let reference = self.fixed.reference(&self.specs, &self.parameters)?;
-        let mut stage = self.fixed.pass(&self.specs, Vec::new(), reference, &folds)?;
-        let held_out = stage.folds.split_off(self.folds.len());
-        let problem = self.fixed.problem(&stage, &mut candidates)?;
+        let mut stage = self.fixed.pass(&self.specs, Vec::new(), reference, &folds, Keep::No)?;
+        let training = self.folds.len();
+        let held_out =
+            stage.torques.iter_mut().map(|folds| Products::sum(&folds.split_off(training))).collect();
+        let problem = self.fixed.problem(stage, &mut candidates)?;
         let fit = Fit::new(&problem, problem.active(&candidates.present), &self.chosen.rows, None);
         Ok(Trial {
-            held_out: products(&stage, &held_out),
+            held_out,
             places: candidates.list.iter().map(|candidate| candidate.effects[0]).collect(),
             rows: self.chosen.rows.clone(),
             members: candidates.present,
@@ -163,13 +164,4 @@ impl Trial {
         let better = (0..count).filter(|&fold| loss(&self.fit, fold) < loss(without, fold)).count();
         better as f64 / count.max(1) as f64
     }
-}
-
-fn products(stage: &Stage, folds: &[GroupedFactor]) -> Vec<Products> {
-    let of_torque = |torque: usize| {
-        let mut sum = Products::zero(stage.design.rows()[torque].parameters.len() + 1);
-        folds.iter().for_each(|fold| sum.add(&Products::of_factor(&fold.groups()[torque].factor)));
-        sum
-    };
-    (0..stage.design.rows().len()).map(of_torque).collect()
 }

@@ -8,7 +8,7 @@ mod swings;
 
 use super::folds::split_by_motion;
 use super::residuals::ResidualShape;
-use super::stage::{Fixed, Stage};
+use super::stage::Fixed;
 use crate::selection::students_tail;
 use phiw_effects::SignalRanges;
 use phiw_identification::{EffectSpec, IdentificationError};
@@ -113,19 +113,19 @@ fn probes(
     let Fit { fixed, specs, parameters, .. } = fit;
     let folds = [fixed.data.train.as_slice(), &fixed.data.held_out].concat();
     let folds = split_by_motion(fixed, folds)?;
-    let stage = fixed.pass(specs, effects, fixed.reference(specs, parameters)?, &folds)?;
+    let (design, folds) = fixed.factors(specs, effects, fixed.reference(specs, parameters)?, &folds)?;
     // A held model's parameters do not give way.
-    let free = if fixed.prior.is_some() { 0 } else { stage.model_size() };
+    let free = if fixed.prior.is_some() { 0 } else { parameters.len() };
     let mut parameters = parameters.to_vec();
-    parameters.resize(stage.design.parameter_count(), 0.0);
+    parameters.resize(design.parameter_count(), 0.0);
     let limit = fit.false_alarm / looked_at.len().max(1) as f64;
     let of_row = |&row: &usize| {
-        let residual = Residual::new(&stage, &parameters, free, row);
+        let residual = Residual { folds: &folds, parameters: &parameters, row, free };
         let alone = residual.left_over(&[])?;
         let mut found = Vec::new();
         let own = looked_at.iter().enumerate().filter(|(_, (of, ..))| *of == row);
         for (candidate, (_, signals, least_share)) in own {
-            let shape = stage.design.effect_parameters(stage.model_effects + candidate);
+            let shape = design.effect_parameters(specs.len() + candidate);
             let after = residual.left_over(&shape.collect::<Vec<usize>>())?;
             let share = 1.0 - after.iter().sum::<f64>() / alone.iter().sum::<f64>().max(f64::MIN_POSITIVE);
             let logarithms = |squares: &[f64]| -> Vec<f64> {
@@ -147,18 +147,14 @@ fn probes(
 
 /// What a model leaves of one torque, fold by fold.
 struct Residual<'a> {
-    folds: Vec<&'a GroupedFactor>,
+    folds: &'a [GroupedFactor],
     parameters: &'a [f64],
     row: usize,
     /// The model's parameters from the first up to this one may give way to a shape.
     free: usize,
 }
 
-impl<'a> Residual<'a> {
-    fn new(stage: &'a Stage, parameters: &'a [f64], free: usize, row: usize) -> Self {
-        Residual { folds: stage.folds.iter().collect(), parameters, row, free }
-    }
-
+impl Residual<'_> {
     /// The sum of squares left of each fold after a fit of the free parameters and `added` to the other parts
     /// of the folds.
     fn left_over(&self, added: &[usize]) -> Result<Vec<f64>, RegressorError> {

@@ -1,0 +1,286 @@
+//! One pass over the logs. What a column is made of is mostly the motion alone: such columns are the same in
+//! every pass, and are evaluated once.
+
+use crate::selection::Products;
+use faer::Mat;
+use phiw_identification::effect::ReferenceModel;
+use phiw_identification::fitting::{FilteredRows, map_filtered_rows};
+use phiw_identification::{BlockSource, Design, EffectSpec, Fold, IdentificationError};
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+
+/// Columns that are kept, at most \[bytes\].
+const KEPT_BYTES: usize = 256 << 20;
+
+/// Whether candidates' columns come again in other passes.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Keep {
+    Yes,
+    No,
+}
+
+/// What is asked of a pass.
+pub(super) struct Pass<'a> {
+    /// The model's effects, then the candidates', without a reference model.
+    pub design: &'a Design,
+    /// Effects of the model that are in force in the signals or the torques themselves.
+    pub in_force: Vec<EffectSpec>,
+    pub reference: ReferenceModel,
+    pub folds: &'a [Fold],
+    pub sources: &'a [&'a dyn BlockSource],
+    pub keep: Keep,
+}
+
+/// What a pass gives.
+pub(super) struct PassProducts {
+    /// For each torque the products of each fold.
+    pub torques: Vec<Vec<Products>>,
+    /// Candidates whose columns are not finite.
+    pub not_finite: Vec<usize>,
+}
+
+/// Filtered columns of earlier passes.
+#[derive(Default)]
+pub(super) struct KeptColumns {
+    /// The effects that were in force in the signals: with others every column is another.
+    in_force: Vec<EffectSpec>,
+    blocks: Vec<KeptBlock>,
+    /// Where the columns of an effect are among those of effects.
+    effects: HashMap<Key, Range<usize>>,
+    /// Number of columns of effects.
+    columns: usize,
+    /// Rows of all blocks together, once they are known.
+    rows: Option<usize>,
+}
+
+/// The columns of one block.
+struct KeptBlock {
+    /// For each torque whether a row counts.
+    counts: Vec<Vec<bool>>,
+    /// For each torque the rigid body's columns, then the measured torque.
+    rigid_body: Vec<Vec<Vec<f64>>>,
+    effects: Vec<Vec<f64>>,
+}
+
+/// An effect's kind, joints and constants.
+type Key = (String, Vec<String>, Vec<(String, u64)>);
+
+fn key(spec: &EffectSpec) -> Key {
+    let constants = spec.constants.iter().map(|(name, value)| (name.clone(), value.to_bits()));
+    (spec.kind.clone(), spec.joints.clone(), constants.collect())
+}
+
+/// Where a column is.
+#[derive(Clone, Copy)]
+enum Place {
+    Kept(usize),
+    Evaluated(usize),
+}
+
+/// What one block adds.
+struct Piece {
+    /// For each fold that it has rows in, the products of each torque.
+    products: Vec<(usize, Vec<Products>)>,
+    rows: usize,
+    rigid_body: Option<KeptBlock>,
+    /// New columns of effects.
+    effects: Vec<Vec<f64>>,
+}
+
+/// What a pass evaluates.
+struct Evaluated {
+    design: Design,
+    has_rigid_body: bool,
+    /// For each torque where its effects' columns are.
+    places: Vec<Vec<Place>>,
+    /// Columns of the evaluation that are kept from now on.
+    kept: Vec<usize>,
+}
+
+impl KeptColumns {
+    /// The products of a pass; columns that are at hand are not evaluated again.
+    ///
+    /// # Errors
+    /// A log cannot be read.
+    pub fn products(&mut self, pass: Pass<'_>) -> Result<PassProducts, IdentificationError> {
+        if pass.design.effects().iter().any(|effect| effect.compliance().is_some()) {
+            // Where the links are follows from the model's torque, and all columns from where they are.
+            let pass = Pass { keep: Keep::No, ..pass };
+            return KeptColumns { rows: self.rows, ..KeptColumns::default() }.evaluate(pass);
+        }
+        if pass.in_force != self.in_force {
+            let in_force = pass.in_force.clone();
+            *self = KeptColumns { in_force, rows: self.rows, ..KeptColumns::default() };
+        }
+        self.evaluate(pass)
+    }
+
+    fn evaluate(&mut self, pass: Pass<'_>) -> Result<PassProducts, IdentificationError> {
+        let Pass { design, in_force, reference, folds, sources, keep } = pass;
+        let in_force: HashSet<Key> = in_force.iter().map(key).collect();
+        let keys: Vec<Key> = design.effects().iter().map(|effect| key(&effect.spec())).collect();
+        let is_evaluated = |&effect: &usize| {
+            let needs = design.effects()[effect].needs();
+            let own = &keys[effect];
+            needs.of_reference() || in_force.contains(own) || !self.effects.contains_key(own)
+        };
+        let chosen: Vec<usize> = (0..keys.len()).filter(is_evaluated).collect();
+        let has_rigid_body = self.blocks.is_empty();
+        let part = design.part(&chosen, has_rigid_body).with_reference(reference);
+        let evaluated = columns_of_effects(&part);
+        let mut new = Vec::new();
+        let mut kept = Vec::new();
+        for (at, &effect) in chosen.iter().enumerate().filter(|_| keep == Keep::Yes) {
+            let own = &design.effects()[effect];
+            let columns = &evaluated[at];
+            let room = self.room().saturating_sub(kept.len());
+            let stays = !own.needs().of_reference() && !in_force.contains(&keys[effect]);
+            if stays && columns.len() <= room {
+                let first = self.columns + kept.len();
+                new.push((effect, first..first + columns.len()));
+                kept.extend(columns.iter().map(|(_, column)| *column));
+            }
+        }
+        let mut places: Vec<Vec<Place>> = vec![Vec::new(); design.rows().len()];
+        let mut next = chosen.iter().zip(&evaluated).peekable();
+        for (effect, own) in design.effects().iter().enumerate() {
+            if let Some((_, columns)) = next.next_if(|(chosen, _)| **chosen == effect) {
+                columns.iter().for_each(|&(row, column)| places[row].push(Place::Evaluated(column)));
+            } else if let Some(columns) = self.effects.get(&keys[effect]) {
+                let entries = own.entries().into_iter().zip(columns.clone());
+                entries.for_each(|(entry, column)| places[entry.row].push(Place::Kept(column)));
+            }
+        }
+        let evaluated = Evaluated { design: part, has_rigid_body, places, kept };
+        let pieces = map_filtered_rows(&evaluated.design, sources, |block, rows| {
+            self.piece(&evaluated, folds, block, &rows)
+        })?;
+        let not_finite: Vec<usize> = evaluated.design.not_finite().into_iter().map(|at| chosen[at]).collect();
+        let torques = self.take(pieces, folds.len(), design);
+        self.columns += evaluated.kept.len();
+        // What is not finite is asked for again, and says so again.
+        new.retain(|(effect, _)| !not_finite.contains(effect));
+        self.effects.extend(new.into_iter().map(|(effect, columns)| (keys[effect].clone(), columns)));
+        Ok(PassProducts { torques, not_finite })
+    }
+
+    /// Columns of effects that there is still room for: none before the number of rows is known.
+    fn room(&self) -> usize {
+        let Some(rows) = self.rows.filter(|_| !self.blocks.is_empty()) else { return 0 };
+        let rigid_body = self.blocks.first().map_or(0, |block| block.rigid_body.iter().map(Vec::len).sum());
+        (KEPT_BYTES / size_of::<f64>() / rows.max(1)).saturating_sub(rigid_body + self.columns)
+    }
+
+    fn piece(&self, evaluated: &Evaluated, folds: &[Fold], block: usize, rows: &FilteredRows) -> Piece {
+        let design = &evaluated.design;
+        let rigid_body = evaluated.has_rigid_body.then(|| KeptBlock {
+            counts: (0..design.rows().len()).map(|torque| rows.counts(torque).collect()).collect(),
+            rigid_body: rigid_body_of(design, rows),
+            effects: Vec::new(),
+        });
+        let products = match rigid_body.as_ref().or_else(|| self.blocks.get(block)) {
+            Some(kept) => products_of(&evaluated.places, folds, kept, rows),
+            None => Vec::new(),
+        };
+        Piece {
+            products,
+            rows: rows.t.len(),
+            rigid_body,
+            effects: evaluated.kept.iter().map(|&column| rows.column(column).to_vec()).collect(),
+        }
+    }
+
+    /// Keeps what the pieces bring, and puts the products of each fold together, in the order of the blocks.
+    fn take(&mut self, pieces: Vec<Piece>, folds: usize, design: &Design) -> Vec<Vec<Products>> {
+        self.rows = Some(pieces.iter().map(|piece| piece.rows).sum());
+        let mut torques: Vec<Vec<Option<Products>>> = vec![vec![None; folds]; design.rows().len()];
+        for (place, piece) in pieces.into_iter().enumerate() {
+            self.blocks.extend(piece.rigid_body);
+            if let Some(block) = self.blocks.get_mut(place) {
+                block.effects.extend(piece.effects);
+            }
+            for (fold, products) in piece.products {
+                for (sums, products) in torques.iter_mut().zip(products) {
+                    match &mut sums[fold] {
+                        Some(sum) => sum.add(&products),
+                        empty => *empty = Some(products),
+                    }
+                }
+            }
+        }
+        let numbers = self.blocks.first().map_or(0, |block| block.rigid_body.iter().map(Vec::len).sum());
+        if numbers * self.rows.unwrap_or_default() * size_of::<f64>() > KEPT_BYTES {
+            self.blocks.clear();
+        }
+        let whole = |(sums, layout): (Vec<Option<Products>>, &phiw_identification::design::RowLayout)| {
+            let zero = || Products::zero(layout.parameters.len() + 1);
+            sums.into_iter().map(|sum| sum.unwrap_or_else(zero).without_rounding()).collect()
+        };
+        torques.into_iter().zip(design.rows()).map(whole).collect()
+    }
+}
+
+/// For each effect of a design, the torque and the column of the evaluation of each of its entries.
+fn columns_of_effects(design: &Design) -> Vec<Vec<(usize, usize)>> {
+    let first = design.base().count();
+    let mut next: Vec<usize> = design
+        .rows()
+        .iter()
+        .map(|row| row.range.start + row.parameters.partition_point(|&parameter| parameter < first))
+        .collect();
+    let mut of_effect = |effect: &std::sync::Arc<dyn phiw_identification::Effect>| {
+        let place = |entry: phiw_identification::effect::Entry| {
+            next[entry.row] += 1;
+            (entry.row, next[entry.row] - 1)
+        };
+        effect.entries().into_iter().map(place).collect()
+    };
+    design.effects().iter().map(&mut of_effect).collect()
+}
+
+/// For each torque the columns before those of effects, then the measured torque.
+fn rigid_body_of(design: &Design, rows: &FilteredRows) -> Vec<Vec<Vec<f64>>> {
+    let first = design.base().count();
+    let of_torque = |row: &phiw_identification::design::RowLayout| {
+        let own = row.parameters.partition_point(|&parameter| parameter < first);
+        let columns = (row.range.start..row.range.start + own).chain([row.range.end - 1]);
+        columns.map(|column| rows.column(column).to_vec()).collect()
+    };
+    design.rows().iter().map(of_torque).collect()
+}
+
+/// For each fold that has rows in a block, the products of each torque.
+fn products_of(
+    places: &[Vec<Place>],
+    folds: &[Fold],
+    kept: &KeptBlock,
+    rows: &FilteredRows,
+) -> Vec<(usize, Vec<Products>)> {
+    let fold_of = |t: &f64| folds.iter().position(|fold| fold.contains(rows.log, *t));
+    let fold_of_row: Vec<Option<usize>> = rows.t.iter().map(fold_of).collect();
+    let mut present: Vec<usize> = fold_of_row.iter().flatten().copied().collect();
+    present.sort_unstable();
+    present.dedup();
+    let of_torque = |fold: usize, torque: usize| {
+        let counts = &kept.counts[torque];
+        let own: Vec<usize> =
+            (0..counts.len()).filter(|&row| counts[row] && fold_of_row[row] == Some(fold)).collect();
+        let effects = places[torque].iter().map(|place| match *place {
+            Place::Kept(column) => kept.effects[column].as_slice(),
+            Place::Evaluated(column) => rows.column(column),
+        });
+        let (measured, rigid_body) = match kept.rigid_body[torque].split_last() {
+            Some((measured, rigid_body)) => (measured.as_slice(), rigid_body),
+            None => (&[][..], &[][..]),
+        };
+        let columns = rigid_body.iter().map(Vec::as_slice).chain(effects).chain([measured]);
+        let columns: Vec<&[f64]> = columns.collect();
+        Products::of_rows(
+            Mat::from_fn(own.len(), columns.len(), |row, column| columns[column][own[row]]).as_ref(),
+        )
+    };
+    present
+        .into_iter()
+        .map(|fold| (fold, (0..places.len()).map(|torque| of_torque(fold, torque)).collect()))
+        .collect()
+}
