@@ -247,13 +247,16 @@ impl Subject<'_> {
         let widths: Vec<f64> = (0..self.tree.joint_count())
             .map(|joint| self.model.rest_speeds.get(joint).copied().unwrap_or(SIGN_WIDTH))
             .collect();
+        // The rigid body moves by the backend: its columns would be evaluated for nothing.
+        let all: Vec<usize> = (0..self.design.effects().len()).collect();
+        let effects = self.design.part(&all, false);
         let identified = || {
             Ok(Plant::new(backends::of(self.backend, &identified_tree)?)
-                .with_effects(self.design, &parameters)?)
+                .with_effects(&effects, &parameters)?)
         };
         let least_squares = || {
             Ok(Plant::new(backends::of(self.backend, &least_squares_tree)?)
-                .with_effects(self.design, self.parameters)?)
+                .with_effects(&effects, self.parameters)?)
         };
         let nominal = || {
             Ok(Plant::new(backends::of(self.backend, self.tree)?).with_declared_friction(self.tree, &widths))

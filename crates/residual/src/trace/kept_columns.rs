@@ -103,12 +103,15 @@ impl KeptColumns {
     /// # Errors
     /// A log cannot be read.
     pub fn products(&mut self, pass: Pass<'_>) -> Result<PassProducts, IdentificationError> {
-        if pass.design.effects().iter().any(|effect| effect.compliance().is_some()) {
-            // Where the links are follows from the model's torque, and all columns from where they are.
+        // Where links lag behind their encoders, the columns are made where the links are, by the model's
+        // torque. And a model on trial with others in force is no reason to forget what the model has.
+        let lags = pass.design.effects().iter().any(|effect| effect.compliance().is_some());
+        let is_other = pass.in_force != self.in_force;
+        if lags || (is_other && pass.keep == Keep::No) {
             let pass = Pass { keep: Keep::No, ..pass };
             return KeptColumns { rows: self.rows, ..KeptColumns::default() }.evaluate(pass);
         }
-        if pass.in_force != self.in_force {
+        if is_other {
             let in_force = pass.in_force.clone();
             *self = KeptColumns { in_force, rows: self.rows, ..KeptColumns::default() };
         }
