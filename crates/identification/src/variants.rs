@@ -11,6 +11,8 @@ use std::ops::Range;
 
 /// Share of a torque's residual variance that a variant of a declared effect must save over a simpler one.
 const WORTH_A_VARIANT: f64 = 0.1;
+/// Torques that are merged on one processor; where there are more, several have work.
+const TORQUES_AT_A_TIME: usize = 9;
 /// Sweeps over the effects; more have never changed a choice.
 const SWEEPS: usize = 2;
 
@@ -177,15 +179,25 @@ impl Rest {
         let Columns { kept, variant } = columns;
         let shared: Vec<usize> = [&kept[..variant.start], &kept[variant.end..]].concat();
         let selected = factors.select(&shared)?;
-        let mut builder = FactorBuilder::new(shared.len() + 1);
-        for (row, group) in selected.groups().iter().enumerate() {
-            if !own.contains(&row) {
+        let rows: Vec<usize> = (0..selected.groups().len()).filter(|row| !own.contains(row)).collect();
+        let factor = |rows: &[usize]| {
+            let mut builder = FactorBuilder::new(shared.len() + 1);
+            for &row in rows {
+                let group = &selected.groups()[row];
                 let mut columns = group.parameters.clone();
                 columns.push(shared.len());
                 builder.push_factor(&group.factor, &columns, weights[row])?;
             }
-        }
-        Ok(Rest { own: own.into_iter().collect(), others: builder.factor(), weights })
+            Ok(builder.factor())
+        };
+        let parts: Result<Vec<Factor>, RegressorError> =
+            rows.par_chunks(TORQUES_AT_A_TIME).map(factor).collect();
+        let others = match parts?.as_slice() {
+            [] => factor(&[])?,
+            [one] => one.clone(),
+            several => Factor::merge_all(several)?,
+        };
+        Ok(Rest { own: own.into_iter().collect(), others, weights })
     }
 
     /// Rows of the torques that the effect acts on.

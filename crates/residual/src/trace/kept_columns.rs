@@ -3,11 +3,14 @@
 
 use crate::selection::Products;
 use faer::Mat;
-use phiw_identification::effect::ReferenceModel;
+use phiw_identification::design::RowLayout;
+use phiw_identification::effect::{Entry, ReferenceModel};
 use phiw_identification::fitting::{FilteredRows, map_filtered_rows};
-use phiw_identification::{BlockSource, Design, EffectSpec, Fold, IdentificationError};
+use phiw_identification::{BlockSource, Design, Effect, EffectSpec, Fold, IdentificationError};
+use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Columns that are kept, at most \[bytes\].
 const KEPT_BYTES: usize = 256 << 20;
@@ -196,30 +199,33 @@ impl KeptColumns {
     /// Keeps what the pieces bring, and puts the products of each fold together, in the order of the blocks.
     fn take(&mut self, pieces: Vec<Piece>, folds: usize, design: &Design) -> Vec<Vec<Products>> {
         self.rows = Some(pieces.iter().map(|piece| piece.rows).sum());
-        let mut torques: Vec<Vec<Option<Products>>> = vec![vec![None; folds]; design.rows().len()];
+        let mut of_torques: Vec<Vec<(usize, Products)>> = vec![Vec::new(); design.rows().len()];
         for (place, piece) in pieces.into_iter().enumerate() {
             self.blocks.extend(piece.rigid_body);
             if let Some(block) = self.blocks.get_mut(place) {
                 block.effects.extend(piece.effects);
             }
             for (fold, products) in piece.products {
-                for (sums, products) in torques.iter_mut().zip(products) {
-                    match &mut sums[fold] {
-                        Some(sum) => sum.add(&products),
-                        empty => *empty = Some(products),
-                    }
-                }
+                let torques = of_torques.iter_mut().zip(products);
+                torques.for_each(|(own, products)| own.push((fold, products)));
             }
         }
         let numbers = self.blocks.first().map_or(0, |block| block.rigid_body.iter().map(Vec::len).sum());
         if numbers * self.rows.unwrap_or_default() * size_of::<f64>() > KEPT_BYTES {
             self.blocks.clear();
         }
-        let whole = |(sums, layout): (Vec<Option<Products>>, &phiw_identification::design::RowLayout)| {
+        let whole = |(pieces, layout): (Vec<(usize, Products)>, &RowLayout)| {
+            let mut sums: Vec<Option<Products>> = vec![None; folds];
+            for (fold, products) in pieces {
+                match &mut sums[fold] {
+                    Some(sum) => sum.add(&products),
+                    empty => *empty = Some(products),
+                }
+            }
             let zero = || Products::zero(layout.parameters.len() + 1);
             sums.into_iter().map(|sum| sum.unwrap_or_else(zero).without_rounding()).collect()
         };
-        torques.into_iter().zip(design.rows()).map(whole).collect()
+        of_torques.into_par_iter().zip(design.rows()).map(whole).collect()
     }
 }
 
@@ -231,8 +237,8 @@ fn columns_of_effects(design: &Design) -> Vec<Vec<(usize, usize)>> {
         .iter()
         .map(|row| row.range.start + row.parameters.partition_point(|&parameter| parameter < first))
         .collect();
-    let mut of_effect = |effect: &std::sync::Arc<dyn phiw_identification::Effect>| {
-        let place = |entry: phiw_identification::effect::Entry| {
+    let mut of_effect = |effect: &Arc<dyn Effect>| {
+        let place = |entry: Entry| {
             next[entry.row] += 1;
             (entry.row, next[entry.row] - 1)
         };
@@ -244,7 +250,7 @@ fn columns_of_effects(design: &Design) -> Vec<Vec<(usize, usize)>> {
 /// For each torque the columns before those of effects, then the measured torque.
 fn rigid_body_of(design: &Design, rows: &FilteredRows) -> Vec<Vec<Vec<f64>>> {
     let first = design.base().count();
-    let of_torque = |row: &phiw_identification::design::RowLayout| {
+    let of_torque = |row: &RowLayout| {
         let own = row.parameters.partition_point(|&parameter| parameter < first);
         let columns = (row.range.start..row.range.start + own).chain([row.range.end - 1]);
         columns.map(|column| rows.column(column).to_vec()).collect()

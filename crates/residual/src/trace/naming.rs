@@ -10,6 +10,7 @@ use super::trial::{Squares, Trial};
 use crate::selection::{Member, Products, certainty};
 use phiw_effects::EffectKind;
 use phiw_identification::{EffectSpec, IdentificationError};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// A rival that is less probable is none.
@@ -219,10 +220,9 @@ impl Search<'_> {
         let levels = self.levels(whole);
         let simpler = self.simpler(&levels)?;
         let all = whole.foretold_squares(&whole.fit);
-        let mut judged = Vec::new();
-        for (&member, &place) in whole.members.iter().zip(&whole.places) {
+        let judged = |(&member, &place): (&Member, &usize)| -> Option<Judged> {
             if place < self.declared {
-                continue;
+                return None;
             }
             let level = levels.get(&place).copied();
             // What others are forms of is judged without these; a form beside the simpler ones only.
@@ -235,7 +235,7 @@ impl Search<'_> {
                 Some(beside) => (&beside.trial, beside.place(place)),
                 None => (whole, place),
             };
-            let Some(own_member) = trial.member(own) else { continue };
+            let own_member = trial.member(own)?;
             let with = trial.foretold_squares(&trial.fit);
             let mut without = trial.foretold_squares(&trial.fit_with(|other| other != own));
             let below = level.map(|level| simpler[level - 1].squares.as_slice()).unwrap_or_default();
@@ -252,7 +252,7 @@ impl Search<'_> {
             let certainty = certainty(&trial.problem, &trial.fit, own_member);
             let material = material && self.may_have_a_name(place);
             let without = whole.fit_with(|other| other != place);
-            judged.push(Judged {
+            Some(Judged {
                 place,
                 size: trial.size(own_member, &squares),
                 significance: certainty.significance,
@@ -260,9 +260,9 @@ impl Search<'_> {
                 folds: whole.better_folds(&without),
                 certain: certainty.tail <= limit,
                 named: certainty.tail <= limit && material,
-            });
-        }
-        Ok(judged)
+            })
+        };
+        Ok(whole.members.par_iter().zip(&whole.places).filter_map(judged).collect())
     }
 
     /// Whether a form of something simpler is worth a name of its own: it must take away most of what the
@@ -378,7 +378,6 @@ impl Search<'_> {
         let named = judged.iter().filter(|judged| judged.named).count();
         let declared = self.declared;
         let mut found: Vec<FoundEffect> = Vec::new();
-        let mut inside: Vec<usize> = Vec::new();
         let account = |inside: &[usize]| {
             let fit = trial.fit_with(|place| place < declared || inside.contains(&place));
             let squares = trial.held_out_squares(&fit);
@@ -391,10 +390,11 @@ impl Search<'_> {
                 .sum();
             ((squares.iter().sum::<f64>() / torque).sqrt(), excess)
         };
-        let mut before = account(&inside);
-        for judged in &judged {
-            inside.push(judged.place);
-            let after = account(&inside);
+        let places: Vec<usize> = judged.iter().map(|judged| judged.place).collect();
+        let accounts: Vec<(f64, f64)> =
+            (0..=places.len()).into_par_iter().map(|count| account(&places[..count])).collect();
+        for (judged, accounts) in judged.iter().zip(accounts.windows(2)) {
+            let (before, after) = (accounts[0], accounts[1]);
             let (confidence, rivals) = odds(&self.chosen.alternatives[judged.place - declared]);
             found.push(FoundEffect {
                 spec: self.specs[judged.place].clone(),
@@ -410,7 +410,6 @@ impl Search<'_> {
                 rivals,
                 ranking: Vec::new(),
             });
-            before = after;
         }
         let order: Vec<usize> = (0..declared).chain(judged.iter().map(|judged| judged.place)).collect();
         self.reorder(&order)?;
