@@ -150,7 +150,7 @@ impl ReferenceModel {
         let period =
             if samples > 1 { (block.t[samples - 1] - block.t[0]) / (samples - 1) as f64 } else { 1.0 };
         let stride = ((DERIVATIVE_PERIOD / period) as usize).max(1);
-        let mut workspace = Workspace::new(&self.tree);
+        let (mut workspace, mut of_numbers) = (Workspace::new(&self.tree), Workspace::new(&self.tree));
         let mut state = DualState::new(joints);
         let mut before = None;
         let mut sample = 0;
@@ -169,12 +169,8 @@ impl ReferenceModel {
                 Along::Velocity,
                 &mut out.by_velocity[at.clone()],
             )?;
-            state.derivatives(
-                &self.tree,
-                &mut workspace,
-                Along::Acceleration,
-                &mut out.by_acceleration[at],
-            )?;
+            let q = &block.q[block.row(sample)];
+            self.tree.mass_matrix(q, &mut of_numbers, &mut out.by_acceleration[at])?;
             if let Some(first) = before {
                 for values in [&mut out.by_position, &mut out.by_velocity, &mut out.by_acceleration] {
                     interpolate(values, size, first, sample);
@@ -221,7 +217,6 @@ const DERIVATIVE_PERIOD: f64 = 0.02;
 enum Along {
     Position,
     Velocity,
-    Acceleration,
 }
 
 /// Joints along which is differentiated at a time.
@@ -252,7 +247,7 @@ impl DualState {
         }
     }
 
-    /// ∂τ/∂(q, q̇ or q̈), row-major, a row for each torque.
+    /// ∂τ/∂(q or q̇), row-major, a row for each torque.
     fn derivatives(
         &mut self,
         tree: &Tree,
@@ -278,7 +273,6 @@ impl DualState {
         match along {
             Along::Position => &mut self.q[joint],
             Along::Velocity => &mut self.v[joint],
-            Along::Acceleration => &mut self.a[joint],
         }
     }
 }

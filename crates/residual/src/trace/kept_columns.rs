@@ -293,3 +293,110 @@ fn products_of(
         .map(|fold| (fold, (0..places.len()).map(|torque| of_torque(fold, torque)).collect()))
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use phiw_dynamics::Tree;
+    use phiw_dynamics::random_tree::{RandomNumbers, RandomTreeOptions, random_tree};
+    use phiw_effects::Catalogue;
+    use phiw_identification::EffectCatalogue;
+    use phiw_identification::fitting::accumulate;
+    use phiw_regressor::BaseParameters;
+    use phiw_telemetry::Block;
+
+    /// Two blocks of one log.
+    fn blocks(joints: usize) -> Vec<Block> {
+        let block = |first: usize| {
+            let time = |sample: usize| 0.01 * (first + sample) as f64;
+            let signal = |phase: f64| -> Vec<f64> {
+                let at = |sample: usize, joint: usize| (2.0 * time(sample) + phase + joint as f64).sin();
+                (0..200).flat_map(|sample| (0..joints).map(move |joint| at(sample, joint))).collect()
+            };
+            let t = (0..200).map(time).collect();
+            Block::unfiltered(joints, t, [signal(0.0), signal(1.5), signal(3.0)], signal(0.7))
+        };
+        vec![block(0), block(200)]
+    }
+
+    /// (kind, joint) of effects of the motion alone, of the model's torque, with memory, and of the signals.
+    const EFFECTS: [(&str, &str); 5] = [
+        ("viscous_friction", "joint_1"),
+        ("torque_gain", "joint_1"),
+        ("hysteresis", "joint_2"),
+        ("coulomb_friction", "joint_2"),
+        ("joint_spring", "joint_1"),
+    ];
+
+    fn products(
+        kept: &mut KeptColumns,
+        tree: &Tree,
+        effects: &[EffectSpec],
+        in_force: Vec<EffectSpec>,
+        keep: Keep,
+    ) -> (Vec<Vec<Products>>, Vec<Vec<Products>>) {
+        let base = BaseParameters::of_tree(tree, Default::default()).unwrap();
+        let built = || effects.iter().map(|spec| Catalogue::default().build(spec, tree).unwrap()).collect();
+        let design = || Design::new(tree.clone(), base.clone(), built()).with_rest_speeds(vec![0.2; 2]);
+        let reference = || ReferenceModel::new(tree.clone());
+        let blocks = blocks(2);
+        let sources: [&dyn BlockSource; 1] = [&blocks];
+        let folds = [0.0, 1.3, 2.6].map(|start| Fold { log: 0, start, end: start + 1.3 });
+        let asked = Pass {
+            design: &design(),
+            in_force,
+            reference: reference(),
+            folds: &folds,
+            sources: &sources,
+            keep,
+        };
+        let found = kept.products(asked).unwrap().torques;
+        let factors = accumulate(&design().with_reference(reference()), &folds, &sources).unwrap();
+        let of_torque = |torque: usize| {
+            factors.iter().map(|fold| Products::of_factor(&fold.groups()[torque].factor)).collect()
+        };
+        (found, (0..2).map(of_torque).collect())
+    }
+
+    fn assert_equal((found, expected): (Vec<Vec<Products>>, Vec<Vec<Products>>)) {
+        for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
+            assert!(found.rows() > 0.0 && found.rows() == expected.rows());
+            let size = expected.column(0).len();
+            let square = |column: usize| expected.column(column)[column];
+            for column in 0..size {
+                for (other, value) in found.column(column).iter().enumerate() {
+                    let scale = (square(column) * square(other)).sqrt();
+                    let difference = (value - expected.column(column)[other]).abs();
+                    assert!(difference <= 1e-10 * scale, "{difference:e} of {scale:e}");
+                }
+            }
+        }
+    }
+
+    /// Whatever was asked before: the products are those of factors, which evaluate all columns.
+    #[test]
+    fn columns_that_are_kept_are_those_that_would_be_evaluated() {
+        let tree = random_tree(5, &RandomTreeOptions { joints: 2, ..Default::default() }).unwrap();
+        let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
+        let spec = |(kind, joint): (&str, &str)| {
+            EffectSpec::new(kind, &[joints[usize::from(joint == "joint_2")].as_str()])
+        };
+        let all = EFFECTS.map(spec);
+        let absent = Catalogue::default().build(&spec(("encoder_offset", "joint_2")), &tree).unwrap();
+        let offset = absent.relinearised(&[0.3]).unwrap().spec();
+        let with_offset: Vec<EffectSpec> = [offset.clone()].into_iter().chain(all.clone()).collect();
+        let mut kept = KeptColumns::default();
+        let mut random = RandomNumbers::new(3);
+        for round in 0..12 {
+            let keep = if random.uniform(0.0, 1.0) < 0.5 { Keep::Yes } else { Keep::No };
+            let (effects, in_force) = match round % 4 {
+                0 => (all.to_vec(), Vec::new()),
+                1 => (all[..3].to_vec(), Vec::new()),
+                2 => (all.iter().rev().cloned().collect(), Vec::new()),
+                _ => (with_offset.clone(), vec![offset.clone()]),
+            };
+            assert_equal(products(&mut kept, &tree, &effects, in_force, keep));
+        }
+        assert!(kept.columns > 0, "nothing was kept");
+    }
+}
