@@ -357,6 +357,22 @@ impl Design {
         self.effects.iter().for_each(|effect| effect.correct(block));
     }
 
+    /// Whether an effect corrects the signals, by what it does to some.
+    pub fn corrects_signals(&self, effect: usize) -> bool {
+        let joints = self.tree.joint_count();
+        let t: Vec<f64> = (0..16).map(|sample| 0.01 * f64::from(sample)).collect();
+        let signal = |phase: f64| -> Vec<f64> {
+            let at = |t: &f64, joint: usize| (3.0 * t + phase + joint as f64).sin();
+            t.iter().flat_map(|t| (0..joints).map(move |joint| at(t, joint))).collect()
+        };
+        let signals = [signal(0.0), signal(1.0), signal(2.0)];
+        let block = Block::unfiltered(joints, t.clone(), signals, signal(3.0));
+        let mut corrected = block.clone();
+        self.effects[effect].correct(&mut corrected);
+        let of = |block: &Block| [block.q.clone(), block.qd.clone(), block.qdd.clone(), block.tau.clone()];
+        of(&block) != of(&corrected)
+    }
+
     /// Working memory for one block.
     pub fn scratch(&self) -> DesignScratch<'_> {
         let unit_gravity = |axis: usize| {

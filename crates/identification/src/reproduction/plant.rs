@@ -216,27 +216,7 @@ fn can_be_simulated(design: &Design, index: usize) -> bool {
     let effect = &design.effects()[index];
     let simulated = Needs { torque: true, total_torque: true, statics: true, ..Needs::default() };
     let needs = effect.needs().union(simulated) == simulated;
-    needs && effect.is_causal() && effect.compliance().is_none() && !corrects(design, index)
-}
-
-/// Whether an effect corrects the signals, which a simulation has from nobody.
-fn corrects(design: &Design, index: usize) -> bool {
-    let joints = design.tree().joint_count();
-    let t: Vec<f64> = (0..16).map(|sample| 0.01 * f64::from(sample)).collect();
-    let signal = |phase: f64| -> Vec<f64> {
-        t.iter().flat_map(|t| (0..joints).map(move |joint| (3.0 * t + phase + joint as f64).sin())).collect()
-    };
-    let block = Block::unfiltered(joints, t.clone(), [signal(0.0), signal(1.0), signal(2.0)], signal(3.0));
-    let mut corrected = block.clone();
-    design.effects()[index].correct(&mut corrected);
-    [
-        (&block.q, &corrected.q),
-        (&block.qd, &corrected.qd),
-        (&block.qdd, &corrected.qdd),
-        (&block.tau, &corrected.tau),
-    ]
-    .iter()
-    .any(|(one, other)| one != other)
+    needs && effect.is_causal() && effect.compliance().is_none() && !design.corrects_signals(index)
 }
 
 impl Effects<'_> {

@@ -96,6 +96,11 @@ impl Products {
         self.rows
     }
 
+    /// Whether all columns are finite: one that is not has no finite square.
+    pub fn is_finite(&self) -> bool {
+        (0..self.size).all(|column| self.values[column * self.size + column].is_finite())
+    }
+
     /// The products of one column with all.
     pub fn column(&self, column: usize) -> &[f64] {
         &self.values[column * self.size..(column + 1) * self.size]

@@ -7,6 +7,7 @@ use phiw_identification::design::RowLayout;
 use phiw_identification::effect::{Entry, ReferenceModel};
 use phiw_identification::fitting::{FilteredRows, map_filtered_rows};
 use phiw_identification::{BlockSource, Design, Effect, EffectSpec, Fold, IdentificationError};
+use phiw_regressor::RegressorError;
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -104,7 +105,7 @@ impl KeptColumns {
     /// The products of a pass; columns that are at hand are not evaluated again.
     ///
     /// # Errors
-    /// A log cannot be read.
+    /// A log cannot be read, or a column of the model is not finite.
     pub fn products(&mut self, pass: Pass<'_>) -> Result<PassProducts, IdentificationError> {
         // Where links lag behind their encoders, the columns are made where the links are, by the model's
         // torque. And a model on trial with others in force is no reason to forget what the model has.
@@ -163,6 +164,9 @@ impl KeptColumns {
         })?;
         let not_finite: Vec<usize> = evaluated.design.not_finite().into_iter().map(|at| chosen[at]).collect();
         let torques = self.take(pieces, folds.len(), design);
+        if !torques.iter().flatten().all(Products::is_finite) {
+            return Err(RegressorError::NotFinite { row: 0 }.into());
+        }
         self.columns += evaluated.kept.len();
         // What is not finite is asked for again, and says so again.
         new.retain(|(effect, _)| !not_finite.contains(effect));

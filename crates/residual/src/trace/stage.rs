@@ -164,8 +164,9 @@ impl<'a> Fixed<'a> {
         }
         let design = self.design(specs, candidates)?;
         let mut in_force = Vec::new();
-        for spec in specs {
-            if self.absent(spec)?.is_some() {
+        for (place, spec) in specs.iter().enumerate() {
+            let is_factor = design.effects()[place].logged_factor().is_some();
+            if is_factor || design.corrects_signals(place) || self.absent(spec)?.is_some() {
                 in_force.push(spec.clone());
             }
         }
