@@ -81,8 +81,8 @@ impl<'a> Plant<'a> {
     }
 
     /// The same with the effects of a design, given all of its parameters. Those that cannot be simulated are
-    /// left out; [`Plant::left_out`] names them. Columns of the rigid body are not used: a design without them
-    /// ([`Design::part`]) is quicker.
+    /// left out; [`Plant::left_out`] names them. Columns of the rigid body are not used: a design without
+    /// them ([`Design::part`]) is quicker.
     ///
     /// # Errors
     /// `parameters` are not the design's.

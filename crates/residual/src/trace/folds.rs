@@ -1,8 +1,6 @@
 //! Stretches of motion whose residuals have nothing to do with each other.
 
-use super::kept_columns::Keep;
 use super::stage::Fixed;
-use phiw_identification::effect::ReferenceModel;
 use phiw_identification::{Fold, IdentificationError};
 
 /// Stretches that the training motion is cut into: enough for a tail probability of one in ten thousand.
@@ -29,7 +27,7 @@ pub(super) fn split_by_motion(
     if finest.len() == folds.len() {
         return Ok(folds);
     }
-    let moves = torques_with_rows(fixed, &finest)?;
+    let moves = fixed.has_rows(&finest)?;
     let whole = folds.clone();
     let mut parts = 1;
     while folds.len() < finest.len() && seen_least(&folds, &finest, &moves) < enough {
@@ -53,14 +51,6 @@ fn cut(folds: &[Fold], parts: usize) -> Vec<Fold> {
             .collect::<Vec<Fold>>()
     };
     folds.iter().flat_map(cut).collect()
-}
-
-/// For each fold, and each torque, whether it has rows there.
-fn torques_with_rows(fixed: &Fixed<'_>, folds: &[Fold]) -> Result<Vec<Vec<bool>>, IdentificationError> {
-    let reference = ReferenceModel::new(fixed.tree.clone());
-    let stage = fixed.pass(&[], Vec::new(), reference, folds, Keep::No)?;
-    let in_fold = |fold: usize| stage.torques.iter().map(|folds| folds[fold].rows() > 0.0).collect();
-    Ok((0..folds.len()).map(in_fold).collect())
 }
 
 /// The smallest number of `folds` in which a torque has rows, of those that have any; `finest` are the parts

@@ -2,7 +2,7 @@
 
 use super::hypotheses::Candidates;
 use super::input::{TraceInput, TraceOptions};
-use super::kept_columns::{Keep, KeptColumns, Pass};
+use super::kept_columns::{Keep, KeptColumns, Pass, PassProducts};
 use crate::selection::{self, Hypothesis, Member, Products, Torque, Variant};
 use phiw_dynamics::Tree;
 use phiw_effects::Catalogue;
@@ -170,13 +170,8 @@ impl<'a> Fixed<'a> {
                 in_force.push(spec.clone());
             }
         }
-        // A pass beside this one evaluates all columns by itself.
-        let mut kept = self.kept.lock().map(|mut kept| std::mem::take(&mut *kept)).unwrap_or_default();
         let pass = Pass { design: &design, in_force, reference, folds, sources: &self.data.sources, keep };
-        let products = kept.products(pass)?;
-        if let Ok(mut place) = self.kept.lock() {
-            *place = kept;
-        }
+        let products = self.products(pass)?;
         Ok(Stage {
             model_effects: specs.len(),
             not_finite: products.not_finite,
@@ -184,6 +179,31 @@ impl<'a> Fixed<'a> {
             torques: products.torques,
             design,
         })
+    }
+
+    /// The products of a pass. One beside another evaluates all columns by itself.
+    fn products(&self, pass: Pass<'_>) -> Result<PassProducts, IdentificationError> {
+        let mut kept = self.kept.lock().map(|mut kept| std::mem::take(&mut *kept)).unwrap_or_default();
+        let products = kept.products(pass)?;
+        if let Ok(mut place) = self.kept.lock() {
+            *place = kept;
+        }
+        Ok(products)
+    }
+
+    /// For each fold, and each torque, whether it has rows there.
+    pub fn has_rows(&self, folds: &[Fold]) -> Result<Vec<Vec<bool>>, IdentificationError> {
+        let rigid_body = Pass {
+            design: &self.design(&[], Vec::new())?,
+            in_force: Vec::new(),
+            reference: ReferenceModel::new(self.tree.clone()),
+            folds,
+            sources: &self.data.sources,
+            keep: Keep::No,
+        };
+        let torques = self.products(rigid_body)?.torques;
+        let in_fold = |fold: usize| torques.iter().map(|folds| folds[fold].rows() > 0.0).collect();
+        Ok((0..folds.len()).map(in_fold).collect())
     }
 
     /// What is to be chosen from, as plain data; hypotheses and their variants are those of `candidates`, in
