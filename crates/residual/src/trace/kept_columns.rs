@@ -323,7 +323,7 @@ mod tests {
         vec![block(0), block(200)]
     }
 
-    /// (kind, joint) of effects of the motion alone, of the model's torque, with memory, and of the signals.
+    /// (kind, joint) of effects of the motion alone, one of them with memory, and of the model's torque.
     const EFFECTS: [(&str, &str); 5] = [
         ("viscous_friction", "joint_1"),
         ("torque_gain", "joint_1"),
@@ -401,6 +401,15 @@ mod tests {
             };
             assert_equal(products(&mut kept, &tree, &effects, in_force, keep));
         }
-        assert!(kept.columns > 0, "nothing was kept");
+        // What is kept is what is used: once it is changed, so are the products.
+        let products = |kept: &mut KeptColumns| products(kept, &tree, &all, Vec::new(), Keep::Yes);
+        (0..2).for_each(|_| assert_equal(products(&mut kept)));
+        let first = kept.effects[&key(&all[0])].start;
+        kept.blocks[0].effects[first].iter_mut().for_each(|value| *value += 1.0);
+        let (found, expected) = products(&mut kept);
+        let square = |products: &Products, column: usize| products.column(column)[column];
+        let (found, expected) = (&found[0][0], &expected[0][0]);
+        let differs = |column| square(found, column) > 1.1 * square(expected, column);
+        assert!((0..expected.column(0).len()).any(differs), "what is kept is not used");
     }
 }
