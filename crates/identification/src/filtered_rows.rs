@@ -27,7 +27,7 @@ impl FilteredRows {
         self.column(self.first_share + torque).iter().map(|share| moves(*share))
     }
 
-    /// One number of an evaluation ([`DesignScratch::evaluate`](crate::DesignScratch::evaluate)) in all rows.
+    /// One number of an evaluation ([`DesignScratch::evaluate`]) in all rows.
     pub fn column(&self, place: usize) -> &[f64] {
         &self.values[place * self.t.len()..(place + 1) * self.t.len()]
     }
