@@ -1,6 +1,6 @@
 //! Whatever the data say, bodies are possible and the optimum is certified.
 
-mod random;
+use crate::random;
 
 use phiw_consistency::{PARAMETERS_PER_BODY, Problem, PseudoInertia, Settings};
 use proptest::prelude::*;

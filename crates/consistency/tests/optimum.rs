@@ -1,6 +1,6 @@
 //! The optimum against independent answers.
 
-mod random;
+use crate::random;
 
 use faer::Mat;
 use faer::prelude::SolveLstsq;

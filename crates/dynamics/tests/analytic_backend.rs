@@ -1,6 +1,6 @@
 //! The analytic backend moves robots as mechanics says.
 
-mod arbitrary;
+use crate::arbitrary;
 
 use arbitrary::{assert_close, dot, mass_matrix, times};
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, RandomTreeOptions, random_state, random_tree};

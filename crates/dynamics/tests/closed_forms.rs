@@ -1,6 +1,6 @@
 //! Robots whose equations of motion are in every textbook.
 
-mod arbitrary;
+use crate::arbitrary;
 
 use arbitrary::{assert_close, inverse_dynamics};
 use phiw_dynamics::Tree;

@@ -1,7 +1,7 @@
 //! Inverse dynamics, mass matrix and forward dynamics agree with each other and with energy, over random
 //! robots.
 
-mod arbitrary;
+use crate::arbitrary;
 
 use arbitrary::{assert_close, dot, inverse_dynamics, mass_matrix, robot, times};
 use phiw_dynamics::inertia::Inertia;

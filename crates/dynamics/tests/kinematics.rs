@@ -1,6 +1,6 @@
 //! Jacobians are the derivatives of the kinematics; merging links changes nothing that can be felt.
 
-mod arbitrary;
+use crate::arbitrary;
 
 use arbitrary::{assert_close, inverse_dynamics, options, robot, times};
 use phiw_dynamics::random_tree::{

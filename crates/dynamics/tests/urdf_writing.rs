@@ -1,6 +1,6 @@
 //! An identified URDF holds the tree's parameters, and everything else as it was.
 
-mod arbitrary;
+use crate::arbitrary;
 
 use arbitrary::{assert_close, options};
 use phiw_dynamics::Tree;

@@ -53,6 +53,29 @@ fn comments_are_no_wider_than_code() {
     assert!(wide.is_empty(), "break these comments at {WIDEST} columns:\n{}", wide.join("\n"));
 }
 
+/// The integration tests of a crate are one program, which knows only the files that it lists: one that it
+/// does not list would never run.
+#[test]
+fn every_file_of_tests_is_in_the_program_of_its_crate() {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let (mut programs, mut forgotten) = (0, Vec::new());
+    for entry in std::fs::read_dir(&crates).unwrap() {
+        let tests = entry.unwrap().path().join("tests");
+        let Ok(program) = std::fs::read_to_string(tests.join("main.rs")) else { continue };
+        programs += 1;
+        for entry in std::fs::read_dir(&tests).unwrap() {
+            let path = entry.unwrap().path();
+            let is_module = path.join("mod.rs").exists() || path.extension().is_some_and(|end| end == "rs");
+            let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+            if is_module && name != "main" && !program.lines().any(|line| line == format!("mod {name};")) {
+                forgotten.push(path.display().to_string());
+            }
+        }
+    }
+    assert!(programs > 10, "{programs} programs of tests in {}", crates.display());
+    assert!(forgotten.is_empty(), "list these in the main.rs beside them:\n{}", forgotten.join("\n"));
+}
+
 #[track_caller]
 fn check(line: &str, is_wide: bool) {
     let source = format!("fn f() {{}}\n{line}\n");

@@ -1,6 +1,6 @@
 //! Factors do not depend on how the work was cut, and no row is lost or counted twice.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw_identification::fitting::{accumulate, merge};
 use phiw_identification::{BlockSource, LogSet, predict};

@@ -1,6 +1,6 @@
 //! Cut-offs compared in one band.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw_identification::bandwidth::{Bandwidth, BandwidthSettings, bandwidth};
 use phiw_identification::{LogSet, Variants};

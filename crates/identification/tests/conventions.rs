@@ -1,6 +1,6 @@
 //! Logs that count joints otherwise than the URDF.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw_identification::checks::{Convention, ConventionKind, ConventionSettings, conventions};
 use phiw_telemetry::Recording;

@@ -1,6 +1,6 @@
 //! The rows of a design against the regressor, whole.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw_regressor::JointTorqueRegressor;
 use proptest::prelude::*;

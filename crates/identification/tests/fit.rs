@@ -1,6 +1,6 @@
 //! Fits of robots whose truth is known.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw_dynamics::Tree;
 use phiw_identification::checks::InputError;

@@ -1,6 +1,6 @@
 //! Whether the robot of the motion held out is that of the training logs.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw_dynamics::Tree;
 use phiw_identification::fitting::{HeldOutChange, held_out_change};

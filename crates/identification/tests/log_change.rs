@@ -1,6 +1,6 @@
 //! Whether the training logs are of one robot.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw_dynamics::Tree;
 use phiw_dynamics::random_tree::RandomNumbers;

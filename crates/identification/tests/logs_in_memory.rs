@@ -1,6 +1,6 @@
 //! Logs in memory beside logs in files, and work that is called off.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw_dynamics::Tree;
 use phiw_identification::{BlockSource, IdentificationError, Interruption, KeptBlocks, LogSet};

@@ -1,6 +1,6 @@
 //! `model.json`: what is written is what is read.
 
-mod synthetic;
+use crate::synthetic;
 
 use faer::Mat;
 use faer::linalg::solvers::DenseSolveCore;

@@ -1,6 +1,6 @@
 //! Models that are moved: what they reproduce, and what cannot move.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw_dynamics::{AnalyticBackend, Tree, Workspace};
 use phiw_identification::effect::{EffectParameter, Entry, Evaluator, Needs, Sample};

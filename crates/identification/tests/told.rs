@@ -1,6 +1,6 @@
 //! What logs tell, on robots where it is known.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw_dynamics::Tree;
 use phiw_dynamics::random_tree::RandomNumbers;

@@ -1,6 +1,6 @@
 //! Files that are cut or damaged are refused, or read right; they never end the program.
 
-mod read;
+use crate::read;
 
 use read::{CHECKED, UNCHECKED, file, rows};
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! The same log in all formats is the same rows, to the last bit.
 
-mod read;
+use crate::read;
 
 use phiw_log_formats::{OpenOptions, Step, is_missing, open};
 use read::{CHECKED, UNCHECKED, file, rows};

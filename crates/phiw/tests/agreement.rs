@@ -1,6 +1,6 @@
 //! One model has one error: `identify`, `explain` and `predict` compute the same.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw::arguments::{ExplainArguments, PredictArguments, SessionArguments};
 use phiw::console::Console;

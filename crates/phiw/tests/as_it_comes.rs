@@ -1,7 +1,7 @@
 //! Robots as they come: everything missing at once, joints of noise, slow noise, slow training. Each test is
 //! a case that was measured from outside, on robots that the tracer had not seen.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw::arguments::{ExplainArguments, SessionArguments};
 use phiw::console::Console;

@@ -1,6 +1,6 @@
 //! `phiw check`: what is in logs, before anything is fitted; and the same as warnings of `identify`.
 
-mod synthetic;
+use crate::synthetic;
 
 use assert_cmd::Command;
 use phiw_telemetry::Recording;

@@ -1,7 +1,7 @@
 //! What the user has a say in: effects declared on given joints, candidates excluded, joints held by pattern,
 //! right angles of the URDF.
 
-mod synthetic;
+use crate::synthetic;
 
 use assert_cmd::Command;
 use phiw::arguments::{ExplainArguments, PredictArguments, SessionArguments};

@@ -1,7 +1,7 @@
 //! `phiw explain` from files to files: a sufficient model, an effect that is found, a held model that has
 //! changed.
 
-mod synthetic;
+use crate::synthetic;
 
 use assert_cmd::Command;
 use phiw_report::ReportJson;

@@ -1,6 +1,6 @@
 //! `phiw export`: files of a model for other programs.
 
-mod synthetic;
+use crate::synthetic;
 
 use assert_cmd::Command;
 use phiw::arguments::SessionArguments;

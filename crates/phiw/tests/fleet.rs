@@ -1,6 +1,6 @@
 //! Logs that are reduced apart give the files of one process, to the last bit.
 
-mod synthetic;
+use crate::synthetic;
 
 use assert_cmd::Command;
 use phiw_telemetry::Recording;

@@ -1,7 +1,7 @@
 //! Logs that are faster than what they log, and logs with rows of zeros, give what the log gives that they
 //! were made of, and it is said.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw::arguments::{ExplainArguments, SessionArguments};
 use phiw::console::Console;

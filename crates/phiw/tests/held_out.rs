@@ -1,6 +1,6 @@
 //! A verdict rests on motion held out: on all of it, and on nothing where there is none.
 
-mod synthetic;
+use crate::synthetic;
 
 use assert_cmd::Command;
 use phiw_dynamics::random_tree::RandomNumbers;

@@ -1,6 +1,6 @@
 //! Input made to exhaust the machine, or broken as if it were: refused with one line, before the work begins.
 
-mod synthetic;
+use crate::synthetic;
 
 use assert_cmd::Command;
 use std::fs;

@@ -1,6 +1,6 @@
 //! `identified.xml`: the model as MuJoCo reads it.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw::arguments::SessionArguments;
 use phiw::console::Console;

@@ -1,6 +1,6 @@
 //! `phiw identify` from end to end, on a robot whose truth is known.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw::arguments::SessionArguments;
 use phiw::console::Console;

@@ -1,6 +1,6 @@
 //! Logs with a map give what the same logs without one give; `phiw map` writes a first map.
 
-mod synthetic;
+use crate::synthetic;
 
 use assert_cmd::Command;
 use phiw_telemetry::Recording;

@@ -1,6 +1,6 @@
 //! Torques that a drive, a logger, or whoever published the log has changed.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw::console::Console;
 use phiw::explain::explain;

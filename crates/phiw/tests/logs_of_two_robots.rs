@@ -1,6 +1,6 @@
 //! Training logs that are not of one robot.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw::console::Console;
 use phiw::explain::results;

@@ -1,7 +1,7 @@
 //! `phiw next`, from files to files: a small robot that stands, motions of it, and logs of what it has run.
 
-mod next_scene;
-mod synthetic;
+use crate::next_scene;
+use crate::synthetic;
 
 use next_scene::{JOINTS, Scene, motion, tree, urdf};
 use phiw_dynamics::random_tree::RandomNumbers;

@@ -1,8 +1,8 @@
 //! `phiw next` with a simulated robot behind it, which knows nothing but files: five iterations give what the
 //! curriculum gives in one process, since both plan alike and estimate alike.
 
-mod next_scene;
-mod synthetic;
+use crate::next_scene;
+use crate::synthetic;
 
 use next_scene::{JOINTS, Scene, tree, urdf};
 use phiw_curriculum::constraint::{FalseFalls, ZmpConstraint};

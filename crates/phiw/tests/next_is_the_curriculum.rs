@@ -1,8 +1,7 @@
 //! `phiw next` and the curriculum plan the same on the same inputs: the same motion, α and margin, and the
 //! same refusal.
 
-mod next_scene;
-mod synthetic;
+use crate::next_scene;
 
 use next_scene::{JOINTS, Scene, tree, urdf};
 use phiw_curriculum::constraint::{Certainty, FalseFalls, ZmpConstraint};

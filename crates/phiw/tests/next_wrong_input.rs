@@ -1,8 +1,7 @@
 //! `phiw next` on wrong input: one message that names the file, the place and the mend, exit status 2, and
 //! nothing written.
 
-mod next_scene;
-mod synthetic;
+use crate::next_scene;
 
 use next_scene::{JOINTS, Scene, tree, urdf};
 use phiw_telemetry::{Recording, TorqueColumns};

@@ -1,6 +1,6 @@
 //! What is written for a simulator is a robot that can exist, whatever the logs say.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw::arguments::SessionArguments;
 use phiw::console::Console;

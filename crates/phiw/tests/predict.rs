@@ -1,6 +1,6 @@
 //! `phiw predict`: what an identified model says of logs, row by row.
 
-mod synthetic;
+use crate::synthetic;
 
 use assert_cmd::Command;
 use phiw::arguments::PredictArguments;

@@ -1,6 +1,6 @@
 //! Something else that acts on the robot while it is logged.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw::console::Console;
 use phiw::explain::results;

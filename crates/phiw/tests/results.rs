@@ -1,6 +1,6 @@
 //! What the command does to files and streams, beside its results.
 
-mod synthetic;
+use crate::synthetic;
 
 use assert_cmd::Command;
 use std::fs;

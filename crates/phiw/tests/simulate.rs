@@ -1,6 +1,6 @@
 //! `phiw simulate`: logs reproduced by the model and by the URDF that it was made from.
 
-mod synthetic;
+use crate::synthetic;
 
 use assert_cmd::Command;
 use serde_json::Value;

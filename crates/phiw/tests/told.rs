@@ -1,7 +1,7 @@
 //! What the logs tell, in the report and on the terminal, and which motion would tell more.
 
-mod next_scene;
-mod synthetic;
+use crate::next_scene;
+use crate::synthetic;
 
 use phiw::arguments::SessionArguments;
 use phiw::console::Console;

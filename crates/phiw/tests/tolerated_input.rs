@@ -1,7 +1,7 @@
 //! Input that is odd but can be worked with: exit status 0, and everyone is told, on standard error, in the
 //! page and in `report.json`.
 
-mod synthetic;
+use crate::synthetic;
 
 use assert_cmd::Command;
 use phiw_report::ReportJson;

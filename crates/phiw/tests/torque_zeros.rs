@@ -1,6 +1,6 @@
 //! Torques whose zero is another in each log.
 
-mod synthetic;
+use crate::synthetic;
 
 use phiw::arguments::SessionArguments;
 use phiw::console::Console;

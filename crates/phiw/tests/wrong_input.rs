@@ -1,7 +1,7 @@
 //! Wrong input gets one message that names the file, the place and the mend, exit status 2, and nothing
 //! written.
 
-mod synthetic;
+use crate::synthetic;
 
 use assert_cmd::Command;
 use phiw_telemetry::Recording;

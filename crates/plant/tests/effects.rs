@@ -2,7 +2,7 @@
 //! the true motion is the effect's own formula. The effect is felt by the motion (the loop is closed), and
 //! the log is the plant's ordinary one.
 
-mod plants;
+use crate::plants;
 
 use phiw_dynamics::{Placement, Tree, Vec3, Workspace, World};
 use phiw_plant::{Coupling, Friction, Mechanism, PlantEffect, PlantRun, Presliding, Sensors};

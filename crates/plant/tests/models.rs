@@ -1,6 +1,6 @@
 //! The robots in `models/`: their soles fit them, and what a plant needs of them is there.
 
-mod plants;
+use crate::plants;
 
 use phiw_dynamics::Placement;
 use phiw_zmp::{FeetError, feet_from_toml};

@@ -1,7 +1,7 @@
 //! The plant as a whole: without secrets it is the rigid body, with the same seed it is the same, and it
 //! refuses nonsense.
 
-mod plants;
+use crate::plants;
 
 use phiw_dynamics::{
     BackendError, DimensionError, DynamicsBackend, Foot, Placement, SimulationBackend, Tree, World,

@@ -1,6 +1,6 @@
 //! Robots that stand on their feet in a physics engine, under the plant's controller.
 
-mod plants;
+use crate::plants;
 
 use phiw_dynamics::{BackendError, SimulationBackend, Tree, World};
 use phiw_plant::{ComputedTorque, Gains, Plant, PlantRun, PlantSetup, Reference, RigidBodyModel, Timing};

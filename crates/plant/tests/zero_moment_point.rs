@@ -1,6 +1,6 @@
 //! Robots that stand: where the two ZMPs differ, and which of them a force plate measures.
 
-mod plants;
+use crate::plants;
 
 use phiw_dynamics::{BackendError, Placement, SimulationBackend, Tree, Vec3, World};
 use phiw_plant::{ComputedTorque, Gains, Plant, PlantRun, PlantSetup, RigidBodyModel, Timing};

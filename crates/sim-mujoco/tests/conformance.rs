@@ -1,6 +1,6 @@
 //! The conformance suite on MuJoCo.
 
-mod setup;
+use crate::setup;
 
 use phiw_conformance as suite;
 use phiw_conformance::{Failure, Measured};

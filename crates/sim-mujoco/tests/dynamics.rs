@@ -1,6 +1,6 @@
 //! The robot's own equation, against phiw's algorithms.
 
-mod setup;
+use crate::setup;
 
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, random_state};
 use phiw_dynamics::{AnalyticBackend, BackendError, DynamicsBackend, JointType, Tree, World};

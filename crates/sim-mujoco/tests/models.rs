@@ -1,6 +1,6 @@
 //! Which robots become models, and which do not.
 
-mod setup;
+use crate::setup;
 
 use phiw_dynamics::random_tree::{RandomTreeOptions, random_tree};
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};

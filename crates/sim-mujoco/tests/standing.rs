@@ -1,6 +1,6 @@
 //! A robot that stands on the floor: contact forces, and falling over.
 
-mod setup;
+use crate::setup;
 
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{AnalyticBackend, DynamicsBackend, SimulationBackend, Tree, World};

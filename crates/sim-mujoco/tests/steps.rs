@@ -1,6 +1,6 @@
 //! Steps in time.
 
-mod setup;
+use crate::setup;
 
 use phiw_dynamics::random_tree::RandomState;
 use phiw_dynamics::{AnalyticBackend, BackendError, DynamicsBackend, SimulationBackend, World};

@@ -1,6 +1,6 @@
 //! Estimators on a robot that is known.
 
-mod arm;
+use crate::arm;
 
 use arm::Arm;
 use phiw_curriculum::{Experiment, unreliable_model};

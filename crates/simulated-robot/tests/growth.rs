@@ -1,7 +1,7 @@
 //! The loop closed: what nobody declared enters the model, nothing does where there is nothing, and rivals
 //! are told apart.
 
-mod arm;
+use crate::arm;
 
 use arm::Arm;
 use phiw_curriculum::end::FixedCount;

@@ -1,6 +1,6 @@
 //! The small parts: motions, relaxation, ends, beliefs, controllers.
 
-mod arm;
+use crate::arm;
 
 use arm::{Arm, tree};
 use phiw_curriculum::constraint::Safety;

@@ -1,6 +1,6 @@
 //! Whole runs: what they reach, that they are the same however they are interrupted, and that falls count.
 
-mod arm;
+use crate::arm;
 
 use arm::Arm;
 use phiw_curriculum::constraint::{Believed, Constraint, Safety};

@@ -1,6 +1,6 @@
 //! The score test: it foretells what a fit saves, finds what no residual's colour shows, and invents nothing.
 
-mod arm;
+use crate::arm;
 
 use arm::Arm;
 use phiw_curriculum::end::FixedCount;

@@ -1,6 +1,6 @@
 //! Selections against the naive way: merge every candidate, decompose, compare.
 
-mod arm;
+use crate::arm;
 
 use arm::{motions, tree};
 use phiw_curriculum::motion::MotionDataset;

@@ -1,6 +1,6 @@
 //! The simulated robot: its truth and its noise are stated once, its sensors can be set.
 
-mod arm;
+use crate::arm;
 
 use arm::Arm;
 use phiw_bspline_retarget::embedded::embedded_motions;

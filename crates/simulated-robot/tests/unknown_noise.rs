@@ -1,7 +1,7 @@
 //! A robot whose noise nobody knows: sensors that are not exact, and the estimator that finds the noise
 //! out.
 
-mod arm;
+use crate::arm;
 
 use arm::Arm;
 use phiw_curriculum::{Experiment, unreliable_model};

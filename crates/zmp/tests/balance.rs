@@ -1,6 +1,6 @@
 //! The balance against inverse dynamics, finite differences and closed forms.
 
-mod robots;
+use crate::robots;
 
 use phiw_dynamics::inertia::Inertia;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};

@@ -1,6 +1,6 @@
 //! The linear map of the parameters, and what it says of uncertainty.
 
-mod robots;
+use crate::robots;
 
 use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_zmp::{BalanceRows, ZmpModel, ZmpWorkspace, standard_deviation};

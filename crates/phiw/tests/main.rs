@@ -1,0 +1,36 @@
+//! The integration tests of this crate as one program, which is linked once. Each file is listed here.
+
+mod agreement;
+mod as_it_comes;
+mod check;
+mod control;
+mod dependencies;
+mod explain;
+mod export;
+mod fleet;
+mod held_logs;
+mod held_out;
+mod hostile_input;
+mod identified_mjcf;
+mod identify;
+mod log_maps;
+mod logged_torque;
+mod logs_of_two_robots;
+mod next;
+mod next_closes_the_loop;
+mod next_is_the_curriculum;
+mod next_scene;
+mod next_wrong_input;
+mod possible_bodies;
+mod predict;
+mod pushes;
+mod real_robots;
+mod results;
+mod retarget;
+mod simulate;
+mod synthetic;
+mod told;
+mod tolerated_input;
+mod torque_zeros;
+mod torture;
+mod wrong_input;

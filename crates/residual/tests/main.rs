@@ -1,0 +1,5 @@
+//! The integration tests of this crate as one program, which is linked once. Each file is listed here.
+
+mod real_logs;
+mod scanned_constants;
+mod trace;
