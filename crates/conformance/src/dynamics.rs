@@ -69,6 +69,33 @@ pub fn forward_dynamics_undoes_inverse_dynamics<B: DynamicsBackend + ?Sized>(
     Measured::check("acceleration after inverse and forward dynamics", largest, AGREEMENT, "")
 }
 
+/// The mass matrix times an acceleration is what inverse dynamics asks for beside gravity, with rotors.
+///
+/// # Errors
+/// The largest difference, over the largest force of its state, is above 1e-8.
+pub fn mass_matrix_is_of_inverse_dynamics<B: DynamicsBackend + ?Sized>(
+    build: &Builder<B>,
+    tree: &Tree,
+    states: usize,
+) -> Result<Measured, Failure> {
+    let world = World { rotor_inertia: vec![0.7; tree.joint_count()], ..World::default() };
+    let mut backend = build(tree, &world)?;
+    let size = tree.velocity_size();
+    let still = vec![0.0; size];
+    let (mut matrix, mut bias) = (vec![0.0; size * size], still.clone());
+    let largest = over_states(tree, states, 8, |RandomState { q, a, .. }| {
+        let mut force = vec![0.0; size];
+        backend.inverse_dynamics(q, &still, &still, &mut bias)?;
+        backend.inverse_dynamics(q, &still, a, &mut force)?;
+        backend.mass_matrix(q, &mut matrix)?;
+        let times = |row: &[f64]| row.iter().zip(a).map(|(mass, a)| mass * a).sum::<f64>();
+        let told: Vec<f64> =
+            matrix.chunks_exact(size).zip(&bias).map(|(row, bias)| times(row) + bias).collect();
+        Ok(relative_difference(&told, &force))
+    })?;
+    Measured::check("mass matrix against inverse dynamics", largest, AGREEMENT, "")
+}
+
 /// Φw = τ: the joint torque regressor times the tree's parameters is the backend's own inverse dynamics.
 ///
 /// # Errors

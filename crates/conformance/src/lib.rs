@@ -27,7 +27,8 @@ use contract::{
 };
 use dynamics::{
     base_wrench_of_inverse_dynamics, forward_dynamics_undoes_inverse_dynamics,
-    inverse_dynamics_is_the_analytic, regressor_predicts_inverse_dynamics,
+    inverse_dynamics_is_the_analytic, mass_matrix_is_of_inverse_dynamics,
+    regressor_predicts_inverse_dynamics,
 };
 use phiw_dynamics::{BodyKinematics, DynamicsBackend, Tree};
 
@@ -47,6 +48,7 @@ pub fn equation_of_motion<B: DynamicsBackend + ?Sized>(
         inverse_dynamics_is_the_analytic(build, tree, states)?,
         base_wrench_of_inverse_dynamics(build, tree, states.min(100))?,
         forward_dynamics_undoes_inverse_dynamics(build, tree, states)?,
+        mass_matrix_is_of_inverse_dynamics(build, tree, states.min(100))?,
         regressor_predicts_inverse_dynamics(build, tree, 0, states.min(100))?,
     ])
 }

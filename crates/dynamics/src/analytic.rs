@@ -145,6 +145,16 @@ impl DynamicsBackend for AnalyticBackend {
         Ok(())
     }
 
+    fn mass_matrix(&mut self, q: &[f64], matrix: &mut [f64]) -> Result<(), BackendError> {
+        self.tree.mass_matrix(q, &mut self.workspace, matrix)?;
+        let size = self.tree.velocity_size();
+        let first_joint = size - self.joint_names.len();
+        for (joint, inertia) in self.rotor_inertia.iter().enumerate() {
+            matrix[(first_joint + joint) * (size + 1)] += inertia;
+        }
+        Ok(())
+    }
+
     fn forward_dynamics(
         &mut self,
         q: &[f64],

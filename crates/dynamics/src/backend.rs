@@ -90,6 +90,30 @@ pub trait DynamicsBackend {
         force: &mut [f64],
     ) -> Result<(), BackendError>;
 
+    /// The mass matrix `M(q)`: dense, symmetric, row by row, with the inertia of rotors.
+    ///
+    /// This one asks for inverse dynamics once for each column and once more, and allocates; a backend that
+    /// has the matrix gives it. What [`base_wrench`](Self::base_wrench) tells after it is of no motion.
+    ///
+    /// # Errors
+    /// A slice does not fit the robot, or the backend fails.
+    fn mass_matrix(&mut self, q: &[f64], matrix: &mut [f64]) -> Result<(), BackendError> {
+        let size = self.velocity_size();
+        check_size("the mass matrix", matrix.len(), size * size)?;
+        let still = vec![0.0; size];
+        let (mut unit, mut bias, mut force) = (still.clone(), still.clone(), still.clone());
+        self.inverse_dynamics(q, &still, &still, &mut bias)?;
+        for column in 0..size {
+            unit[column] = 1.0;
+            self.inverse_dynamics(q, &still, &unit, &mut force)?;
+            unit[column] = 0.0;
+            for row in 0..size {
+                matrix[row * size + column] = force[row] - bias[row];
+            }
+        }
+        Ok(())
+    }
+
     /// The acceleration under a generalised force; for a floating base its first six elements push the base.
     ///
     /// # Errors

@@ -10,6 +10,7 @@ use phiw_dynamics::{JointType, Tree};
 use phiw_limits::Limits;
 use phiw_regressor::{JointTorqueRegressor, fewest_base_parameters};
 use phiw_telemetry::Survey;
+use phiw_telemetry::segments::{GapCount, GapReason};
 use std::path::PathBuf;
 
 /// A log that a model cannot be fitted to.
@@ -66,6 +67,19 @@ pub enum InputError {
         rate_hz: f64,
         /// What the stamps look like.
         mend: &'static str,
+    },
+    /// Stamps of which most are that of the row before.
+    #[error(
+        "{}: {repeated} of {rows} rows have the time stamp of the row before: the stamps were written with too \
+         few digits; write them to a tenth of the sample period, or from the start of the log", path.display()
+    )]
+    CoarseStamps {
+        /// The log.
+        path: PathBuf,
+        /// Rows whose stamp is that of the row before.
+        repeated: u64,
+        /// All rows.
+        rows: u64,
     },
     /// Velocities that are the positions' derivative but for a unit.
     #[error(
@@ -159,6 +173,12 @@ fn check_time_unit(survey: &Survey) -> Result<(), InputError> {
     let rate_hz = survey.rate_hz();
     if RATES_HZ.contains(&rate_hz) {
         return Ok(());
+    }
+    // A clock's seconds since 1970 in six or ten digits are whole seconds or more.
+    let is_repeated = |gap: &&GapCount| gap.reason == GapReason::DuplicateStamp;
+    let repeated = survey.gaps.iter().filter(is_repeated).map(|gap| gap.count).sum();
+    if 2 * repeated > survey.rows {
+        return Err(InputError::CoarseStamps { path: survey.path.clone(), repeated, rows: survey.rows });
     }
     let plausible = |factor: f64| (10.0..20_000.0).contains(&(rate_hz * factor));
     let mend = if plausible(1e3) {

@@ -420,9 +420,9 @@ impl DesignScratch<'_> {
         Ok(())
     }
 
-    /// Takes torques of a simulation in the place of the reference model's.
-    pub(crate) fn set_reference(&mut self, reference: BlockReference) {
-        self.reference = reference;
+    /// What is known of the reference model's torques, for a simulation to put its own there.
+    pub(crate) fn reference_mut(&mut self) -> &mut BlockReference {
+        &mut self.reference
     }
 
     /// All rows of one sample, side by side as [`RowLayout::range`] says: columns, then the measured torque.

@@ -6,6 +6,7 @@ use crate::{Design, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, leave_one_out};
 use phiw_regressor::least_squares::GroupedFactor;
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// A torque that a log by itself tells otherwise than all training logs together.
@@ -56,22 +57,24 @@ pub fn log_changes(
         let own: Vec<GroupedFactor> =
             own.map(|(_, fold)| fold.select(&determined)).collect::<Result<_, RegressorError>>()?;
         let weighted: Vec<Factor> =
-            own.iter().map(|fold| fold.combine(&weights)).collect::<Result<_, RegressorError>>()?;
+            own.par_iter().map(|fold| fold.combine(&weights)).collect::<Result<_, RegressorError>>()?;
         if own.len() < 2 {
             continue;
         }
         let of_all: Vec<f64> = determined.iter().map(|&parameter| common.parameters[parameter]).collect();
-        let mut squares = vec![(0.0, 0.0); weights.len()];
-        for (fold, others) in own.iter().zip(leave_one_out(&weighted)?) {
+        let left_of = |(fold, others): (&GroupedFactor, Factor)| {
             let alone = match others.merge(&all)?.solve() {
                 Ok(solution) => solution.parameters,
                 // Beside what the log tells of other parameters, what all logs tell of one is lost in
                 // rounding.
                 Err(RegressorError::RankDeficient { .. }) => of_all.clone(),
-                Err(error) => return Err(error.into()),
+                Err(error) => return Err(error),
             };
-            let left = fold.residual_sums_of_squares(&of_all)?;
-            let left_alone = fold.residual_sums_of_squares(&alone)?;
+            Ok((fold.residual_sums_of_squares(&of_all)?, fold.residual_sums_of_squares(&alone)?))
+        };
+        let of_folds = own.par_iter().zip(leave_one_out(&weighted)?).map(left_of);
+        let mut squares = vec![(0.0, 0.0); weights.len()];
+        for (left, left_alone) in of_folds.collect::<Result<Vec<_>, RegressorError>>()? {
             squares.iter_mut().zip(left.iter().zip(&left_alone)).for_each(|(sums, (all, alone))| {
                 sums.0 += all;
                 sums.1 += alone;

@@ -224,6 +224,9 @@ fn stamps_velocities_and_positions_in_other_units() {
     check(|scene| scene.record(scaled_time(1e6)), &["look like microseconds"]);
     check(|scene| scene.record(scaled_time(1e9)), &["look like nanoseconds"]);
     check(|scene| scene.record(scaled_time(1e-3)), &["not in seconds"]);
+    // Seconds since 1970 in ten digits: 1 s for 1 s, taken for milliseconds.
+    let whole_seconds = |log: &mut Recording| log.t.iter_mut().for_each(|t| *t = (1.7e9 + *t).floor());
+    check(|scene| scene.record(whole_seconds), &["have the time stamp of the row before", "too few digits"]);
     let large = |log: &mut Recording| log.q.iter_mut().for_each(|q| *q *= 1e3);
     check(|scene| scene.record(large), &["q.joint_1 runs from", "another unit"]);
     let velocity = |factor: f64| {

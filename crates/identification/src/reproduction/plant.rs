@@ -47,6 +47,8 @@ struct Effects<'a> {
     /// All parameters of the design, zero where they belong to the other half, or to the rigid body.
     linear_parameters: Vec<f64>,
     other_parameters: Vec<f64>,
+    /// Whether anything is affine in the motion.
+    has_linear: bool,
     /// The sample before and the present one.
     block: Block,
     evaluation: Vec<f64>,
@@ -58,6 +60,7 @@ struct Scratch {
     unit: Vec<f64>,
     bias: Vec<f64>,
     column: Vec<f64>,
+    of_effects: Vec<f64>,
     /// Row-major; its lower half becomes Cholesky's factor.
     mass: Vec<f64>,
     rigid: Vec<f64>,
@@ -74,6 +77,7 @@ impl<'a> Plant<'a> {
             unit: zeros(),
             bias: zeros(),
             column: zeros(),
+            of_effects: zeros(),
             mass: vec![0.0; joints * joints],
             rigid: zeros(),
         };
@@ -99,12 +103,27 @@ impl<'a> Plant<'a> {
             }
         }
         let joints = self.scratch.joints;
+        let mut scratch_of_other = design.scratch();
+        // What needs the torques' derivatives is not simulated, but its columns are asked for all the same.
+        let (zeros, matrices) = (vec![0.0; 2 * joints], vec![0.0; 2 * joints * joints]);
+        *scratch_of_other.reference_mut() = BlockReference {
+            by_position: matrices.clone(),
+            by_velocity: matrices.clone(),
+            by_acceleration: matrices,
+            gravity: vec![0.0; 2 * 3 * joints],
+            total_torque: zeros.clone(),
+            torque: zeros.clone(),
+            torque_rate: zeros.clone(),
+            torque_second_rate: zeros.clone(),
+            total_torque_rate: zeros,
+        };
         let pair = || vec![0.0; 2 * joints];
         let block = Block::unfiltered(joints, vec![0.0; 2], [pair(), pair(), pair()], pair());
         let effects = Effects {
             design,
             linear: design.scratch(),
-            other: design.scratch(),
+            other: scratch_of_other,
+            has_linear: linear.iter().any(|parameter| *parameter != 0.0),
             linear_parameters: linear,
             other_parameters: other,
             block,
@@ -193,20 +212,20 @@ impl<'a> Plant<'a> {
         let Plant { backend, effects, scratch, .. } = self;
         let joints = scratch.joints;
         backend.inverse_dynamics(q, v, &scratch.still, &mut scratch.bias)?;
-        if let Some(effects) = effects {
-            effects.add_linear([q, v, &scratch.still], &mut scratch.bias)?;
-        }
+        backend.mass_matrix(q, &mut scratch.mass)?;
+        let Some(effects) = effects.as_mut().filter(|effects| effects.has_linear) else { return Ok(()) };
+        scratch.of_effects.fill(0.0);
+        effects.add_linear([q, v, &scratch.still], &mut scratch.of_effects)?;
         for joint in 0..joints {
             scratch.unit[joint] = 1.0;
-            backend.inverse_dynamics(q, v, &scratch.unit, &mut scratch.column)?;
-            if let Some(effects) = effects {
-                effects.add_linear([q, v, &scratch.unit], &mut scratch.column)?;
-            }
+            scratch.column.fill(0.0);
+            effects.add_linear([q, v, &scratch.unit], &mut scratch.column)?;
             scratch.unit[joint] = 0.0;
             for row in 0..joints {
-                scratch.mass[row * joints + joint] = scratch.column[row] - scratch.bias[row];
+                scratch.mass[row * joints + joint] += scratch.column[row] - scratch.of_effects[row];
             }
         }
+        scratch.bias.iter_mut().zip(&scratch.of_effects).for_each(|(bias, own)| *bias += own);
         Ok(())
     }
 }
@@ -245,21 +264,10 @@ impl Effects<'_> {
         torque: &mut [f64],
     ) -> Result<(), DimensionError> {
         self.set(t, state);
-        let both = [rigid, rigid].concat();
-        let none = vec![0.0; both.len()];
-        // What needs the torques' derivatives is not simulated, but its columns are asked for all the same.
-        let matrices = vec![0.0; both.len() * rigid.len()];
-        self.other.set_reference(BlockReference {
-            by_position: matrices.clone(),
-            by_velocity: matrices.clone(),
-            by_acceleration: matrices,
-            gravity: [none.as_slice(); 3].concat(),
-            total_torque: both.clone(),
-            torque: both,
-            torque_rate: none.clone(),
-            torque_second_rate: none.clone(),
-            total_torque_rate: none,
-        });
+        let reference = self.other.reference_mut();
+        for torques in [&mut reference.torque, &mut reference.total_torque] {
+            torques.chunks_exact_mut(rigid.len()).for_each(|sample| sample.copy_from_slice(rigid));
+        }
         self.other.evaluate(&self.block, 1, &mut self.evaluation)?;
         self.add(&self.other_parameters, torque);
         Ok(())
