@@ -131,6 +131,37 @@ impl Products {
         w.iter().map(|&(column, value)| value * along(self.column(column))).sum::<f64>().max(0.0)
     }
 
+    /// What is left of ‖Φw‖² beside other columns, whatever their parameters.
+    pub fn size_beside(&self, w: &[(usize, f64)], others: &[usize]) -> f64 {
+        let inner = |a: &[(usize, f64)], b: &[(usize, f64)]| -> f64 {
+            let along = |column: usize| {
+                b.iter().map(|&(other, value)| self.column(column)[other] * value).sum::<f64>()
+            };
+            a.iter().map(|&(column, value)| value * along(column)).sum()
+        };
+        // Gram and Schmidt, in the inner product of the rows.
+        let mut basis: Vec<Vec<(usize, f64)>> = Vec::new();
+        let beside = |w: &[(usize, f64)], basis: &[Vec<(usize, f64)>]| {
+            let mut left = w.to_vec();
+            for unit in basis {
+                let along = inner(unit, &left);
+                left.extend(unit.iter().map(|&(column, value)| (column, -along * value)));
+            }
+            left
+        };
+        for &column in others {
+            let own = [(column, 1.0)];
+            let left = beside(&own, &basis);
+            let squares = inner(&left, &left);
+            if squares > 1e-9 * inner(&own, &own) {
+                let length = squares.sqrt();
+                basis.push(left.into_iter().map(|(column, value)| (column, value / length)).collect());
+            }
+        }
+        let left = beside(w, &basis);
+        inner(&left, &left).max(0.0)
+    }
+
     /// Φ_columnᵀ(f − Φw).
     pub fn score(&self, column: usize, w: &[(usize, f64)]) -> f64 {
         let products = self.column(column);
@@ -142,6 +173,25 @@ impl Products {
 mod tests {
     use super::Products;
     use phiw_regressor::factor::Factor;
+
+    /// A spring and a balancer on a short arc are the same but for a cube: next to nothing is left of either.
+    #[test]
+    fn little_is_left_of_a_column_beside_one_that_is_nearly_parallel() {
+        let q: Vec<f64> = (0..41).map(|row| -0.4 + 0.02 * f64::from(row)).collect();
+        let rows = faer::Mat::from_fn(q.len(), 4, |row, column| match column {
+            0 => q[row],
+            1 => q[row].sin(),
+            2 => q[row].cos(),
+            _ => 0.0,
+        });
+        let products = Products::of_rows(rows.as_ref());
+        let (own, whole) = ([(0, 50.0)], products.size_of(&[(0, 50.0)]));
+        assert!((products.size_beside(&own, &[]) / whole - 1.0).abs() < 1e-12);
+        let left = products.size_beside(&own, &[1, 2]) / whole;
+        assert!(left > 0.0 && left < 1e-3, "{left}");
+        // Cosines are even, and take nothing of what is odd.
+        assert!((products.size_beside(&own, &[2, 2]) / whole - 1.0).abs() < 1e-12);
+    }
 
     /// An external force named a moment of 10¹⁷ N·m: its column was rounding, and followed the noise.
     #[test]

@@ -8,7 +8,7 @@ use phiw_identification::{Effect, EffectSpec, IdentificationError};
 
 /// A kind on a site, with the constants to choose from.
 pub(super) struct Candidate {
-    /// Two for each kind of the catalogue, in its order: on single joints, and on several together.
+    /// [`number_of`] it.
     pub kind: usize,
     /// Whether the kind acts on each joint by itself.
     pub familiar: bool,
@@ -35,6 +35,17 @@ pub(super) struct Present<'a> {
     pub declared: usize,
 }
 
+/// A number for hypotheses of the kind of a rank in the catalogue: two for each, in its order, for those on
+/// single joints and for those on several together.
+fn number_of(rank: usize, joints: usize) -> usize {
+    2 * rank + usize::from(joints > 1)
+}
+
+/// The rank in the catalogue of the kind of a number.
+pub(super) fn rank_of(number: usize) -> usize {
+    number / 2
+}
+
 impl Candidates {
     /// The effects of the model, each as it is. Declared effects of a held model are no candidates but part
     /// of what is held.
@@ -48,7 +59,7 @@ impl Candidates {
             let rank = fixed.catalogue.rank(&spec.kind).unwrap_or_default();
             candidates.present.push(Member { hypothesis: candidates.list.len(), variant: 0 });
             candidates.list.push(Candidate {
-                kind: 2 * rank + usize::from(spec.joints.len() > 1),
+                kind: number_of(rank, spec.joints.len()),
                 familiar: spec.joints.len() == 1,
                 specs: vec![spec.clone()],
                 effects: vec![place],
@@ -140,7 +151,7 @@ impl Candidates {
         let built: Vec<Box<dyn Effect>> =
             scanned.iter().map(|constants| kind.build(fixed.tree, site, constants)).collect();
         self.list.push(Candidate {
-            kind: 2 * rank + usize::from(site.len() > 1),
+            kind: number_of(rank, site.len()),
             familiar: site.len() == 1,
             specs: built.iter().map(|effect| effect.spec()).collect(),
             effects: (first..first + built.len()).collect(),

@@ -14,6 +14,7 @@ mod harm;
 mod hypotheses;
 mod impossible;
 mod input;
+mod interchangeable;
 mod kept_columns;
 mod multiples;
 mod naming;

@@ -31,19 +31,19 @@ struct Simpler {
 }
 
 /// What leaving out an effect does.
-struct Judged {
+pub(super) struct Judged {
     /// Place among the model's effects.
-    place: usize,
-    significance: f64,
+    pub place: usize,
+    pub significance: f64,
     /// What the logarithms of the foretold errors gain with it: Σ rows·log(without/with).
-    gain: f64,
+    pub gain: f64,
     /// Share of the stretches of training motion that it makes better.
-    folds: f64,
+    pub folds: f64,
     /// RMS of what it takes over the RMS of a torque that it acts on, the largest.
-    size: f64,
+    pub size: f64,
     /// Whether its certainty is that of a name.
-    certain: bool,
-    named: bool,
+    pub certain: bool,
+    pub named: bool,
 }
 
 impl Search<'_> {
@@ -71,6 +71,7 @@ impl Search<'_> {
         let mut judged = self.judge(&trial)?;
         self.judge_beside_forms(&trial, &mut judged);
         self.judge_small(&trial, &mut judged)?;
+        self.judge_interchangeable(&trial, &mut judged);
         self.name_families(&mut judged);
         self.in_order(&trial, judged)
     }
@@ -203,7 +204,7 @@ impl Search<'_> {
     }
 
     /// Whether an effect is one of the robot, and not of its log, and was not found to be uncertain.
-    fn may_have_a_name(&self, place: usize) -> bool {
+    pub(super) fn may_have_a_name(&self, place: usize) -> bool {
         let EffectSpec { kind, joints, .. } = &self.specs[place];
         let of_the_log = self.fixed.catalogue.kind(kind).is_ok_and(EffectKind::is_of_the_log);
         !of_the_log && !self.uncertain.iter().any(|(other, on)| other == kind && on == joints)
@@ -314,7 +315,8 @@ impl Search<'_> {
     /// Where the other parameters have taken up most of it, it is to be seen on any torque, and must be a
     /// share of its torque by itself.
     pub(super) fn is_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
-        let own = |torque: usize| trial.torque(torque).size_of(&trial.values_of(member, torque));
+        let others = self.interchangeable(trial, member);
+        let own = |torque: usize| trial.size_beside(member, &others, torque);
         let (seen, absorbed) = self.is_seen_or_absorbed(trial, member, squares, own);
         seen || absorbed
     }

@@ -141,6 +141,14 @@ impl Trial {
         }
     }
 
+    /// The squares of what a member adds to a torque, beyond what others could add.
+    pub fn size_beside(&self, member: Member, others: &[Member], torque: usize) -> f64 {
+        let rows = &self.problem.torques[torque];
+        let columns = others.iter().flat_map(|&other| &self.problem.variant(other).parameters);
+        let columns: Vec<usize> = columns.filter_map(|&parameter| rows.column(parameter)).collect();
+        self.torque(torque).size_beside(&self.values_of(member, torque), &columns)
+    }
+
     /// What a member adds to a torque, as (column, value) pairs.
     pub fn values_of(&self, member: Member, torque: usize) -> Vec<(usize, f64)> {
         let rows = &self.problem.torques[torque];

@@ -104,6 +104,19 @@ fn a_stop_that_stiffens_is_a_stop_and_no_map() {
     assert_eq!(named(&tracing), [("end_stop".to_owned(), vec!["elbow".to_owned()])]);
 }
 
+/// A spring and a balancer that cancel each other mended what a long soft stop is not in the catalogue's form,
+/// and both had names beside it; where the stop began beyond the fifth of the range that was looked through,
+/// they had its name.
+#[test]
+fn a_long_soft_stop_is_neither_a_spring_nor_a_balancer() {
+    for begin in [0.2, 0.6] {
+        let tracing = traced(11, &|state, torque| {
+            torque[1] += 4.0 * (state.q[1] - begin).max(0.0).powf(1.2);
+        });
+        assert_eq!(named(&tracing), [("end_stop".to_owned(), vec!["elbow".to_owned()])], "from {begin} rad");
+    }
+}
+
 /// Friction of the load is the same both ways.
 #[test]
 fn a_drive_that_is_harder_to_drive_back_has_an_efficiency_by_the_direction_of_power() {
