@@ -180,7 +180,7 @@ impl EffectKind for EndStop {
     }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         let (lower, upper) = ranges.joints[site[0]].position;
-        let shares = [0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.27, 0.35];
+        let shares = [0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3];
         let side = |side: f64, edge: f64| {
             let stops = shares.map(|share| edge - side * share * (upper - lower));
             product(&values(SIDE, [side]), &values(STOP, stops))

@@ -40,7 +40,7 @@ const SENTENCES: &[(&str, &str)] = &[
         "torque_ripple",
         "The torque of shoulder ripples by 0.559 N·m with 1.91 periods a radian over 2π (12.0 a turn).",
     ),
-    ("end_stop", "shoulder runs into something stiff at -0.600: 0.500 N·m/rad."),
+    ("end_stop", "shoulder runs into something stiff at -0.400: 0.500 N·m/rad."),
     (
         "transmission_coupling",
         "shoulder and elbow share a transmission: 0.500 N·m·s/rad of viscous friction of the first on the second, 0.250 N·m of Coulomb friction of the first on the second.",

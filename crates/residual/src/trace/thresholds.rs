@@ -32,10 +32,10 @@ pub struct Thresholds {
     /// RMS of what an effect takes over the RMS of its torque, at least, to have a name. Half of it is as
     /// good as nothing ([`Self::negligible_share`]).
     pub least_size: f64,
-    /// Share of a torque (RMS) that is seen by itself: what an effect is, beyond what others of its signal that
-    /// were found could do, where the other parameters have taken up most of it, to have a name; what is left of a right model by filters and encoders at most;
-    /// and what an effect must take not to be asked whether other constants of the other effects could do its
-    /// work.
+    /// Share of a torque (RMS) that is seen by itself: what an effect is, beyond what others of its signal
+    /// that were found could do, where the other parameters have taken up most of it, to have a name; what
+    /// is left of a right model by filters and encoders at most; and what an effect must take not to be
+    /// asked whether other constants of the other effects could do its work.
     pub least_visible: f64,
     /// Factor between two errors (RMS) up to which they are the same: between a residual and the noise floor,
     /// between one and what a held model left when it was identified, and between the errors on motion held

@@ -104,9 +104,9 @@ fn a_stop_that_stiffens_is_a_stop_and_no_map() {
     assert_eq!(named(&tracing), [("end_stop".to_owned(), vec!["elbow".to_owned()])]);
 }
 
-/// A spring and a balancer that cancel each other mended what a long soft stop is not in the catalogue's form,
-/// and both had names beside it; where the stop began beyond the fifth of the range that was looked through,
-/// they had its name.
+/// A spring and a balancer that cancel each other mended what a long soft stop is not in the catalogue's
+/// form, and both had names beside it; where the stop began beyond the fifth of the range that was looked
+/// through, they had its name.
 #[test]
 fn a_long_soft_stop_is_neither_a_spring_nor_a_balancer() {
     for begin in [0.2, 0.6] {
