@@ -48,7 +48,9 @@ pub fn warnings(found: &Bandwidth) -> Vec<String> {
     {
         let better = significant(better_hz, 3);
         warnings.push(format!(
-            "a fit with columns and torque low-passed at {better} Hz foretells training motion left out better than the one at {own} Hz: it saves {} ± {} % of the error's variance in the same band; compare with --parallel-cutoff-hz {better}",
+            "a fit with columns and torque low-passed at {better} Hz foretells training motion left out \
+             better than the one at {own} Hz: it saves {} ± {} % of the error's variance in the same \
+             band; compare with --parallel-cutoff-hz {better}",
             percent(rung.comparison.saving),
             percent(rung.comparison.standard_error)
         ));
@@ -61,7 +63,9 @@ pub fn warnings(found: &Bandwidth) -> Vec<String> {
             more => format!(", {more} others too"),
         };
         warnings.push(format!(
-            "the answer depends on the cut-off: {} moves by {} of its standard deviations if columns and torque are low-passed at {other} Hz and not at {own} Hz{more}; compare with --parallel-cutoff-hz {other}",
+            "the answer depends on the cut-off: {} moves by {} of its standard deviations if columns and \
+             torque are low-passed at {other} Hz and not at {own} Hz{more}; compare with \
+             --parallel-cutoff-hz {other}",
             most.name,
             significant(most.deviations, 2)
         ));
@@ -76,7 +80,8 @@ pub fn in_words(found: &Bandwidth) -> String {
     };
     let rungs: Vec<String> = found.rungs.iter().map(rung).collect();
     format!(
-        "error on training motion left out, of fits at other cut-offs (with viscous and Coulomb friction and offset of all joints), all in the band of {} Hz: {}",
+        "error on training motion left out, of fits at other cut-offs (with viscous and Coulomb friction \
+         and offset of all joints), all in the band of {} Hz: {}",
         significant(found.reference_hz, 3),
         rungs.join(", ")
     )

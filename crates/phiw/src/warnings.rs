@@ -30,13 +30,17 @@ pub fn all(session: &Session, identified: &Identified) -> Vec<String> {
     warnings.extend(crate::check::warnings(&session.tree, logs.surveys()));
     if identified.fit.standard_deviations.iter().all(|std| std.is_nan()) {
         warnings.push(
-            "standard deviations could not be estimated: without one twelfth of the training motion some parameter is not determined at all; record more motion"
+            "standard deviations could not be estimated: without one twelfth of the training motion some \
+             parameter is not determined at all; record more motion"
                 .to_owned(),
         );
     }
     if identified.fit.is_drawn {
         warnings.push(
-            "the training motion tells some parameters too poorly: left out, a stretch of it was foretold worse than by no model at all, and all parameters are drawn to nothing, as much as foretells such stretches best; move several joints together in training, or record more motion"
+            "the training motion tells some parameters too poorly: left out, a stretch of it was \
+             foretold worse than by no model at all, and all parameters are drawn to nothing, as much as \
+             foretells such stretches best; move several joints together in training, or record more \
+             motion"
                 .to_owned(),
         );
     }
@@ -56,7 +60,9 @@ fn worse_than_none(session: &Session, identified: &Identified) -> Option<String>
         .collect();
     (!joints.is_empty()).then(|| {
         format!(
-            "on the motion held out the model is worse than none (error: {}): that motion asks for parameters that the training motion does not tell; move each joint more often in training, and several together",
+            "on the motion held out the model is worse than none (error: {}): that motion asks for \
+             parameters that the training motion does not tell; move each joint more often in training, \
+             and several together",
             joints.join(", ")
         )
     })

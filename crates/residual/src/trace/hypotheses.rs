@@ -8,7 +8,7 @@ use phiw_identification::{Effect, EffectSpec, IdentificationError};
 
 /// A kind on a site, with the constants to choose from.
 pub(super) struct Candidate {
-    /// [`number_of`] it.
+    /// Its number, see [`number_of`].
     pub kind: usize,
     /// Whether the kind acts on each joint by itself.
     pub familiar: bool,
