@@ -1,5 +1,6 @@
 //! Friction that depends on the velocity alone, or on the load.
 
+use crate::bristles::{Bristles, DEFLECTION, bristles_near, with_bristles};
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{
@@ -45,7 +46,7 @@ impl EffectKind for Viscous {
     }
 }
 
-/// fc·sign(q̇).
+/// fc·sign(q̇), where the sign turns over a speed, or over a way.
 pub struct Coulomb;
 
 impl EffectKind for Coulomb {
@@ -56,7 +57,10 @@ impl EffectKind for Coulomb {
         sign_widths(site[0], ranges)
     }
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
-        signs_near(found, step)
+        signs_near(found, step).into_iter().chain(bristles_near(found, step)).collect()
+    }
+    fn turned_over_a_way(&self, found: &Constants) -> Option<Constants> {
+        Some(with_bristles(found))
     }
     fn may_change(&self) -> bool {
         true
@@ -74,14 +78,15 @@ impl EffectKind for Coulomb {
         &[VISCOUS]
     }
     fn constants_of_the_site(&self) -> &'static [&'static str] {
-        &[WIDTH, POWER]
+        &[WIDTH, POWER, DEFLECTION]
     }
     fn dissipates(&self) -> bool {
         true
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, sign) = (site[0], Sign::of(constants));
-        let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = sign.at(sample.qd()[joint]);
+        let steady = move |sample: &Sample<'_>| sign.at(sample.qd()[joint]);
+        let columns = Bristles { joint, deflection: constant(constants, DEFLECTION, 0.0), steady };
         let parameters = [("fc", ParameterKind::Torque, 0.0)];
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
     }
@@ -207,7 +212,11 @@ impl EffectKind for Stribeck {
         let mut near = around(found, STRIBECK_VELOCITY, step);
         near.extend(around(found, WIDTH, step));
         near.extend(around(found, EXPONENT, step));
+        near.extend(bristles_near(found, step));
         near
+    }
+    fn turned_over_a_way(&self, found: &Constants) -> Option<Constants> {
+        Some(with_bristles(found))
     }
     fn telling_motion(&self) -> &'static str {
         "a slow motion, well below the speed at which friction is lowest"
@@ -246,7 +255,7 @@ impl EffectKind for Stribeck {
         let (joint, sign) = (site[0], Sign::of(constants));
         let speed = constant(constants, STRIBECK_VELOCITY, STRIBECK_DEFAULTS.0);
         let exponent = constant(constants, EXPONENT, STRIBECK_DEFAULTS.1);
-        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+        let steady = move |sample: &Sample<'_>| {
             let velocity = sample.qd()[joint];
             let relative = (velocity / speed).abs();
             let power = if exponent == 1.0 {
@@ -257,8 +266,9 @@ impl EffectKind for Stribeck {
                 relative.powf(exponent)
             };
             // Far above the Stribeck velocity the exponential is below the last digit of one.
-            out[0] = if power > 40.0 { 0.0 } else { (-power).exp() * sign.at(velocity) };
+            if power > 40.0 { 0.0 } else { (-power).exp() * sign.at(velocity) }
         };
+        let columns = Bristles { joint, deflection: constant(constants, DEFLECTION, 0.0), steady };
         let parameters = [("fs", ParameterKind::Torque, 0.0)];
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
     }
@@ -275,7 +285,10 @@ impl EffectKind for LoadDependent {
         few_sign_widths(site[0], ranges)
     }
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
-        around(found, WIDTH, step)
+        around(found, WIDTH, step).into_iter().chain(bristles_near(found, step)).collect()
+    }
+    fn turned_over_a_way(&self, found: &Constants) -> Option<Constants> {
+        Some(with_bristles(found))
     }
     fn telling_motion(&self) -> &'static str {
         "the same motion with the arm stretched out and folded, or with a load"
@@ -299,10 +312,11 @@ impl EffectKind for LoadDependent {
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, sign) = (site[0], Sign::of(constants));
-        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+        let steady = move |sample: &Sample<'_>| {
             let load = sample.reference_torque().get(joint).copied().unwrap_or_default();
-            out[0] = load.abs() * sign.at(sample.qd()[joint]);
+            load.abs() * sign.at(sample.qd()[joint])
         };
+        let columns = Bristles { joint, deflection: constant(constants, DEFLECTION, 0.0), steady };
         let parameters = [("mu", ParameterKind::Ratio, 0.0)];
         let needs = Needs { torque: true, ..Needs::default() };
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns).needing(needs))

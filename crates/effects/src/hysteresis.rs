@@ -27,6 +27,9 @@ impl EffectKind for Hysteresis {
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
         around(found, PRESLIDING, step)
     }
+    fn mends_turning(&self) -> bool {
+        true
+    }
     fn telling_motion(&self) -> &'static str {
         "small slow strokes of growing size about one position"
     }

@@ -112,6 +112,18 @@ pub trait EffectKind: Send + Sync {
         &[]
     }
 
+    /// The constants of a dry friction that turns over a way at a reversal and not over a speed, as bristles
+    /// do; `None` for what does not turn.
+    fn turned_over_a_way(&self, _found: &Constants) -> Option<Constants> {
+        None
+    }
+
+    /// Whether it mends what a friction of its joint does at a reversal where that turns in another way than
+    /// the model has it.
+    fn mends_turning(&self) -> bool {
+        false
+    }
+
     /// The property of a joint that holds its only parameter, in a URDF or a simulator; none if neither can
     /// express it.
     fn joint_property(&self) -> Option<JointProperty> {

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod bristles;
 mod catalogue;
 mod columns;
 mod coupling;

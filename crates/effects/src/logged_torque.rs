@@ -27,6 +27,9 @@ impl EffectKind for TimeDelay {
     fn acts_on(&self) -> &'static str {
         EACH_OR_ALL
     }
+    fn mends_turning(&self) -> bool {
+        true
+    }
     fn telling_motion(&self) -> &'static str {
         QUICK_REVERSALS
     }

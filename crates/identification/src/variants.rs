@@ -51,15 +51,17 @@ pub(crate) fn choose(
             let with = |variant: usize| {
                 let mut trial = chosen.clone();
                 trial[slot] = variant;
-                Columns::new(columns(&trial, Some(slot)), design.effect_parameters(variant))
+                Columns::new(columns(&trial, Some(slot)), design, variant)
             };
             let rest = Rest::new(design, factors, &solution, &with(chosen[slot]), variants.clone())?;
-            let merits: Result<Vec<f64>, RegressorError> = variants
-                .clone()
-                .into_par_iter()
-                .map(|variant| rest.log_error(factors, &with(variant)))
-                .collect();
+            let merits: Result<Vec<Merit>, RegressorError> =
+                variants.clone().into_par_iter().map(|variant| rest.merit(factors, &with(variant))).collect();
             let merits = merits?;
+            let any_possible = merits.iter().any(|merit| merit.is_possible);
+            let merits: Vec<f64> = merits
+                .into_iter()
+                .map(|merit| if any_possible && !merit.is_possible { f64::INFINITY } else { merit.log_error })
+                .collect();
             let best = merits.iter().copied().fold(f64::INFINITY, f64::min);
             let margin = 0.5 * rest.own_rows(factors) * WORTH_A_VARIANT;
             let simplest = merits.iter().position(|merit| *merit <= best + margin).unwrap_or_default();
@@ -147,13 +149,31 @@ struct Columns {
     kept: Vec<usize>,
     /// Places of the variant's columns in `kept`.
     variant: Range<usize>,
+    /// What the parameters of these columns can be.
+    bounds: Vec<(f64, f64)>,
 }
 
 impl Columns {
-    fn new(kept: Vec<usize>, parameters: Range<usize>) -> Self {
+    fn new(kept: Vec<usize>, design: &Design, effect: usize) -> Self {
+        let parameters = design.effect_parameters(effect);
         let first = kept.iter().position(|column| *column == parameters.start).unwrap_or(kept.len());
-        Columns { kept, variant: first..first + parameters.len() }
+        let bounds = design.effects()[effect].parameters().iter().map(|parameter| parameter.bounds).collect();
+        Columns { kept, variant: first..first + parameters.len(), bounds }
     }
+
+    /// Whether the variant's parameters are what they can be: a stop at the other end of the range, that
+    /// pulls, is no stop.
+    fn are_possible(&self, solution: &[f64]) -> bool {
+        let mut own = self.variant.clone().zip(&self.bounds);
+        own.all(|(column, &(low, high))| (low..=high).contains(&solution[column]))
+    }
+}
+
+/// What a variant is worth.
+struct Merit {
+    /// Σ rows·log(RMSE).
+    log_error: f64,
+    is_possible: bool,
 }
 
 /// The torques that no variant of a slot acts on, merged once for all of them.
@@ -176,7 +196,7 @@ impl Rest {
         let entries = variants.flat_map(|effect| design.effects()[effect].entries());
         let own: BTreeSet<usize> = entries.map(|entry| entry.row).collect();
         let weights: Vec<f64> = solution.group_std.iter().map(|std| 1.0 / std).collect();
-        let Columns { kept, variant } = columns;
+        let Columns { kept, variant, .. } = columns;
         let shared: Vec<usize> = [&kept[..variant.start], &kept[variant.end..]].concat();
         let selected = factors.select(&shared)?;
         let rows: Vec<usize> = (0..selected.groups().len()).filter(|row| !own.contains(row)).collect();
@@ -205,9 +225,9 @@ impl Rest {
         self.own.iter().map(|&row| factors.groups()[row].factor.rows() as f64).sum()
     }
 
-    /// Σ rows·log(RMSE) of the fit with these columns.
-    fn log_error(&self, factors: &GroupedFactor, columns: &Columns) -> Result<f64, RegressorError> {
-        let Columns { kept, variant } = columns;
+    /// What the fit with these columns leaves.
+    fn merit(&self, factors: &GroupedFactor, columns: &Columns) -> Result<Merit, RegressorError> {
+        let Columns { kept, variant, .. } = columns;
         let mut builder = FactorBuilder::new(kept.len() + 1);
         let of_others: Vec<usize> = (0..variant.start).chain(variant.end..kept.len()).collect();
         let with_torque: Vec<usize> = of_others.iter().copied().chain([kept.len()]).collect();
@@ -228,22 +248,7 @@ impl Rest {
             targets.push(kept.len());
             builder.push_factor(&factor, &targets, self.weights[row])?;
         }
-        let solution = match builder.factor().solve() {
-            Ok(solution) => solution.parameters,
-            Err(RegressorError::RankDeficient { undetermined, .. }) => {
-                let determined: Vec<usize> =
-                    (0..kept.len()).filter(|column| !undetermined.contains(column)).collect();
-                let named: Vec<usize> = determined.iter().copied().chain([kept.len()]).collect();
-                let part = builder.factor().select(&named)?.solve()?;
-                let mut parameters = vec![0.0; kept.len()];
-                determined
-                    .iter()
-                    .zip(part.parameters)
-                    .for_each(|(&column, value)| parameters[column] = value);
-                parameters
-            }
-            Err(error) => return Err(error),
-        };
+        let solution = solve(&builder.factor())?;
         let of_others: Vec<f64> = of_others.iter().map(|&column| solution[column]).collect();
         let others = self.others.residual_sum_of_squares(&of_others)?;
         let mut total = 0.5 * self.others.rows() as f64 * others.max(f64::MIN_POSITIVE).ln();
@@ -252,6 +257,22 @@ impl Rest {
             let squares = factor.residual_sum_of_squares(&parameters)?;
             total += 0.5 * factor.rows() as f64 * squares.max(f64::MIN_POSITIVE).ln();
         }
-        Ok(total)
+        Ok(Merit { log_error: total, is_possible: columns.are_possible(&solution) })
     }
+}
+
+/// The parameters of a factor; those that the rows do not determine are zero.
+fn solve(factor: &Factor) -> Result<Vec<f64>, RegressorError> {
+    let undetermined = match factor.solve() {
+        Ok(solution) => return Ok(solution.parameters),
+        Err(RegressorError::RankDeficient { undetermined, .. }) => undetermined,
+        Err(error) => return Err(error),
+    };
+    let all = 0..factor.parameters();
+    let determined: Vec<usize> = all.filter(|column| !undetermined.contains(column)).collect();
+    let named: Vec<usize> = determined.iter().copied().chain([factor.parameters()]).collect();
+    let part = factor.select(&named)?.solve()?;
+    let mut parameters = vec![0.0; factor.parameters()];
+    determined.iter().zip(part.parameters).for_each(|(&column, value)| parameters[column] = value);
+    Ok(parameters)
 }

@@ -166,7 +166,7 @@ impl Search<'_> {
             })
     }
 
-    fn is_within_bounds(&self, fit: &Fit, member: &Member) -> bool {
+    pub(super) fn is_within_bounds(&self, fit: &Fit, member: &Member) -> bool {
         let variant = self.problem.variant(*member);
         let determined = |parameter: usize| fit.place[parameter].is_some_and(|place| fit.determined[place]);
         let within = |(&parameter, (low, high)): (&usize, &(f64, f64))| {

@@ -296,7 +296,15 @@ impl<'a> Search<'a> {
 
     /// The best model with something else in the place of a member, if the criterion is smaller with it.
     fn better_in_place_of(&self, place: usize) -> Option<Model> {
-        let best = self.in_place_of(place).into_iter().find(|(model, _)| model.settled);
+        let member = self.model.members[place];
+        // What is declared stays in the model with constants at which it can be: a stop where it pushes.
+        let is_within = |fit: &Fit, member: &Member| self.is_within_bounds(fit, member);
+        let stays_possible = self.is_declared(&member) && is_within(&self.model.fit, &member);
+        let may_enter = |model: &Model, entering: &[Member]| {
+            !stays_possible || entering.iter().all(|entering| is_within(&model.fit, entering))
+        };
+        let mut models = self.in_place_of(place).into_iter();
+        let best = models.find(|(model, entering)| model.settled && may_enter(model, entering));
         let (model, entering) = best.filter(|(model, _)| model.value < self.model.value - LEAST_STEP)?;
         match entering.len() {
             1 => Some(model),

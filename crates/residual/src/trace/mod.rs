@@ -30,6 +30,7 @@ mod textbook;
 mod thresholds;
 mod tracing;
 mod trial;
+mod turning;
 mod verdict;
 
 pub use floor::{noise_floor, noise_floor_at, poses};

@@ -150,7 +150,7 @@ impl Search<'_> {
             self.choose()?;
             self.refine()?;
             self.leave_out_what_is_not_realised()?;
-            if self.names() == before && !self.contest()? {
+            if self.names() == before && !self.turn_over_a_way()? && !self.contest()? {
                 break;
             }
         }
@@ -282,7 +282,7 @@ impl Search<'_> {
     }
 
     /// The criterion of the model as it is, with these effective rows of each torque.
-    fn value(&self, rows: &[f64]) -> Result<f64, IdentificationError> {
+    pub(super) fn value(&self, rows: &[f64]) -> Result<f64, IdentificationError> {
         let mut candidates =
             Candidates::of_model(self.fixed, Present { specs: &self.specs, declared: self.declared });
         let stage = self.pass(Vec::new(), Keep::No)?;

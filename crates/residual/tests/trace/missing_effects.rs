@@ -67,6 +67,42 @@ fn a_sign_that_turns_slowly_is_no_stribeck_friction() {
     assert_eq!(powers, [Some(&1.0), Some(&1.0)]);
 }
 
+/// Friction that turns over a tenth of a milliradian was named a hysteresis, and the Coulomb friction that was
+/// declared was refuted beside it: bristles bend before they slip, and that is how a sign turns.
+#[test]
+fn bristles_are_no_hysteresis() {
+    let none: &[(&str, &[&str])] = &[];
+    for (stribeck, expected) in [(0.0, none), (2.0, &[("stribeck_friction", &["elbow"])])] {
+        let bristles = RefCell::new((0.0, 0.0));
+        let secret = |state: &State<'_>, torque: &mut [f64]| {
+            let (mut force, before) = *bristles.borrow();
+            if state.t == 0.0 {
+                force = 0.0;
+            }
+            // LuGre's bristles in a hundred steps a sample: ż = v − |v|·z/d, of the force that they end at.
+            let way = (state.q[1] - before) / 100.0;
+            for _ in 0..100 {
+                let steady = 3.0 + stribeck * (-(state.qd[1] / 0.3).powi(2)).exp();
+                force += (steady * way - way.abs() * force) / 1e-4_f64.max(way.abs());
+            }
+            *bristles.borrow_mut() = (force, state.q[1]);
+            torque[1] += force - 0.6 * (state.qd[1] / 0.01).tanh();
+        };
+        let tracing = traced(11, &secret);
+        let expected: Vec<(String, Vec<String>)> = expected
+            .iter()
+            .map(|(kind, joints)| {
+                ((*kind).to_owned(), joints.iter().map(|&joint| joint.to_owned()).collect())
+            })
+            .collect();
+        assert_eq!(named(&tracing), expected, "{stribeck} N·m");
+        let deflected = tracing.specs.iter().filter(|spec| spec.joints == ["elbow"]).any(|spec| {
+            spec.constants.get("bristle_deflection").is_some_and(|way| (3e-5..=3e-4).contains(way))
+        });
+        assert!(deflected, "{:?}", tracing.specs);
+    }
+}
+
 #[test]
 fn a_ripple_is_named_with_its_frequency() {
     let ripple = |state: &State<'_>, torque: &mut [f64]| torque[0] += 0.4 * (9.0 * state.q[0] + 0.3).sin();

@@ -1,0 +1,142 @@
+//! Dry friction that turns over a way, as that of bristles that bend before they slip.
+
+use crate::columns::Formula;
+use crate::kind::{Constants, around, product, values};
+use crate::sign::{POWER, WIDTH};
+use phiw_identification::effect::Sample;
+
+/// The constant of a friction that turns over a way instead of over a speed: the way \[rad, m\].
+pub(crate) const DEFLECTION: &str = "bristle_deflection";
+/// Ways that are tried. A longer one is a hysteresis, which has a name of its own.
+const DEFLECTIONS: [f64; 5] = [1e-5, 3e-5, 1e-4, 3e-4, 1e-3];
+
+/// A friction whose steady state is `steady`, and which lags behind it over the way of its joint: the force
+/// of LuGre's bristles without micro-damping (Canudas de Wit et al. 1995), of one whose steady state does not
+/// change on the way.
+pub(crate) struct Bristles<F> {
+    pub joint: usize,
+    /// The way over which the force turns \[rad, m\]; zero where it turns at once.
+    pub deflection: f64,
+    pub steady: F,
+}
+
+impl<F: Fn(&Sample<'_>) -> f64 + Send + Sync> Formula for Bristles<F> {
+    type Memory = Option<Turning>;
+
+    fn columns(&self, memory: &mut Self::Memory, sample: &Sample<'_>, columns: &mut [f64]) {
+        columns[0] = (self.steady)(sample);
+        if self.deflection > 0.0 {
+            let now = Turning {
+                force: columns[0],
+                steady: columns[0],
+                position: sample.q()[self.joint],
+                velocity: sample.qd()[self.joint],
+            };
+            // The motion before the log is unknown: the first force is the steady one.
+            let before = memory.unwrap_or(now);
+            columns[0] = before.followed_by(&now, sample.period(), self.deflection);
+            *memory = Some(Turning { force: columns[0], ..now });
+        }
+    }
+}
+
+/// A friction on its way to its steady state, and where the joint is.
+#[derive(Clone, Copy)]
+pub(crate) struct Turning {
+    force: f64,
+    steady: f64,
+    position: f64,
+    velocity: f64,
+}
+
+impl Turning {
+    /// The force after the way to where the joint is `now`, `period` \[s\] later: the exact solution of
+    /// `deflection`·dF/d|q| = steady − F, where the velocity changes its sign at the time that it is zero
+    /// between the two.
+    fn followed_by(&self, now: &Self, period: f64, deflection: f64) -> f64 {
+        let toward =
+            |force: f64, steady: f64, way: f64| steady + (force - steady) * (-way / deflection).exp();
+        if self.velocity * now.velocity >= 0.0 {
+            return toward(self.force, now.steady, (now.position - self.position).abs());
+        }
+        let (before, after) = (self.velocity.abs(), now.velocity.abs());
+        let [forth, back] = [before, after].map(|speed| 0.5 * period * speed * speed / (before + after));
+        toward(toward(self.force, self.steady, forth), now.steady, back)
+    }
+}
+
+/// The constants of a friction with bristles instead of a sign that turns over a speed.
+pub(crate) fn with_bristles(found: &Constants) -> Constants {
+    let mut with = found.clone();
+    with.insert(WIDTH.to_owned(), 0.0);
+    with.remove(POWER);
+    with.insert(DEFLECTION.to_owned(), DEFLECTIONS[DEFLECTIONS.len() / 2]);
+    with
+}
+
+/// Other ways near the one of a friction with bristles; at first also those of other sizes.
+pub(crate) fn bristles_near(found: &Constants, step: usize) -> Vec<Constants> {
+    let mut near = around(found, DEFLECTION, step);
+    if step == 0 && found.contains_key(DEFLECTION) {
+        near.extend(product(std::slice::from_ref(found), &values(DEFLECTION, DEFLECTIONS)));
+    }
+    near.retain(|near| near[DEFLECTION] <= DEFLECTIONS[DEFLECTIONS.len() - 1]);
+    near
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{DEFLECTION, DEFLECTIONS, Turning, bristles_near, with_bristles};
+    use crate::kind::Constants;
+    use crate::sign::{POWER, WIDTH};
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn a_column_of_bristles_is_lugre_integrated(
+            deflection in 3e-5..1e-2f64,
+            omega in 3.0..12.0f64,
+            amplitude in 0.2..0.8f64,
+            period in 1e-3..5e-3f64,
+        ) {
+            const STEPS: usize = 2000;
+            // Away from a reversal at t = 0, with one between rows.
+            let position = |t: f64| -amplitude * (omega * t + 0.4).cos();
+            let velocity = |t: f64| amplitude * omega * (omega * t + 0.4).sin();
+            let turning = |t: f64, force: f64| {
+                let velocity = velocity(t);
+                Turning { force, steady: velocity.signum(), position: position(t), velocity }
+            };
+            // LuGre's ż = v − |v|·z over `deflection`, by the implicit midpoint rule.
+            let (mut z, mut before) = (1.0, position(0.0));
+            let mut state = turning(0.0, 1.0);
+            for row in 1..1000_usize {
+                for step in 1..=STEPS {
+                    let now = position(((row - 1) as f64 + step as f64 / STEPS as f64) * period);
+                    let way = (now - before) / deflection;
+                    z = (z * (1.0 - 0.5 * way.abs()) + way) / (1.0 + 0.5 * way.abs());
+                    before = now;
+                }
+                let t = row as f64 * period;
+                let now = turning(t, 0.0);
+                state = Turning { force: state.followed_by(&now, period, deflection), ..now };
+                prop_assert!((state.force - z).abs() < 0.01, "row {row}: {} and {z}", state.force);
+            }
+        }
+    }
+
+    #[test]
+    fn bristles_take_the_place_of_a_speed_and_stay_below_a_hysteresis() {
+        let smooth = Constants::from([(WIDTH.to_owned(), 0.02), (POWER.to_owned(), 2.0)]);
+        assert!(bristles_near(&smooth, 0).is_empty());
+        let mut found = with_bristles(&smooth);
+        assert!(found[WIDTH] == 0.0 && !found.contains_key(POWER));
+        for _ in 0..20 {
+            let near = bristles_near(&found, 0);
+            assert!(near.iter().all(|near| near[DEFLECTION] <= DEFLECTIONS[4] && near[WIDTH] == 0.0));
+            found = near.into_iter().max_by(|a, b| a[DEFLECTION].total_cmp(&b[DEFLECTION])).unwrap();
+        }
+        assert_eq!(found[DEFLECTION], DEFLECTIONS[4]);
+    }
+}
