@@ -1,11 +1,16 @@
 //! Friction that turns over a way, in the place of what mended how it turned.
 
 use super::search::Search;
-use phiw_identification::IdentificationError;
+use phiw_effects::Constants;
+use phiw_identification::{EffectSpec, IdentificationError};
+
+/// How much larger the criterion is to be without a form of a friction beside one that turns over a way:
+/// about what a name takes (five standard deviations of one parameter are 12).
+const A_FORM_IS_WORTH: f64 = 10.0;
 
 impl Search<'_> {
     /// Lets the frictions of a joint turn over a way, as bristles do, in the place of a hysteresis or a delay of
-    /// that joint, where the criterion is then smaller. Whether any do.
+    /// that joint, where the criterion is then smaller, or little larger without a hysteresis. Whether any do.
     ///
     /// Constants are refined one effect after the other, and each is best as it is beside what mends it.
     pub(super) fn turn_over_a_way(&mut self) -> Result<bool, IdentificationError> {
@@ -18,33 +23,54 @@ impl Search<'_> {
                 continue;
             }
             let mut branch = self.clone();
-            let mut turn = 0;
             for other in 0..self.specs.len() {
                 let spec = &mut branch.specs[other];
-                if spec.joints != joints || self.is_held(other) {
-                    continue;
-                }
-                if let Some(turned) = catalogue.kind(&spec.kind)?.turned_over_a_way(&spec.constants) {
+                let is_open = spec.joints == joints && !self.is_held(other);
+                if let Some(turned) = catalogue.kind(&spec.kind)?.turned_over_a_way(&spec.constants)
+                    && is_open
+                {
                     spec.constants = turned;
-                    turn += 1;
                 }
             }
-            if turn == 0 {
-                continue;
+            let simpler = self.simpler_that_turns(place)?;
+            let turns = branch.specs != self.specs;
+            match simpler {
+                Some(simpler) => branch.replace(place, simpler)?,
+                None if turns => branch.remove(place)?,
+                None => continue,
             }
-            branch.remove(place)?;
             branch.refine()?;
             let value = branch.value(&branch.chosen.rows)?;
             let present = match own {
                 Some(own) => own,
                 None => *own.insert(self.value(&self.chosen.rows)?),
             };
-            if value < present {
+            // A form of a friction gives way to the friction, if that does about as much.
+            let is_a_form = !catalogue.kind(&self.specs[place].kind)?.form_of().is_empty();
+            let may_lose = if is_a_form { A_FORM_IS_WORTH } else { 0.0 };
+            if value < present + may_lose {
                 *self = branch;
                 own = Some(value);
                 any = true;
             }
         }
         Ok(any)
+    }
+
+    /// The simpler kind, turning over a way, that the effect at `place` is a form of, where the model has it on
+    /// no such joint and it may be found.
+    fn simpler_that_turns(&self, place: usize) -> Result<Option<EffectSpec>, IdentificationError> {
+        let catalogue = self.fixed.catalogue;
+        let own = &self.specs[place];
+        for &kind in catalogue.kind(&own.kind)?.form_of() {
+            let Some(constants) = catalogue.kind(kind)?.turned_over_a_way(&Constants::new()) else {
+                continue;
+            };
+            let is_this = |spec: &EffectSpec| spec.kind == kind && spec.joints == own.joints;
+            if !self.specs.iter().chain(&self.options.excluded).any(is_this) {
+                return Ok(Some(EffectSpec { kind: kind.to_owned(), joints: own.joints.clone(), constants }));
+            }
+        }
+        Ok(None)
     }
 }

@@ -103,6 +103,24 @@ fn bristles_are_no_hysteresis() {
     }
 }
 
+/// With nothing declared a hysteresis was named in the place of the friction that it was taken for.
+#[test]
+fn friction_of_bristles_is_found_with_nothing_declared() {
+    let bristles = RefCell::new((0.0_f64, 0.0));
+    let secret = |state: &State<'_>, torque: &mut [f64]| {
+        let (force, before) = *bristles.borrow();
+        let way: f64 = state.q[1] - before;
+        let steady = 2.0 * way.signum();
+        let force = steady + (force - steady) * (-way.abs() / 2e-4).exp();
+        *bristles.borrow_mut() = (force, state.q[1]);
+        torque[1] += force - 0.6 * (state.qd[1] / 0.01).tanh();
+    };
+    let tracing = traced_on(folds().0, &[], 11, &secret, false);
+    let named = named(&tracing);
+    assert!(named.contains(&("coulomb_friction".to_owned(), vec!["elbow".to_owned()])), "{named:?}");
+    assert!(!named.iter().any(|(kind, _)| kind == "hysteresis" || kind == "time_delay"), "{named:?}");
+}
+
 #[test]
 fn a_ripple_is_named_with_its_frequency() {
     let ripple = |state: &State<'_>, torque: &mut [f64]| torque[0] += 0.4 * (9.0 * state.q[0] + 0.3).sin();
