@@ -139,7 +139,6 @@ impl Search<'_> {
         self.ask_of_logs()?;
         self.prefer_simpler_forms()?;
         self.prefer_special_cases()?;
-        self.turn_over_a_way()?;
         self.take_back()?;
         Ok(self)
     }
