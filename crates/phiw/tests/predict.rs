@@ -120,8 +120,8 @@ fn same_errors(scene: &Scene, validate: &str, tolerance: f64) {
         ..PredictArguments::default()
     };
     let outcome = predict(&arguments, &Console::silent()).unwrap();
-    // A drift counts the session's time: in the report the log comes after the training logs, and by itself it
-    // is a session of its own.
+    // A drift counts the session's time: in the report the log comes after the training logs, and by itself
+    // it is a session of its own.
     let mut effects = report.effects.iter().chain(&report.refinements);
     if effects.any(|effect| effect.kind == "thermal_drift") {
         println!("not compared: the model of {validate} has a drift over the session");

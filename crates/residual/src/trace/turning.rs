@@ -9,8 +9,9 @@ use phiw_identification::{EffectSpec, IdentificationError};
 const A_FORM_IS_WORTH: f64 = 10.0;
 
 impl Search<'_> {
-    /// Lets the frictions of a joint turn over a way, as bristles do, in the place of a hysteresis or a delay of
-    /// that joint, where the criterion is then smaller, or little larger without a hysteresis. Whether any do.
+    /// Lets the frictions of a joint turn over a way, as bristles do, in the place of a hysteresis or a delay
+    /// of that joint, where the criterion is then smaller, or little larger without a hysteresis. Whether any
+    /// do.
     ///
     /// Constants are refined one effect after the other, and each is best as it is beside what mends it.
     pub(super) fn turn_over_a_way(&mut self) -> Result<bool, IdentificationError> {
@@ -57,8 +58,8 @@ impl Search<'_> {
         Ok(any)
     }
 
-    /// The simpler kind, turning over a way, that the effect at `place` is a form of, where the model has it on
-    /// no such joint and it may be found.
+    /// The simpler kind, turning over a way, that the effect at `place` is a form of, where the model does not
+    /// have it on that joint and it may be found.
     fn simpler_that_turns(&self, place: usize) -> Result<Option<EffectSpec>, IdentificationError> {
         let catalogue = self.fixed.catalogue;
         let own = &self.specs[place];

@@ -67,8 +67,8 @@ fn a_sign_that_turns_slowly_is_no_stribeck_friction() {
     assert_eq!(powers, [Some(&1.0), Some(&1.0)]);
 }
 
-/// Friction that turns over a tenth of a milliradian was named a hysteresis, and the Coulomb friction that was
-/// declared was refuted beside it: bristles bend before they slip, and that is how a sign turns.
+/// Friction that turns over a tenth of a milliradian was named a hysteresis, and the Coulomb friction that
+/// was declared was refuted beside it: bristles bend before they slip, and that is how a sign turns.
 #[test]
 fn bristles_are_no_hysteresis() {
     let none: &[(&str, &[&str])] = &[];
