@@ -58,8 +58,8 @@ impl Search<'_> {
         Ok(any)
     }
 
-    /// The simpler kind, turning over a way, that the effect at `place` is a form of, where the model does not
-    /// have it on that joint and it may be found.
+    /// The simpler kind, turning over a way, that the effect at `place` is a form of, where the model does
+    /// not have it on that joint and it may be found.
     fn simpler_that_turns(&self, place: usize) -> Result<Option<EffectSpec>, IdentificationError> {
         let catalogue = self.fixed.catalogue;
         let own = &self.specs[place];
