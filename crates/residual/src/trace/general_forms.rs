@@ -22,7 +22,6 @@ impl Search<'_> {
             without.remove(place)?;
             without.choose()?;
             without.refine()?;
-            without.turn_over_a_way()?;
             if without.numbers()? <= self.numbers()? && self.is_done_by(place, &without)? {
                 let Search { specs, parameters, chosen, .. } = without;
                 (self.specs, self.parameters, self.chosen) = (specs, parameters, chosen);

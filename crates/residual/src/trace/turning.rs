@@ -4,14 +4,14 @@ use super::search::Search;
 use phiw_effects::Constants;
 use phiw_identification::{EffectSpec, IdentificationError};
 
-/// How much larger the criterion is to be without a form of a friction beside one that turns over a way:
+/// How much larger the criterion is to be with a friction that turns over a way in the place of a form of it:
 /// about what a name takes (five standard deviations of one parameter are 12).
 const A_FORM_IS_WORTH: f64 = 10.0;
 
 impl Search<'_> {
     /// Lets the frictions of a joint turn over a way, as bristles do, in the place of a hysteresis or a delay
-    /// of that joint, where the criterion is then smaller, or little larger without a hysteresis. Whether any
-    /// do.
+    /// of that joint, where the criterion is then smaller, or little larger with a friction in the place of a
+    /// hysteresis. Whether any do.
     ///
     /// Constants are refined one effect after the other, and each is best as it is beside what mends it.
     pub(super) fn turn_over_a_way(&mut self) -> Result<bool, IdentificationError> {
@@ -34,11 +34,15 @@ impl Search<'_> {
                 }
             }
             let simpler = self.simpler_that_turns(place)?;
-            let turns = branch.specs != self.specs;
-            match simpler {
-                Some(simpler) => branch.replace(place, simpler)?,
-                None if turns => branch.remove(place)?,
-                None => continue,
+            // A form of a friction gives way to the friction, if that does about as much.
+            let mut may_lose = 0.0;
+            if let Some(simpler) = simpler {
+                branch.replace(place, simpler)?;
+                may_lose = A_FORM_IS_WORTH;
+            } else if branch.specs != self.specs {
+                branch.remove(place)?;
+            } else {
+                continue;
             }
             branch.refine()?;
             let value = branch.value(&branch.chosen.rows)?;
@@ -46,9 +50,6 @@ impl Search<'_> {
                 Some(own) => own,
                 None => *own.insert(self.value(&self.chosen.rows)?),
             };
-            // A form of a friction gives way to the friction, if that does about as much.
-            let is_a_form = !catalogue.kind(&self.specs[place].kind)?.form_of().is_empty();
-            let may_lose = if is_a_form { A_FORM_IS_WORTH } else { 0.0 };
             if value < present + may_lose {
                 *self = branch;
                 own = Some(value);
