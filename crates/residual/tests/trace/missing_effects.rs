@@ -76,9 +76,6 @@ fn bristles_are_no_hysteresis() {
         let bristles = RefCell::new((0.0, 0.0));
         let secret = |state: &State<'_>, torque: &mut [f64]| {
             let (mut force, before) = *bristles.borrow();
-            if state.t == 0.0 {
-                force = 0.0;
-            }
             // LuGre's bristles in a hundred steps a sample: ż = v − |v|·z/d, of the force that they end at.
             let way = (state.q[1] - before) / 100.0;
             for _ in 0..100 {
