@@ -25,6 +25,7 @@ mod residuals;
 mod sample;
 mod scanned;
 mod search;
+mod special_cases;
 mod stage;
 mod textbook;
 mod thresholds;

@@ -84,7 +84,8 @@ impl Search<'_> {
             let hypothesis = &trial.problem.hypotheses[member.hypothesis];
             !hypothesis.declared && !hypothesis.requires.is_empty()
         };
-        let forms = trial.members.iter().zip(&trial.places).filter(|(member, _)| is_form(member));
+        let forms = trial.members.iter().zip(&trial.places);
+        let forms = forms.filter(|(member, place)| is_form(member) || self.refines_special_case(**place));
         let forms: Vec<usize> = forms.map(|(_, place)| *place).collect();
         let simpler = |place: usize| {
             let own = &self.specs[place].joints;
@@ -159,7 +160,8 @@ impl Search<'_> {
         {
             let own = &self.specs[judged.place];
             let has_constants = |spec: &EffectSpec| spec.joints == own.joints && !spec.constants.is_empty();
-            let mut others = self.specs.iter().enumerate().filter(|(place, _)| *place != judged.place);
+            let others = self.specs.iter().enumerate().filter(|(place, _)| *place != judged.place);
+            let mut others = others.filter(|(place, _)| !self.refines_special_case(*place));
             if !others.any(|(_, spec)| has_constants(spec)) || self.fixed.absent(own)?.is_some() {
                 continue;
             }
@@ -203,11 +205,14 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Whether an effect is one of the robot, and not of its log, and was not found to be uncertain.
+    /// Whether an effect is one of the robot, and not of its log, was not found to be uncertain, and does not
+    /// refine its special case.
     pub(super) fn may_have_a_name(&self, place: usize) -> bool {
         let EffectSpec { kind, joints, .. } = &self.specs[place];
         let of_the_log = self.fixed.catalogue.kind(kind).is_ok_and(EffectKind::is_of_the_log);
-        !of_the_log && !self.uncertain.iter().any(|(other, on)| other == kind && on == joints)
+        !of_the_log
+            && !self.refines_special_case(place)
+            && !self.uncertain.iter().any(|(other, on)| other == kind && on == joints)
     }
 
     /// How improbable an effect must be by chance to have a name: for all hypotheses together it is
@@ -229,7 +234,7 @@ impl Search<'_> {
             // What others are forms of is judged without these; a form beside the simpler ones only.
             let beside = match level {
                 Some(level) => simpler.get(level),
-                None if whole.is_required(&member) => simpler.first(),
+                None if whole.is_required(&member) || self.is_refined(place) => simpler.first(),
                 None => None,
             };
             let (trial, own) = match beside {

@@ -6,6 +6,7 @@ use super::input::{TraceInput, TraceOptions};
 use super::kept_columns::Keep;
 use super::residuals::ranges_of_residual;
 use super::sample::Sample;
+use super::special_cases::Refined;
 use super::stage::{Fixed, Stage, specs_and_values};
 use super::tracing::{Tracing, Withdrawn};
 use crate::selection::{Member, Policy, Problem, select, value};
@@ -47,6 +48,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         asks_of_logs: false,
         refuted: Vec::new(),
         uncertain: Vec::new(),
+        refined: Vec::new(),
         held_out_had_a_say: false,
         left_out_by_held_out: Vec::new(),
         input: &input,
@@ -102,6 +104,8 @@ pub(super) struct Search<'a> {
     pub refuted: Vec<EffectSpec>,
     /// Kinds and joints of which no parameter is certain once their constants are free: they have no name.
     pub uncertain: Vec<(String, Vec<String>)>,
+    /// Effects that gave way to their special cases and refine them.
+    pub refined: Vec<Refined>,
     /// Whether motion held out had a say.
     pub held_out_had_a_say: bool,
     /// What was left out for that.
@@ -301,6 +305,20 @@ impl Search<'_> {
             .map(|effect| effect.parameters().len())
             .sum();
         self.parameters.splice(own, vec![0.0; count]);
+        Ok(())
+    }
+
+    /// Adds an effect, with its parameters at nothing.
+    pub(super) fn add(&mut self, spec: EffectSpec) -> Result<(), IdentificationError> {
+        let count: usize = self
+            .fixed
+            .build(std::slice::from_ref(&spec))?
+            .iter()
+            .map(|effect| effect.parameters().len())
+            .sum();
+        self.specs.push(spec);
+        self.parameters.extend(std::iter::repeat_n(0.0, count));
+        self.chosen.alternatives.push(Vec::new());
         Ok(())
     }
 

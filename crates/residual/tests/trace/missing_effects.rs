@@ -145,6 +145,32 @@ fn a_cable_that_catches_is_a_position_map() {
     );
 }
 
+/// A sum of three waves was named a ripple, a balancer, an offset and a stop, which leave of it what is not
+/// worth a name and several times the noise.
+#[test]
+fn a_curve_of_three_waves_is_a_position_map_and_not_four_effects() {
+    for waves in [[(2.4, 0.1), (2.7, 1.5), (4.0, 0.1)], [(4.1, 5.2), (3.8, 3.6), (2.8, 2.9)]] {
+        let tracing = traced(11, &|state, torque| {
+            torque[1] +=
+                waves.iter().map(|(waves, phase)| 1.5 * (waves * state.q[1] + phase).sin()).sum::<f64>();
+        });
+        assert_eq!(named(&tracing), [("position_map".to_owned(), vec!["elbow".to_owned()])], "{waves:?}");
+    }
+}
+
+/// A friction that differs by direction gave way to an offset, and what it makes beyond that was in no model
+/// any more: three times the noise was left.
+#[test]
+fn what_a_friction_makes_beyond_an_offset_refines_the_model() {
+    let tracing = traced(11, &|state, torque| {
+        let forth = 0.5 + 0.5 * (state.qd[1] / 0.01).tanh();
+        torque[1] += forth * (0.8 + 0.16 * state.qd[1]);
+    });
+    let left = tracing.model.held_out.rmse[1];
+    assert!(left < 0.06, "{left} N·m left, {:?}", named(&tracing));
+    assert_eq!(tracing.verdict, Verdict::Explained);
+}
+
 /// A stop that stiffens was named a map of the position, which follows it more closely with 24 numbers than
 /// the catalogue's stop does with three.
 #[test]
