@@ -168,11 +168,18 @@ fn wave(found: &FittedEffect<'_>, place: usize, angle: Expression) -> Expression
     sine + found.value(place + 1) * angle.of(Function::Cosine)
 }
 
-/// A stiff torque that sets in near a limit: k·(q − q_stop) beyond `stop`, on the `side` +1 or −1.
+/// A stiff torque that sets in near a limit: k·d^`exponent` at the depth d = q − `stop` beyond it \[rad, m\], on
+/// the `side` +1 or −1. Without the exponent it is that of a spring, 1; rubber stiffens as it is pressed (1.5
+/// for a ball, Hertz 1881).
 pub struct EndStop;
 
 const STOP: &str = "stop";
 const SIDE: &str = "side";
+const EXPONENT: &str = "exponent";
+/// Largest exponent that is tried: what stiffens more has no place at which it begins.
+const LARGEST_EXPONENT: f64 = 2.5;
+/// Where a stop of another exponent may begin, in steps of the stop's own refinement.
+const BEGINNINGS: [f64; 7] = [-15.0, -10.0, -5.0, -2.0, 0.0, 2.0, 5.0];
 
 impl EffectKind for EndStop {
     fn name(&self) -> &str {
@@ -189,26 +196,47 @@ impl EffectKind for EndStop {
     }
     fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
         let Some(&stop) = found.get(STOP) else { return Vec::new() };
+        let exponent = constant(found, EXPONENT, 1.0);
         let spread = 0.02 * 0.5_f64.powi(step as i32);
-        [stop - spread, stop + spread]
-            .map(|value| {
-                let mut near = found.clone();
-                near.insert(STOP.to_owned(), value);
-                near
-            })
-            .to_vec()
+        let with = |stop: f64, exponent: f64| {
+            let mut near = found.clone();
+            near.insert(STOP.to_owned(), stop);
+            match exponent > 1.0 {
+                true => near.insert(EXPONENT.to_owned(), exponent),
+                false => near.remove(EXPONENT),
+            };
+            near
+        };
+        let mut near = vec![with(stop - spread, exponent), with(stop + spread, exponent)];
+        let factor = 1.5_f64.powf(0.5_f64.powi(step as i32));
+        for other in [exponent / factor, exponent * factor].map(|other| other.clamp(1.0, LARGEST_EXPONENT)) {
+            if other != exponent {
+                near.extend(BEGINNINGS.map(|steps| with(stop + steps * spread, other)));
+            }
+        }
+        near
     }
     fn telling_motion(&self) -> &'static str {
         "slow motion up to the limit and back"
     }
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         let (joint, stiffness) = (found.joints(), found.quantity(0));
-        format!("{joint} runs into something stiff at {:.3}: {stiffness}.", found.constant(STOP))
+        let exponent = constant(found.constants(), EXPONENT, 1.0);
+        let stiffens = match exponent > 1.0 {
+            true => format!(" at a depth of one, growing with the power {exponent:.2} of the depth"),
+            false => String::new(),
+        };
+        format!("{joint} runs into something stiff at {:.3}: {stiffness}{stiffens}.", found.constant(STOP))
     }
     fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
         let (stop, side) = (found.constant(STOP), constant(found.constants(), SIDE, 1.0));
         let beyond = |joint: &str| side * (Expression::position(joint) + Expression::Constant(-stop));
-        found.own_torque(|joint| (found.value(0) * side) * beyond(joint).of(Function::PositivePart))
+        let exponent = constant(found.constants(), EXPONENT, 1.0);
+        found.own_torque(|joint| {
+            let depth = beyond(joint).of(Function::PositivePart);
+            let depth = if exponent > 1.0 { depth.of(Function::Power(exponent)) } else { depth };
+            (found.value(0) * side) * depth
+        })
     }
     fn seen_against(&self) -> Signal {
         Signal::Position
@@ -216,8 +244,10 @@ impl EffectKind for EndStop {
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
         let (stop, side) = (constant(constants, STOP, 0.0), constant(constants, SIDE, 1.0));
+        let exponent = constant(constants, EXPONENT, 1.0);
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
-            out[0] = side * (side * (sample.q()[joint] - stop)).max(0.0);
+            let depth = (side * (sample.q()[joint] - stop)).max(0.0);
+            out[0] = side * if exponent == 1.0 { depth } else { depth.powf(exponent) };
         };
         let parameters = [("k", ParameterKind::Stiffness, 0.0)];
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))

@@ -10,8 +10,8 @@ impl Search<'_> {
     /// that has no more numbers, and the general form is not worth a name beside it: a stop that is not
     /// quite a spring is still a stop.
     ///
-    /// Where only several together do its work, they must make the criterion no larger: with enough of them
-    /// any curve is drawn but for what is not worth a name.
+    /// Several in its place must make the criterion no larger: with enough of them any curve is drawn but for
+    /// what is not worth a name.
     pub(super) fn prefer_simpler_forms(&mut self) -> Result<(), IdentificationError> {
         let mut asked: Vec<EffectSpec> = Vec::new();
         let mut options = self.options.clone();
@@ -23,10 +23,11 @@ impl Search<'_> {
             without.remove(place)?;
             without.choose()?;
             without.refine()?;
+            let in_its_place = without.specs.iter().filter(|spec| !self.has(spec)).count();
             let rows = &self.chosen.rows;
             if without.numbers()? <= self.numbers()?
                 && self.is_done_by(place, &without)?
-                && (without.value(rows)? <= self.value(rows)? || self.is_done_by_one_of(place, &without)?)
+                && (in_its_place <= 1 || without.value(rows)? <= self.value(rows)?)
             {
                 let Search { specs, parameters, chosen, .. } = without;
                 (self.specs, self.parameters, self.chosen) = (specs, parameters, chosen);
@@ -47,26 +48,6 @@ impl Search<'_> {
             }
         }
         Ok(None)
-    }
-
-    /// Whether one by itself of what another model has more than this one does the same.
-    fn is_done_by_one_of(&self, place: usize, other: &Search<'_>) -> Result<bool, IdentificationError> {
-        let more: Vec<usize> =
-            (other.declared..other.specs.len()).filter(|&place| !self.has(&other.specs[place])).collect();
-        if more.len() <= 1 {
-            return Ok(true);
-        }
-        for &stays in &more {
-            let mut branch = other.clone();
-            for &leaves in more.iter().rev().filter(|&&leaves| leaves != stays) {
-                branch.remove(leaves)?;
-            }
-            branch.refine()?;
-            if self.is_done_by(place, &branch)? {
-                return Ok(true);
-            }
-        }
-        Ok(false)
     }
 
     /// Whether there is an effect of this kind and on these joints.
