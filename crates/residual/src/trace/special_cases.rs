@@ -48,9 +48,9 @@ impl Search<'_> {
         gave_way.into_iter().try_for_each(|refined| self.refine_special_case(refined))
     }
 
-    /// Puts an effect that gave way to its special case into the model again, beside that, where the criterion
-    /// is smaller with it and motion is foretold better: the special case has the name, and the model foretells
-    /// what it foretold.
+    /// Puts an effect that gave way to its special case into the model again, beside that, where the
+    /// criterion is smaller with it and motion is foretold better: the special case has the name, and the model
+    /// foretells what it foretold.
     fn refine_special_case(&mut self, refined: Refined) -> Result<(), IdentificationError> {
         let mut least = self.value(&self.chosen.rows)? - LEAST_STEP;
         let mut better = None;
@@ -73,8 +73,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Constants with which an effect has not the parameter that makes its special case, or its own where that
-    /// cannot leave; none where no parameter makes it by itself, and the two would do each other's work.
+    /// Constants with which an effect has not the parameter that makes its special case, or its own where
+    /// that cannot leave; none where no parameter makes it by itself, and the two would do each other's work.
     fn beside_special_case(&self, refined: &Refined) -> Result<Vec<Constants>, IdentificationError> {
         let by = &refined.by;
         let kind = self.fixed.catalogue.kind(&by.kind)?;
