@@ -169,8 +169,8 @@ fn wave(found: &FittedEffect<'_>, place: usize, angle: Expression) -> Expression
 }
 
 /// A stiff torque that sets in near a limit: k·d^`exponent` at the depth d = q − `stop` beyond it, on the
-/// `side` +1 or −1; k is the torque at a depth of one \[rad, m\]. Without the exponent it is that of a spring, 1;
-/// rubber stiffens as it is pressed (1.5 for a ball, Hertz 1881).
+/// `side` +1 or −1; k is the torque at a depth of one \[rad, m\]. Without the exponent it is that of a
+/// spring, 1; rubber stiffens as it is pressed (1.5 for a ball, Hertz 1881).
 pub struct EndStop;
 
 const STOP: &str = "stop";

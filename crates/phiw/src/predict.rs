@@ -7,6 +7,7 @@ use crate::output::check_file;
 use crate::summary::write_table;
 use crate::warnings::of_log;
 use crate::{Error, session};
+use phiw_effects::{Catalogue, EffectKind};
 use phiw_identification::prediction::{
     CovarianceSource, PredictionErrors, PredictionParts, predict_in_parts,
 };
@@ -26,6 +27,8 @@ pub struct PredictOutcome {
     pub warnings: Vec<String>,
     /// The errors of all logs together, where they have torques.
     pub errors: PredictionErrors,
+    /// Those of each log.
+    pub of_logs: Vec<PredictionErrors>,
     /// Rows that were written.
     pub rows: u64,
 }
@@ -47,7 +50,7 @@ pub fn predict(arguments: &PredictArguments, console: &Console) -> Result<Predic
     let Predicted { sink, errors, of_logs, rows, used } = predict_into(arguments, console, file)?;
     sink.file.commit()?;
     let summary = summary(&used, &errors, &of_logs, rows, arguments);
-    Ok(PredictOutcome { summary, warnings: warnings(&used), errors, rows })
+    Ok(PredictOutcome { summary, warnings: warnings(&used), errors, of_logs, rows })
 }
 
 /// Predictions in memory.
@@ -301,7 +304,25 @@ fn warnings(used: &ModelUse) -> Vec<String> {
             "tau_std holds the noise alone: the model has no covariance; write it again with `phiw identify` or `phiw explain`".to_owned(),
         ),
     }
+    warnings.extend(of_session_time(used));
     warnings
+}
+
+/// Effects that count the time of their session: it begins with the first of the logs that are given.
+fn of_session_time(used: &ModelUse) -> Option<String> {
+    let catalogue = Catalogue::default();
+    let counts = |kind: &str| catalogue.kind(kind).is_ok_and(EffectKind::needs_session_time);
+    let specs = used.design.effects().iter().map(|effect| effect.spec());
+    let of: Vec<String> = specs
+        .filter(|spec| counts(&spec.kind))
+        .map(|spec| format!("{} of {}", spec.kind, spec.joints.join("+")))
+        .collect();
+    (!of.is_empty()).then(|| {
+        format!(
+            "{} counts the time since its session began, which is taken to be with the first log: give the logs that came before as well, in their order, or the errors are other than in the report",
+            of.join(", ")
+        )
+    })
 }
 
 /// Errors of each joint and pooled, of each log, and where the rows are.

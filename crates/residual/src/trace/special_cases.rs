@@ -49,8 +49,8 @@ impl Search<'_> {
     }
 
     /// Puts an effect that gave way to its special case into the model again, beside that, where the
-    /// criterion is smaller with it and motion is foretold better: the special case has the name, and the model
-    /// foretells what it foretold.
+    /// criterion is smaller with it and motion is foretold better: the special case has the name, and the
+    /// model foretells what it foretold.
     fn refine_special_case(&mut self, refined: Refined) -> Result<(), IdentificationError> {
         let mut least = self.value(&self.chosen.rows)? - LEAST_STEP;
         let mut better = None;
