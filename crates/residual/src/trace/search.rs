@@ -11,7 +11,7 @@ use super::stage::{Fixed, Stage, specs_and_values};
 use super::tracing::{Tracing, Withdrawn};
 use crate::selection::{Member, Policy, Problem, select, value};
 use phiw_effects::{Constants, SignalRanges};
-use phiw_identification::{Data, Design, Effect, EffectSpec, Fold, IdentificationError};
+use phiw_identification::{Data, Design, Effect, EffectCatalogue, EffectSpec, Fold, IdentificationError};
 
 /// Times that all is chosen anew: columns that are made of the model's torque need a second, what they bring
 /// about a third.
@@ -298,24 +298,19 @@ impl Search<'_> {
     pub(super) fn replace(&mut self, place: usize, spec: EffectSpec) -> Result<(), IdentificationError> {
         let own = self.design()?.effect_parameters(place);
         self.specs[place] = spec;
-        let count = self
-            .fixed
-            .build(&self.specs[place..=place])?
-            .iter()
-            .map(|effect| effect.parameters().len())
-            .sum();
+        let count = self.parameters_of(&self.specs[place])?;
         self.parameters.splice(own, vec![0.0; count]);
         Ok(())
     }
 
+    /// How many parameters an effect has.
+    fn parameters_of(&self, spec: &EffectSpec) -> Result<usize, IdentificationError> {
+        Ok(self.fixed.catalogue.build(spec, self.fixed.tree)?.parameters().len())
+    }
+
     /// Adds an effect, with its parameters at nothing.
     pub(super) fn add(&mut self, spec: EffectSpec) -> Result<(), IdentificationError> {
-        let count: usize = self
-            .fixed
-            .build(std::slice::from_ref(&spec))?
-            .iter()
-            .map(|effect| effect.parameters().len())
-            .sum();
+        let count = self.parameters_of(&spec)?;
         self.specs.push(spec);
         self.parameters.extend(std::iter::repeat_n(0.0, count));
         self.chosen.alternatives.push(Vec::new());
