@@ -126,13 +126,12 @@ impl EffectKind for TorqueRipple {
         "slow motion at constant speed"
     }
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
-        let periods = found.constant(FREQUENCY);
-        format!(
-            "The torque of {} ripples by {} with {:.2} periods a radian over 2π ({periods:.1} a turn).",
-            found.joints(),
-            found.amplitude(),
-            periods / std::f64::consts::TAU
-        )
+        let (joints, amplitude, frequency) = (found.joints(), found.amplitude(), found.constant(FREQUENCY));
+        if found.unit(0) == "N" {
+            let period = 1e3 * std::f64::consts::TAU / frequency;
+            return format!("The force of {joints} ripples by {amplitude}, once in {period:.2} mm.");
+        }
+        format!("The torque of {joints} ripples by {amplitude}, {frequency:.1} times a turn.")
     }
     fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
         let frequency = constant(found.constants(), FREQUENCY, 1.0);

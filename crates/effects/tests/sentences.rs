@@ -36,10 +36,7 @@ const SENTENCES: &[(&str, &str)] = &[
     ),
     ("joint_spring", "A spring pulls shoulder back: 0.500 N·m/rad."),
     ("gravity_balancer", "shoulder is counterbalanced: up to 0.559 N·m as a sine of its angle."),
-    (
-        "torque_ripple",
-        "The torque of shoulder ripples by 0.559 N·m with 1.91 periods a radian over 2π (12.0 a turn).",
-    ),
+    ("torque_ripple", "The torque of shoulder ripples by 0.559 N·m, 12.0 times a turn."),
     ("end_stop", "shoulder runs into something stiff at -0.400: 0.500 N·m/rad."),
     (
         "transmission_coupling",
@@ -108,6 +105,36 @@ fn each_kind_says_its_sentence() {
     for &(kind, words) in SENTENCES {
         assert_eq!(said(&tree, catalogue.kind(kind).unwrap()), words);
     }
+}
+
+/// It was "0.04 periods a radian" of a slide, which does not turn.
+#[test]
+fn the_ripple_of_a_slide_is_said_in_millimetres() {
+    let slide = ARM.replace(r#""elbow" type="continuous""#, r#""elbow" type="prismatic""#);
+    let slide = slide.replace(
+        "</joint>\n</robot>",
+        r#"<limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>"#,
+    );
+    let tree = read_urdf(&slide, &UrdfOptions::default()).unwrap().tree;
+    let catalogue = Catalogue::default();
+    let constants = Constants::from([("periods".to_owned(), std::f64::consts::TAU / 0.005)]);
+    let effect = catalogue.kind("torque_ripple").unwrap().build(&tree, &[1], &constants);
+    let words = catalogue.sentence(&effect.spec(), &effect.parameters(), &[3.0, 4.0]);
+    assert_eq!(words, "The force of elbow ripples by 5.00 N, once in 5.00 mm.");
+}
+
+#[test]
+fn a_stop_that_stiffens_says_so() {
+    let tree = read_urdf(ARM, &UrdfOptions::default()).unwrap().tree;
+    let catalogue = Catalogue::default();
+    let constants = [("stop", 1.2), ("side", 1.0), ("exponent", 1.5)];
+    let constants: Constants = constants.map(|(name, value)| (name.to_owned(), value)).into();
+    let effect = catalogue.kind("end_stop").unwrap().build(&tree, &[0], &constants);
+    let words = catalogue.sentence(&effect.spec(), &effect.parameters(), &[7.0]);
+    assert_eq!(
+        words,
+        "shoulder runs into something stiff at 1.200: 7.00 N·m/rad at a depth of one, growing with the power 1.50 of the depth."
+    );
 }
 
 /// It was "stamped -9.24 ms late".

@@ -303,7 +303,8 @@ fn ripple(joint: usize, survey: &Survey, rng: &mut CaseRng) -> Option<Mechanism>
     // At least a turn and a half over the travel, or it is a spring; at most 8 Hz at usual speed, or filters
     // take it away.
     let (fewest, most) = (1.5 * TAU / survey.travel(joint), 8.0 * TAU / survey.speed[joint]);
-    let most = if survey.is_prismatic(joint) { most } else { most.min(60.0) };
+    // A harmonic drive of 1:160 ripples 320 times a turn.
+    let most = if survey.is_prismatic(joint) { most } else { most.min(320.0) };
     if fewest * 1.2 > most {
         return None;
     }

@@ -111,7 +111,14 @@ pub fn score(truth: &Truth, report: &Report, floors: Option<&BTreeMap<String, f6
     let mut used = vec![false; named.len()];
     let mut outcomes = vec![Outcome::Missed; truth.secrets.len()];
     // Exact matches first, so that no secret takes a name that is exactly another's.
-    let tests: [fn(&TrueSecret, &Named) -> Option<Outcome>; 3] = [exact, among_rivals, same_kind];
+    // What may be named on any joint may be named on more joints than the secret's.
+    let is_allowed = |kind: &str| truth.allowed.iter().any(|allowed| allowed.name() == kind);
+    let among_allowed = |secret: &TrueSecret, named: &Named| {
+        let is_part = secret.joints.iter().all(|joint| named.joints.contains(joint));
+        (named.kind == secret.kind.name() && is_allowed(&named.kind) && is_part).then_some(Outcome::Right)
+    };
+    type Test<'a> = &'a dyn Fn(&TrueSecret, &Named) -> Option<Outcome>;
+    let tests: [Test<'_>; 4] = [&exact, &among_allowed, &among_rivals, &same_kind];
     for test in tests {
         for (outcome, secret) in outcomes.iter_mut().zip(&truth.secrets) {
             for (used, named) in used.iter_mut().zip(&named) {
@@ -124,11 +131,10 @@ pub fn score(truth: &Truth, report: &Report, floors: Option<&BTreeMap<String, f6
             }
         }
     }
-    let allowed = |named: &Named| truth.allowed.iter().any(|kind| kind.name() == named.kind);
     let false_names: Vec<String> = named
         .iter()
         .zip(&used)
-        .filter(|(named, used)| !**used && !allowed(named))
+        .filter(|(named, used)| !**used && !is_allowed(&named.kind))
         .map(|(named, _)| named.to_string())
         .collect();
     let refined = merged(&report.refinements);
@@ -369,6 +375,19 @@ mod tests {
         check(viscous, &with_rival("viscous_friction", "quadratic_friction", 0.4), &[Rival], 0);
         check(viscous, &with_rival("quadratic_friction", "viscous_friction", 0.4), &[Rival], 0);
         check(viscous, &with_rival("quadratic_friction", "joint_spring", 0.4), &[WrongKind], 1);
+    }
+
+    /// A drive that filters all torques delays them all, beside one that is late by itself.
+    #[test]
+    fn a_name_that_the_situation_makes_true_may_stand_on_more_joints() {
+        let mut truth = truth(&[(Kind::TimeDelay, &["b"])]);
+        truth.allowed = vec![Kind::TimeDelay];
+        let named = |joints: &str| {
+            let effect = format!(r#"{{"kind": "time_delay", "joints": [{joints}], "confidence": 0.9}}"#);
+            score(&truth, &report(&effect), None)
+        };
+        assert_eq!(named(r#""a", "b", "c""#).outcomes, [Outcome::Right]);
+        assert_eq!(named(r#""a", "c""#).outcomes, [Outcome::WrongJoints]);
     }
 
     /// A family is right with and without the joints where it is immaterial; a secret that is only a

@@ -246,16 +246,30 @@ fn one_more(
     .then_some(secret)
 }
 
-/// Sizes of all secrets, and what each of them leaves that no mix of the others can absorb.
+/// Sizes of all secrets, and what each of them leaves that no mix of the others can absorb. An effect is what
+/// the logs lack without it: a gain multiplies the friction that the plant has, and not another.
 fn weighed(secrets: &[Secret], case: &Case, full: &Ordinary) -> Vec<Drawn> {
     let (tree, sensors) = (&case.robot.tree, &case.sensors);
     let joints = tree.joint_count();
     let rate = if joints > 10 { 6.0 } else { 20.0 };
-    let records = |secrets: &[&Secret]| -> Vec<Record> {
-        let one = |motion: &Trajectory| record(tree, full, secrets, motion, &even_times(motion, rate));
+    let records = |ordinary: &Ordinary, secrets: &[&Secret]| -> Vec<Record> {
+        let one = |motion: &Trajectory| record(tree, ordinary, secrets, motion, &even_times(motion, rate));
         case.motions[..2].iter().map(one).collect()
     };
-    let without = records(&[]);
+    // Torque of the plant beside the rigid body's, of all secrets but one; or of those that are not about the
+    // moment at which a torque is logged: what is late is late with all that the rigid body has.
+    let is_late = |secret: &Secret| matches!(secret.form, Form::Delay | Form::ClockDrift);
+    let beside_rigid = |left_out: Option<usize>, late: bool| -> Vec<f64> {
+        let others = secrets.iter().enumerate().filter(|(index, _)| Some(*index) != left_out);
+        let others = others.map(|(_, secret)| secret).filter(|secret| late || !is_late(secret));
+        let plant: Vec<&Secret> = case.plant.iter().chain(others).collect();
+        let added = |record: Record| -> Vec<f64> {
+            record.torque.iter().zip(&record.ideal).map(|(torque, ideal)| torque - ideal).collect()
+        };
+        records(&case.ordinary, &plant).into_iter().flat_map(added).collect()
+    };
+    let without = records(full, &[]);
+    let whole = [false, true].map(|late| beside_rigid(None, late));
     let mut absorber = Absorber::new(tree, full, &case.declared, &without, &sensors.torque_noise);
     let has = |kinds: &[Kind], joint: usize| {
         let one_of = |secret: &Secret| kinds.iter().any(|kind| secret.name == Name::Catalogue(*kind));
@@ -276,10 +290,10 @@ fn weighed(secrets: &[Secret], case: &Case, full: &Ordinary) -> Vec<Drawn> {
     let mut columns: Vec<Vec<f64>> = Vec::new();
     let mut owners: Vec<(usize, Option<usize>, f64)> = Vec::new();
     for (index, secret) in secrets.iter().enumerate() {
-        let effect: Vec<f64> = records(&[secret])
-            .iter()
-            .flat_map(|record| record.torque.iter().zip(&record.ideal).map(|(torque, ideal)| torque - ideal))
-            .collect();
+        let late = is_late(secret);
+        let others = beside_rigid(Some(index), late);
+        let effect: Vec<f64> =
+            whole[usize::from(late)].iter().zip(others).map(|(whole, others)| whole - others).collect();
         let size = |joint: usize| (square(&effect, joint) / square(&ideal, joint)).sqrt();
         if matches!(secret.form, Form::Family(_)) {
             for &joint in &secret.joints {
@@ -293,7 +307,16 @@ fn weighed(secrets: &[Secret], case: &Case, full: &Ordinary) -> Vec<Drawn> {
             columns.push(effect);
         }
     }
-    let visible = visible_beside_others(&absorber, columns, ideal.len() / joints);
+    let visible_in = |columns| visible_beside_others(&absorber, columns, ideal.len() / joints);
+    let mut visible = visible_in(columns.clone());
+    // A gain that the others make up for is no reason not to name them.
+    let is_made_up_for =
+        |place: usize| matches!(secrets[owners[place].0].form, Form::Gain) && visible[place] < VISIBLE;
+    let told: Vec<usize> = (0..owners.len()).filter(|place| !is_made_up_for(*place)).collect();
+    if told.len() < owners.len() {
+        let again = visible_in(told.iter().map(|place| std::mem::take(&mut columns[*place])).collect());
+        told.iter().zip(again).for_each(|(place, again)| visible[*place] = again);
+    }
     let duration = case.motions[..2].iter().map(|motion| motion.duration).sum();
     let rows = effective_rows(sensors, duration);
     let material = |place: usize| {

@@ -27,6 +27,16 @@ impl Search<'_> {
         Ok((search.specs.len() > self.specs.len()).then_some(search))
     }
 
+    /// Whether the model as it is asks for one of these factors, or has it to first order.
+    pub(super) fn still_asks_for(&self, factors: &[EffectSpec]) -> Result<bool, IdentificationError> {
+        let is_one = |spec: &EffectSpec| {
+            factors.iter().any(|factor| factor.kind == spec.kind && factor.joints == spec.joints)
+        };
+        let gains = self.gains();
+        let open = gains.iter().filter(|(_, gain)| is_one(&gain.spec())).map(|(torque, _)| *torque);
+        Ok(self.specs.iter().any(is_one) || !self.multiples(open.collect())?.is_empty())
+    }
+
     /// For each torque that may have one the effect that is a factor of it, not in force.
     fn gains(&self) -> BTreeMap<usize, Box<dyn Effect>> {
         let mut gains = BTreeMap::new();
@@ -53,7 +63,7 @@ impl Search<'_> {
         gains
     }
 
-    /// The multiples that the declared model asks for with all that the textbook has of joints beside it: a
+    /// The multiples that the model asks for with all that the textbook has of joints beside it: a
     /// friction that is missing is no factor.
     fn multiples(&self, open: Vec<usize>) -> Result<Vec<Multiple>, IdentificationError> {
         let mut with_textbook = self.clone();

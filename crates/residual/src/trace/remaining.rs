@@ -41,12 +41,11 @@ impl Search<'_> {
         if large.is_empty() {
             return Ok(remaining);
         }
-        let positions: Vec<(f64, f64)> =
-            self.input.ranges.joints.iter().map(|joint| joint.position).collect();
+        let joints = &self.input.ranges.joints;
         let data = self.fixed.data;
         let folds = [data.train.as_slice(), &data.held_out].concat();
         let shape =
-            residual_shape(&self.design()?, &self.parameters, &folds, &data.sources, &positions, Peaks::All)?;
+            residual_shape(&self.design()?, &self.parameters, &folds, &data.sources, joints, Peaks::All)?;
         let fit = probe::Fit {
             peaks: &shape,
             fixed: self.fixed,

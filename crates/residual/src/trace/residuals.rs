@@ -1,7 +1,7 @@
 //! One pass over the logs with a fitted model: what it leaves, sample by sample, in the memory of a few
 //! blocks.
 
-use phiw_effects::SignalRanges;
+use phiw_effects::{JointRange, SignalRanges};
 use phiw_identification::block_source::try_for_each_batch;
 use phiw_identification::design::DesignScratch;
 use phiw_identification::{BlockSource, Data, Design, Fold, IdentificationError};
@@ -40,8 +40,11 @@ const STRUCTURE_LAGS: [f64; 3] = [0.25, 0.35, 0.5];
 const LAGS: [f64; 4] = [0.25, 0.35, 0.5, 2.5];
 /// Peaks of the residual over the position that are tried as ripple.
 const PEAKS: usize = 4;
-/// Highest spatial frequency that is tried \[1/rad\].
+/// Highest spatial frequency that is tried however fast the joint moves \[1/rad, 1/m\].
 const HIGHEST_FREQUENCY: f64 = 130.0;
+/// Angular frequency of a ripple at the RMS of a joint's speed up to which it is tried \[rad/s\]: what swings
+/// faster is filtered from the torques. The teeth of a screw are a few millimetres apart.
+const HIGHEST_IN_TIME: f64 = 62.8;
 
 /// What the training motion covers, with the frequencies of what a model leaves of it.
 ///
@@ -53,9 +56,8 @@ pub fn ranges_of_residual(
     data: &Data<'_>,
     mut ranges: SignalRanges,
 ) -> Result<SignalRanges, IdentificationError> {
-    let positions: Vec<(f64, f64)> = ranges.joints.iter().map(|joint| joint.position).collect();
-    let shape =
-        residual_shape(design, parameters, &data.train, &data.sources, &positions, Peaks::OverPosition)?;
+    let (train, sources) = (&data.train, &data.sources);
+    let shape = residual_shape(design, parameters, train, sources, &ranges.joints, Peaks::OverPosition)?;
     ranges.ripple_frequencies = shape.ripple_frequencies;
     ranges.joints.iter_mut().zip(shape.rms).for_each(|(joint, rms)| joint.residual_rms = rms);
     Ok(ranges)
@@ -112,13 +114,18 @@ struct Grid {
 }
 
 impl Grid {
-    /// Frequencies from one and a half periods over the range, four to a bin's width.
-    fn new(range: (f64, f64)) -> Self {
+    /// Frequencies over a joint's position.
+    fn over_position(joint: &JointRange) -> Self {
+        let highest = HIGHEST_IN_TIME / joint.velocity_rms.max(1e-6);
+        Self::new(joint.position, highest.max(HIGHEST_FREQUENCY))
+    }
+
+    /// Frequencies from one and a half periods over the range up to the highest, four to a bin's width.
+    fn new(range: (f64, f64), highest: f64) -> Self {
         let width = (range.1 - range.0).max(1e-6);
         let first = 1.5 * std::f64::consts::TAU / width;
         let step = 0.25 * std::f64::consts::TAU / width;
-        let count =
-            if first < HIGHEST_FREQUENCY { ((HIGHEST_FREQUENCY - first) / step) as usize + 1 } else { 0 };
+        let count = if first < highest { ((highest - first) / step) as usize + 2 } else { 0 };
         // Short strokes have few bins; very long ones (linear axes in mm) are not followed without end.
         Grid { first, step, sums: vec![(0.0, 0.0); count.min(2000)] }
     }
@@ -159,7 +166,7 @@ impl Grid {
     }
 }
 
-/// The shape of what `parameters` leave on the folds. `ranges` are the joints' ranges of position.
+/// The shape of what `parameters` leave on the folds. `ranges` are what the joints' motion covers.
 ///
 /// # Errors
 /// A log cannot be read.
@@ -168,12 +175,12 @@ pub fn residual_shape(
     parameters: &[f64],
     folds: &[Fold],
     sources: &[&dyn BlockSource],
-    ranges: &[(f64, f64)],
+    ranges: &[JointRange],
     peaks: Peaks,
 ) -> Result<ResidualShape, IdentificationError> {
     let duration: f64 = folds.iter().map(|fold| fold.end - fold.start).sum();
     let mut collectors: Vec<Collector> =
-        ranges.iter().map(|&range| Collector::new(range, duration, peaks)).collect();
+        ranges.iter().map(|range| Collector::new(range, duration, peaks)).collect();
     let (mut last, mut rows) = (None, 0);
     try_for_each_batch(sources, |batch| {
         let continues: Vec<bool> = batch
@@ -268,9 +275,9 @@ fn shape(collectors: &[Collector], rows: u64) -> ResidualShape {
 }
 
 impl Collector {
-    fn new(range: (f64, f64), duration: f64, peaks: Peaks) -> Self {
-        let grid = |range: (f64, f64)| match peaks {
-            Peaks::All => Grid::new(range),
+    fn new(range: &JointRange, duration: f64, peaks: Peaks) -> Self {
+        let all = |grid: &dyn Fn() -> Grid| match peaks {
+            Peaks::All => grid(),
             Peaks::OverPosition => Grid::empty(),
         };
         Collector {
@@ -280,10 +287,10 @@ impl Collector {
             filled: 0,
             products: Default::default(),
             squares: (0.0, 0.0),
-            positions: Grid::new(range),
-            loads: grid(range),
-            frictions: grid(range),
-            times: grid((0.0, duration)),
+            positions: Grid::over_position(range),
+            loads: all(&|| Grid::over_position(range)),
+            frictions: all(&|| Grid::over_position(range)),
+            times: all(&|| Grid::new((0.0, duration), HIGHEST_FREQUENCY)),
         }
     }
 
@@ -332,5 +339,32 @@ impl Collector {
         }
         self.ring[self.filled % size] = left;
         self.filled += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Grid;
+    use phiw_effects::JointRange;
+
+    /// A slide of 100 mm had ripples longer than 48 mm only: the highest frequency was that of joints that
+    /// turn, in 1/m.
+    #[test]
+    fn the_ripple_of_a_slide_is_found_down_to_millimetres() {
+        let slide = JointRange { position: (0.02, 0.12), velocity_rms: 0.035, ..JointRange::default() };
+        let wrist = JointRange { position: (-1.4, 1.6), velocity_rms: 0.18, ..JointRange::default() };
+        for (joint, frequency) in
+            [(slide, 129.2), (slide, 628.3), (slide, 1256.6), (wrist, 320.0), (wrist, 9.0)]
+        {
+            let mut grid = Grid::over_position(&joint);
+            let (low, high) = joint.position;
+            for row in 0..4000 {
+                let position = 0.5 * (low + high) + 0.5 * (high - low) * (0.0173 * f64::from(row)).sin();
+                grid.add(position, (frequency * position + 0.4).sin());
+            }
+            let peak = grid.peaks()[0];
+            let slip = (peak - frequency).abs() * (high - low);
+            assert!(slip < 0.7, "{frequency}: found {peak}, {slip} rad over the range");
+        }
     }
 }

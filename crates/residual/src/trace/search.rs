@@ -116,11 +116,17 @@ pub(super) struct Search<'a> {
 
 impl Search<'_> {
     /// The search from where it starts to its end. Where the torques agree better once one of them is a
-    /// multiple of what is logged, it also starts with that in force, and the better end is taken: to first
-    /// order a factor of two is no factor, and other effects would stand for it.
+    /// multiple of what is logged, and still do in the end, it also starts with that in force, and the better
+    /// end is taken: to first order a factor of two is no factor, and other effects would stand for it.
     fn run(self) -> Result<Tracing, IdentificationError> {
-        let Some(with_multiples) = self.with_multiples()? else { return self.searched()?.finish() };
-        let (plain, with_multiples) = (self.searched()?, with_multiples.searched()?);
+        let with_multiples = self.with_multiples()?;
+        let declared = self.specs.len();
+        let plain = self.searched()?;
+        let Some(with_multiples) = with_multiples else { return plain.finish() };
+        if !plain.still_asks_for(&with_multiples.specs[declared..])? {
+            return plain.finish();
+        }
+        let with_multiples = with_multiples.searched()?;
         let rows = plain.chosen.rows.clone();
         let better = match with_multiples.value(&rows)? < plain.value(&rows)? {
             true => with_multiples,

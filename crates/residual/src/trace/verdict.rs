@@ -5,8 +5,8 @@ use super::scanned::scanned_constants;
 use super::search::Search;
 use super::tracing::{ROUNDING, Tracing, Verdict};
 use phiw_identification::fitting::{
-    OwnTorqueFit, Rests, TorqueError, accumulate, accumulate_folds, fit, fit_with_own_torque, log_changes,
-    torque_error,
+    Fit, OwnTorqueFit, Rests, TorqueError, accumulate, accumulate_folds, fit, fit_with_own_torque,
+    log_changes, torque_error,
 };
 use phiw_identification::{Design, EffectSpec, IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
@@ -122,6 +122,12 @@ impl Search<'_> {
             constants = scanned_constants(self.fixed.catalogue, &mut model, data)?;
             let impossible = self.impossible(&model.design, &model.fit);
             let uncertain = self.uncertain(&model, effects.len())?;
+            let untold = untold(&model.design, &model.fit, self.declared);
+            if impossible.is_empty() && !untold.is_empty() {
+                untold.into_iter().rev().try_for_each(|place| self.remove(place))?;
+                self.refine()?;
+                return self.finish_with(before, harm);
+            }
             if !impossible.is_empty() || !uncertain.is_empty() {
                 let changes = !impossible.is_empty();
                 self.remove_impossible(impossible)?;
@@ -242,10 +248,58 @@ impl Search<'_> {
     }
 }
 
+/// The places, from `first` on and ascending, of the effects of which the fit has nothing: the logs determine
+/// none of their parameters beside the others', and none has a value in force. To first order, beside the
+/// model that it was chosen for, there was something.
+fn untold(design: &Design, fit: &Fit, first: usize) -> Vec<usize> {
+    let is_untold = |place: &usize| {
+        let effect = &design.effects()[*place];
+        let constants = effect.spec().constants;
+        let in_force = |name: &String| constants.get(name).is_some_and(|value| *value != 0.0);
+        let mut own = design.effect_parameters(*place).zip(effect.parameters());
+        own.all(|(parameter, info)| fit.undetermined.contains(&parameter) && !in_force(&info.name))
+    };
+    (first..design.effects().len()).filter(is_untold).collect()
+}
+
 pub(super) fn errors(
     train: &[GroupedFactor],
     held_out: &[GroupedFactor],
     parameters: &[f64],
 ) -> Result<(TorqueError, TorqueError), IdentificationError> {
     Ok((torque_error(train, parameters)?, torque_error(held_out, parameters)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::untold;
+    use phiw_dynamics::random_tree::{RandomTreeOptions, random_tree};
+    use phiw_effects::Catalogue;
+    use phiw_identification::fitting::{accumulate, fit};
+    use phiw_identification::{BlockSource, Design, EffectCatalogue, EffectSpec, Fold};
+    use phiw_regressor::BaseParameters;
+    use phiw_telemetry::Block;
+
+    /// A gain that left the fit, since the logs did not tell it beside all others, was named: "the torque of
+    /// joint_5 is measured 0.0 % too large".
+    #[test]
+    fn what_the_logs_tell_nothing_of_is_not_in_the_model() {
+        let tree = random_tree(5, &RandomTreeOptions { joints: 2, ..Default::default() }).unwrap();
+        let joints: Vec<String> = tree.joint_names().map(str::to_owned).collect();
+        let signal = |phase: f64| -> Vec<f64> {
+            (0..800).map(|row| (0.01 * f64::from(row) * (2.0 + f64::from(row % 2)) + phase).sin()).collect()
+        };
+        let t: Vec<f64> = (0..400).map(|sample| 0.02 * f64::from(sample)).collect();
+        let blocks = vec![Block::unfiltered(2, t, [signal(0.0), signal(1.5), signal(3.0)], signal(0.7))];
+        let sources: [&dyn BlockSource; 1] = [&blocks];
+        let folds = [0.0, 4.0].map(|start| Fold { log: 0, start, end: start + 4.0 });
+        let specs = ["viscous_friction", "coulomb_friction", "viscous_friction"]
+            .map(|kind| EffectSpec::new(kind, &[joints[0].as_str()]));
+        let effects = specs.iter().map(|spec| Catalogue::default().build(spec, &tree).unwrap()).collect();
+        let base = BaseParameters::of_tree(&tree, Default::default()).unwrap();
+        let design = Design::new(tree.clone(), base, effects).with_rest_speeds(vec![0.0; 2]);
+        let fitted = fit(&design, &accumulate(&design, &folds, &sources).unwrap()).unwrap();
+        assert_eq!(untold(&design, &fitted, 0), [2]);
+        assert_eq!(untold(&design, &fitted, 3), [0; 0]);
+    }
 }
