@@ -22,7 +22,8 @@ impl EffectKind for JointElasticity {
         "quick reversals, so that the torque changes fast"
     }
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
-        format!("The transmission of {} gives: {:.3e} {}.", found.joints(), found.value(0), found.unit(0))
+        let compliance = found.constant(COMPLIANCE) + found.value(0);
+        format!("The transmission of {} gives: {compliance:.3e} {}.", found.joints(), found.unit(0))
     }
     fn seen_against(&self) -> Signal {
         Signal::Acceleration

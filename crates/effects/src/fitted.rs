@@ -60,6 +60,11 @@ impl<'a> FittedEffect<'a> {
         self.parameters.get(place).map_or("", |info| &info.unit)
     }
 
+    /// The unit of its joint's position, where its first parameter is a torque or a force.
+    pub(crate) fn unit_of_position(&self) -> &'static str {
+        if self.unit(0) == "N" { "m" } else { "rad" }
+    }
+
     /// The parameter at `place` with its unit; nothing if there is none.
     pub fn quantity(&self, place: usize) -> String {
         self.in_unit_of(place, self.value(place))

@@ -223,10 +223,11 @@ impl EffectKind for Stribeck {
     }
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         format!(
-            "{} sticks at low speed: {} on top of Coulomb friction, gone above {:.3} rad/s or m/s (Stribeck).",
+            "{} sticks at low speed: {} on top of Coulomb friction, gone above {:.3} {}/s (Stribeck).",
             found.joints(),
             found.quantity(0),
-            found.constant(STRIBECK_VELOCITY)
+            found.constant(STRIBECK_VELOCITY),
+            found.unit_of_position()
         )
     }
     fn servo_friction(&self, found: &FittedEffect<'_>) -> Option<ServoFriction> {

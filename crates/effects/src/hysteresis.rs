@@ -35,10 +35,11 @@ impl EffectKind for Hysteresis {
     }
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         format!(
-            "The torque of {} depends on the way since the last reversal: {} over {:.4} rad or m.",
+            "The torque of {} depends on the way since the last reversal: {} over {:.4} {}.",
             found.joints(),
             found.quantity(0),
-            found.constant(PRESLIDING)
+            found.constant(PRESLIDING),
+            found.unit_of_position()
         )
     }
     fn form_of(&self) -> &'static [&'static str] {

@@ -127,7 +127,7 @@ impl EffectKind for TorqueRipple {
     }
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         let (joints, amplitude, frequency) = (found.joints(), found.amplitude(), found.constant(FREQUENCY));
-        if found.unit(0) == "N" {
+        if found.unit_of_position() == "m" {
             let period = 1e3 * std::f64::consts::TAU / frequency;
             return format!("The force of {joints} ripples by {amplitude}, once in {period:.2} mm.");
         }

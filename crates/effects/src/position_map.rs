@@ -71,7 +71,7 @@ impl EffectKind for PositionMap {
         format!(
             "The torque of {} depends on its position in no simple form (a cable, a hose, cogging): it varies by {size} RMS from {lower:.3} to {upper:.3} {}.",
             found.joints(),
-            if found.unit(0) == "N" { "m" } else { "rad" },
+            found.unit_of_position(),
         )
     }
     fn seen_against(&self) -> Signal {
@@ -121,7 +121,7 @@ fn order(knots: usize) -> Vec<usize> {
 /// RMS of a fitted map about its mean over its arc \[its parameters' unit\].
 fn variation(found: &FittedEffect<'_>) -> f64 {
     let constants = [KNOTS, LOWER, UPPER].map(|name| (name.to_owned(), found.constant(name)));
-    let spline = spline(&constants.into(), found.unit(0) != "N");
+    let spline = spline(&constants.into(), found.unit_of_position() == "rad");
     let order = order(spline.knots());
     let at = |point: usize| {
         let place = (point as f64 + 0.5) / POINTS as f64;

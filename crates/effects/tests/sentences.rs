@@ -28,7 +28,7 @@ const SENTENCES: &[(&str, &str)] = &[
     ("quadratic_friction", "The friction of shoulder bends with the square of the speed: 0.500 N·m·s²/rad²."),
     (
         "stribeck_friction",
-        "shoulder sticks at low speed: 0.500 N·m on top of Coulomb friction, gone above 0.050 rad/s or m/s (Stribeck).",
+        "shoulder sticks at low speed: 0.500 N·m on top of Coulomb friction, gone above 0.050 rad/s (Stribeck).",
     ),
     (
         "load_dependent_friction",
@@ -50,7 +50,7 @@ const SENTENCES: &[(&str, &str)] = &[
     ),
     (
         "hysteresis",
-        "The torque of shoulder depends on the way since the last reversal: 0.500 N·m over 0.0047 rad or m.",
+        "The torque of shoulder depends on the way since the last reversal: 0.500 N·m over 0.0047 rad.",
     ),
     ("thermal_drift", "The friction of shoulder falls as it warms up, over 8 s."),
     ("joint_elasticity", "The transmission of shoulder gives: 5.000e-1 rad/(N·m)."),
@@ -121,6 +121,17 @@ fn the_ripple_of_a_slide_is_said_in_millimetres() {
     let effect = catalogue.kind("torque_ripple").unwrap().build(&tree, &[1], &constants);
     let words = catalogue.sentence(&effect.spec(), &effect.parameters(), &[3.0, 4.0]);
     assert_eq!(words, "The force of elbow ripples by 5.00 N, once in 5.00 mm.");
+}
+
+/// What is in force was left out: a transmission of 3.66·10⁻⁷ rad/(N·m) was said to give −7.27·10⁻⁸.
+#[test]
+fn a_compliance_is_said_with_what_of_it_is_in_force() {
+    let tree = read_urdf(ARM, &UrdfOptions::default()).unwrap().tree;
+    let catalogue = Catalogue::default();
+    let constants = Constants::from([("compliance".to_owned(), 4.5e-4)]);
+    let effect = catalogue.kind("joint_elasticity").unwrap().build(&tree, &[0], &constants);
+    let words = catalogue.sentence(&effect.spec(), &effect.parameters(), &[-5e-5]);
+    assert_eq!(words, "The transmission of shoulder gives: 4.000e-4 rad/(N·m).");
 }
 
 #[test]

@@ -36,23 +36,23 @@ impl<'a> Foretelling<'a> {
 
     /// What is left of each torque.
     pub fn squares(&self) -> Vec<f64> {
-        self.sum(|_, fit| Some(fit.clone()))
+        self.sum(|_, fit| fit.clone())
     }
 
     /// What is left of each torque without a member: the others are fitted again, with the same weights.
     pub fn squares_without(&self, member: Member) -> Vec<f64> {
         let own = &self.problem.variant(member).parameters;
-        self.sum(|problem, fit| {
+        self.sum(|folds, fit| {
             let places: Vec<usize> = own.iter().filter_map(|&parameter| fit.place[parameter]).collect();
-            fit.pinned(problem, &places)
+            let pinned = fit.pinned(self.problem, &places);
+            pinned.unwrap_or_else(|| fit.without_parameters(self.problem, &places, folds))
         })
     }
 
-    /// What `changed` fits to the other parts leave of each part; where there is none, what these fits leave.
-    fn sum(&self, changed: impl Fn(&Problem, &Fit) -> Option<Fit> + Sync) -> Vec<f64> {
+    /// What fits to the other parts leave of each part, once they are `changed`, of its folds and the fit.
+    fn sum(&self, changed: impl Fn(&[usize], &Fit) -> Fit + Sync) -> Vec<f64> {
         let of_part = |(folds, others): &(Vec<usize>, Fit)| -> Vec<f64> {
-            let changed = changed(self.problem, others);
-            let fit = changed.as_ref().unwrap_or(others);
+            let fit = changed(folds, others);
             let of_torque = |(torque, own): (usize, &super::problem::Torque)| -> f64 {
                 let columns = fit.columns(torque);
                 let folds = folds.iter().map(|&fold| &own.folds[fold]).filter(|fold| fold.rows() > 0.0);

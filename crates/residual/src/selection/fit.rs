@@ -10,6 +10,10 @@ const DEPENDENT: f64 = 1e-10;
 pub(super) const ABSORBED: f64 = 4e-6;
 /// Share of all rows that say what is in the model in any case, where stretches are left out.
 const KNOWN: f64 = 0.01;
+/// Share of a variance that must be left beside others' for the constraint's Schur complement to be exact:
+/// below it is rounding. Knots of a map with a direction that the weight of a slide also has were told to do
+/// nothing at all.
+const TOLD_APART: f64 = 1e-9;
 /// Times that the weights are renewed from the residual.
 const ITERATIONS: usize = 4;
 /// Weights that change by less are settled: the criterion changes by the square of that for each parameter.
@@ -89,7 +93,7 @@ impl Fit {
             .iter()
             .map(|&place| self.values[self.active[place]] - problem.absent[self.active[place]])
             .collect();
-        let solved = solve_block(&places, &inverse, &change)?;
+        let solved = solve_block(&places, &inverse, &change, TOLD_APART)?;
         let mut values = self.values.clone();
         for (at, &parameter) in self.active.iter().enumerate().filter(|(at, _)| self.determined[*at]) {
             let change: f64 = inverse.iter().zip(&solved).map(|(column, value)| column[at] * value).sum();
@@ -111,6 +115,19 @@ impl Fit {
         };
         fit.rss = (0..problem.torques.len()).map(|torque| fit.residual(problem, torque)).collect();
         Some(fit)
+    }
+
+    /// The same as [`Fit::pinned`] by another factorisation, on the rows of all folds but some: values only.
+    /// It costs the cube of the parameters' number, and tells apart whatever the rows do.
+    pub fn without_parameters(&self, problem: &Problem, places: &[usize], folds: &[usize]) -> Self {
+        let stays = self.active.iter().enumerate().filter(|(place, _)| !places.contains(place));
+        let active: Vec<usize> = stays.map(|(_, &parameter)| parameter).collect();
+        let mut fit = Fit::prepared(problem, active, &[], Some(self));
+        fit.weights.clone_from(&self.weights);
+        fit.prior_weight = self.prior_weight;
+        fit.values.clone_from(&self.values);
+        fit.solve_rows(problem, None, folds);
+        fit
     }
 
     /// The same parameters fitted with the same weights to the rows of all folds but some.
@@ -337,8 +354,9 @@ pub(super) fn dot(left: &[f64], right: &[f64]) -> f64 {
     sums[0] + rest
 }
 
-/// (Z_oo)⁻¹·x for some places o, from their columns of Z, by Cholesky's factor of the small block.
-pub(super) fn solve_block(own: &[usize], inverse: &[Vec<f64>], x: &[f64]) -> Option<Vec<f64>> {
+/// (Z_oo)⁻¹·x for some places o, from their columns of Z, by Cholesky's factor of the small block. `None`
+/// where of one less than `least` of its square is left beside those before it.
+pub(super) fn solve_block(own: &[usize], inverse: &[Vec<f64>], x: &[f64], least: f64) -> Option<Vec<f64>> {
     let count = own.len();
     let mut l = vec![0.0; count * count];
     for row in 0..count {
@@ -346,7 +364,7 @@ pub(super) fn solve_block(own: &[usize], inverse: &[Vec<f64>], x: &[f64]) -> Opt
             let known: f64 = (0..column).map(|k| l[row * count + k] * l[column * count + k]).sum();
             let rest = inverse[row][own[column]] - known;
             if row == column {
-                if rest.is_nan() || rest <= 0.0 {
+                if rest.is_nan() || rest <= least * inverse[row][own[column]] {
                     return None;
                 }
                 l[row * count + row] = rest.sqrt();

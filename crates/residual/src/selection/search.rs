@@ -303,14 +303,25 @@ impl<'a> Search<'a> {
         let may_enter = |model: &Model, entering: &[Member]| {
             !stays_possible || entering.iter().all(|entering| is_within(&model.fit, entering))
         };
-        let mut models = self.in_place_of(place).into_iter();
-        let best = models.find(|(model, entering)| model.settled && may_enter(model, entering));
-        let (model, entering) = best.filter(|(model, _)| model.value < self.model.value - LEAST_STEP)?;
-        match entering.len() {
-            1 => Some(model),
-            // More in the place of one must foretell more, as whatever is added.
-            _ => self.first_that_foretells(vec![model]),
+        let models = self.in_place_of(place).into_iter();
+        let models = models.filter(|(model, entering)| model.settled && may_enter(model, entering));
+        let better = models.take_while(|(model, _)| model.value < self.model.value - LEAST_STEP);
+        let parameters = |member: &Member| self.problem.variant(*member).parameters.len();
+        for (model, entering) in better {
+            let is_more = match entering.as_slice() {
+                [own] => own.hypothesis == member.hypothesis && parameters(own) > parameters(&member),
+                _ => true,
+            };
+            // More in the place of one must foretell more, as whatever is added: the knots of a map are
+            // more until each is of one stretch alone.
+            if !is_more {
+                return Some(model);
+            }
+            if let Some(model) = self.first_that_foretells(vec![model]) {
+                return Some(model);
+            }
         }
+        None
     }
 
     /// Models with something else in the place of a member, best first.

@@ -70,14 +70,14 @@ fn block(problem: &Problem, fit: &Fit, member: Member) -> (Vec<usize>, Vec<Vec<f
 
 /// vᵀ·(Z_oo)⁻¹·v.
 fn model_squares(own: &[usize], inverse: &[Vec<f64>], values: &[f64]) -> Option<f64> {
-    let solved = solve_block(own, inverse, values)?;
+    let solved = solve_block(own, inverse, values, 0.0)?;
     Some(dot(&solved, values).max(0.0))
 }
 
 /// The linear function of the member's values that is one at the fitted ones, and has the smallest variance:
 /// (Z_oo)⁻¹·v over vᵀ·(Z_oo)⁻¹·v.
 fn weights_of_scale(own: &[usize], inverse: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
-    let Some(solved) = solve_block(own, inverse, values) else { return vec![0.0; values.len()] };
+    let Some(solved) = solve_block(own, inverse, values, 0.0) else { return vec![0.0; values.len()] };
     let total = dot(&solved, values);
     solved.iter().map(|value| if total > 0.0 { value / total } else { 0.0 }).collect()
 }

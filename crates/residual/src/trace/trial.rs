@@ -135,10 +135,9 @@ impl Trial {
     pub fn held_out_squares_without(&self, fit: &Fit, member: Member) -> Vec<f64> {
         let own = &self.problem.variant(member).parameters;
         let places: Vec<usize> = own.iter().filter_map(|&parameter| fit.place[parameter]).collect();
-        match fit.pinned(&self.problem, &places) {
-            Some(without) => self.held_out_squares(&without),
-            None => self.held_out_squares(fit),
-        }
+        let pinned = fit.pinned(&self.problem, &places);
+        let without = pinned.unwrap_or_else(|| fit.without_parameters(&self.problem, &places, &[]));
+        self.held_out_squares(&without)
     }
 
     /// The squares of what a member adds to a torque, beyond what others could add.
