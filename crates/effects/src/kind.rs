@@ -237,7 +237,7 @@ pub struct SignalRanges {
     pub session: (f64, f64),
     /// Time between samples \[s\].
     pub period: f64,
-    /// For each joint, spatial frequencies N \[1/rad\] at which its residual has peaks.
+    /// For each joint, spatial frequencies N \[1/rad, 1/m\] at which its residual has peaks.
     pub ripple_frequencies: Vec<Vec<f64>>,
     /// Whether any joint has a temperature.
     pub temperature: bool,

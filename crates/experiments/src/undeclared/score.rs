@@ -110,13 +110,13 @@ pub fn score(truth: &Truth, report: &Report, floors: Option<&BTreeMap<String, f6
     let named = merged(&report.effects);
     let mut used = vec![false; named.len()];
     let mut outcomes = vec![Outcome::Missed; truth.secrets.len()];
-    // Exact matches first, so that no secret takes a name that is exactly another's.
     // What may be named on any joint may be named on more joints than the secret's.
     let is_allowed = |kind: &str| truth.allowed.iter().any(|allowed| allowed.name() == kind);
     let among_allowed = |secret: &TrueSecret, named: &Named| {
         let is_part = secret.joints.iter().all(|joint| named.joints.contains(joint));
         (named.kind == secret.kind.name() && is_allowed(&named.kind) && is_part).then_some(Outcome::Right)
     };
+    // Exact matches first, so that no secret takes a name that is exactly another's.
     type Test<'a> = &'a dyn Fn(&TrueSecret, &Named) -> Option<Outcome>;
     let tests: [Test<'_>; 4] = [&exact, &among_allowed, &among_rivals, &same_kind];
     for test in tests {

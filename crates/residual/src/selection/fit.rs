@@ -11,8 +11,7 @@ pub(super) const ABSORBED: f64 = 4e-6;
 /// Share of all rows that say what is in the model in any case, where stretches are left out.
 const KNOWN: f64 = 0.01;
 /// Share of a variance that must be left beside others' for the constraint's Schur complement to be exact:
-/// below it is rounding. Knots of a map with a direction that the weight of a slide also has were told to do
-/// nothing at all.
+/// below it is rounding.
 const TOLD_APART: f64 = 1e-9;
 /// Times that the weights are renewed from the residual.
 const ITERATIONS: usize = 4;

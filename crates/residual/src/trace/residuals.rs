@@ -40,7 +40,8 @@ const STRUCTURE_LAGS: [f64; 3] = [0.25, 0.35, 0.5];
 const LAGS: [f64; 4] = [0.25, 0.35, 0.5, 2.5];
 /// Peaks of the residual over the position that are tried as ripple.
 const PEAKS: usize = 4;
-/// Highest spatial frequency that is tried however fast the joint moves \[1/rad, 1/m\].
+/// Highest frequency that is tried over a position, however fast the joint moves \[1/rad, 1/m\], and over the
+/// time \[rad/s\].
 const HIGHEST_FREQUENCY: f64 = 130.0;
 /// Angular frequency of a ripple at the RMS of a joint's speed up to which it is tried \[rad/s\]: what swings
 /// faster is filtered from the torques. The teeth of a screw are a few millimetres apart.
