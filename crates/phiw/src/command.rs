@@ -2,7 +2,7 @@
 
 use crate::arguments::{Arguments, Command};
 use crate::console::{self, Console};
-use crate::{Error, threads};
+use crate::{Error, little_memory, threads};
 use clap::Parser;
 use std::ffi::OsString;
 
@@ -23,10 +23,7 @@ pub fn main(command_line: impl IntoIterator<Item = OsString>) -> u8 {
         }
         // A library's way of saying that the system gave no memory.
         match fault.to_string().contains("AllocError") {
-            true => console::say(
-                "error: ",
-                "there is not enough memory; give phiw more (ulimit -v), or hold joints (--hold)",
-            ),
+            true => console::say("error: ", little_memory::MESSAGE),
             false => console::say("error: phiw itself is at fault, please report it: ", &fault.to_string()),
         }
     }));

@@ -29,6 +29,7 @@ pub mod identify;
 mod identify_arguments;
 mod in_memory;
 pub mod input;
+pub mod little_memory;
 mod log_apart;
 mod log_inputs;
 pub mod map;

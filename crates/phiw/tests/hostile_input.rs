@@ -147,3 +147,29 @@ fn a_small_address_space_is_no_panic() {
         assert_eq!(output.status.code(), Some(0), "{kilobytes} kB: {message}");
     }
 }
+
+/// The standard library's two lines and a signal were all that was said where an allocation failed.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_that_is_used_up_is_one_message() {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("robot.urdf"), synthetic::URDF).unwrap();
+    fs::write(folder.path().join("train.csv"), synthetic::csv(&synthetic::recording(1, 15.0))).unwrap();
+    let words = "explain --urdf robot.urdf --train train.csv --out out";
+    let mut used_up = 0;
+    for kilobytes in (30_000..60_000).step_by(3_000) {
+        let script = format!("ulimit -v {kilobytes}; exec {} {words}", env!("CARGO_BIN_EXE_phiw"));
+        let mut shell = std::process::Command::new("sh");
+        shell.args(["-c", &script]).env("RAYON_NUM_THREADS", "1").env("RUST_BACKTRACE", "1");
+        let output = shell.current_dir(folder.path()).output().unwrap();
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        // Below some size no program is loaded at all.
+        if output.status.code() == Some(0) || message.contains("shared libraries") {
+            continue;
+        }
+        used_up += 1;
+        assert_eq!(output.status.code(), Some(1), "{kilobytes} kB: {message}");
+        assert!(message.lines().count() == 1 && message.contains("not enough memory"), "{message}");
+    }
+    assert!(used_up > 0, "every size was enough");
+}

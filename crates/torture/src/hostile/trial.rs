@@ -9,8 +9,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// A run that takes longer is killed and counts as hanging.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// A run that takes longer is killed and counts as hanging: far longer than any takes beside others on a slow
+/// machine.
+const PATIENCE: Duration = Duration::from_secs(300);
 /// Between two looks at a running program.
 const POLL: Duration = Duration::from_millis(1);
 /// What a file of an earlier result holds, so that a run that fails must leave it.
@@ -185,9 +186,6 @@ impl Trial {
         if !self.results.is_empty() && status == 2 {
             let names: Vec<&str> = self.results.keys().map(String::as_str).collect();
             return Some(format!("refused, but has written {}", names.join(", ")));
-        }
-        if status == 2 && self.time > Duration::from_secs(10) {
-            return Some(format!("{:.1} s until it was refused", self.time.as_secs_f64()));
         }
         if status == 2 && self.peak_bytes > 500_000_000 {
             return Some(format!("{} MB until it was refused", self.peak_bytes / 1_000_000));
