@@ -136,7 +136,13 @@ impl EffectKind for TransmissionCoupling {
         let speed = site.iter().map(|&joint| ranges.joints[joint].velocity_rms).fold(0.0, f64::max);
         product(&values(TERMS_CONSTANT, COMBINATIONS.map(f64::from)), &values(WIDTH, [0.02 * speed]))
     }
-    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+    fn refine(
+        &self,
+        _site: &[usize],
+        _ranges: &SignalRanges,
+        found: &Constants,
+        step: usize,
+    ) -> Vec<Constants> {
         if constant(found, TERMS_CONSTANT, 0.0) as u32 & 0b1100_1100 == 0 {
             return Vec::new();
         }

@@ -32,7 +32,13 @@ impl EffectKind for ThermalDrift {
         }
         variants
     }
-    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+    fn refine(
+        &self,
+        _site: &[usize],
+        _ranges: &SignalRanges,
+        found: &Constants,
+        step: usize,
+    ) -> Vec<Constants> {
         let mut near = around(found, TIME_CONSTANT, step);
         near.retain(|constants| constant(constants, TIME_CONSTANT, SHORTEST_S) >= SHORTEST_S);
         near
@@ -83,7 +89,7 @@ impl EffectKind for ThermalDrift {
 mod tests {
     use super::ThermalDrift;
     use crate::fitted::FittedEffect;
-    use crate::kind::EffectKind;
+    use crate::kind::{EffectKind, SignalRanges};
     use phiw_identification::EffectSpec;
 
     /// A drift over 0.27 s was refined from one over 1.25 s: the first moments of a log of ten seconds.
@@ -91,7 +97,7 @@ mod tests {
     fn a_drift_is_not_refined_to_the_first_moments_of_a_log() {
         let found = EffectSpec::new("thermal_drift", &["elbow"]).with("time_constant", 1.25).constants;
         for step in 0..6 {
-            let near = ThermalDrift.refine(&found, step);
+            let near = ThermalDrift.refine(&[0], &SignalRanges::default(), &found, step);
             assert!(!near.is_empty() && near.iter().all(|near| near["time_constant"] >= 1.0), "{near:?}");
         }
     }

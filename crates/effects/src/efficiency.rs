@@ -39,7 +39,13 @@ impl EffectKind for DriveEfficiency {
         let widths: Vec<Constants> = few_sign_widths(site[0], ranges).into_iter().step_by(2).collect();
         product(&values(PART, [DRIVING, DRIVEN, BOTH]), &widths)
     }
-    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+    fn refine(
+        &self,
+        _site: &[usize],
+        _ranges: &SignalRanges,
+        found: &Constants,
+        step: usize,
+    ) -> Vec<Constants> {
         around(found, WIDTH, step)
     }
     fn declared_constants(&self) -> Option<Constants> {

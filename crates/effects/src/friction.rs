@@ -56,7 +56,13 @@ impl EffectKind for Coulomb {
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         sign_widths(site[0], ranges)
     }
-    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+    fn refine(
+        &self,
+        _site: &[usize],
+        _ranges: &SignalRanges,
+        found: &Constants,
+        step: usize,
+    ) -> Vec<Constants> {
         signs_near(found, step).into_iter().chain(bristles_near(found, step)).collect()
     }
     fn turned_over_a_way(&self, found: &Constants) -> Option<Constants> {
@@ -112,7 +118,13 @@ impl EffectKind for Asymmetric {
     fn declared_constants(&self) -> Option<Constants> {
         Some(Constants::from([("part".to_owned(), 2.0)]))
     }
-    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+    fn refine(
+        &self,
+        _site: &[usize],
+        _ranges: &SignalRanges,
+        found: &Constants,
+        step: usize,
+    ) -> Vec<Constants> {
         around(found, WIDTH, step)
     }
     fn telling_motion(&self) -> &'static str {
@@ -208,7 +220,13 @@ impl EffectKind for Stribeck {
         let shapes = product(&speeds, &values(EXPONENT, [1.0, 2.0]));
         product(&shapes, &values(WIDTH, [0.02 * speed]))
     }
-    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+    fn refine(
+        &self,
+        _site: &[usize],
+        _ranges: &SignalRanges,
+        found: &Constants,
+        step: usize,
+    ) -> Vec<Constants> {
         let mut near = around(found, STRIBECK_VELOCITY, step);
         near.extend(around(found, WIDTH, step));
         near.extend(around(found, EXPONENT, step));
@@ -285,7 +303,13 @@ impl EffectKind for LoadDependent {
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         few_sign_widths(site[0], ranges)
     }
-    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+    fn refine(
+        &self,
+        _site: &[usize],
+        _ranges: &SignalRanges,
+        found: &Constants,
+        step: usize,
+    ) -> Vec<Constants> {
         around(found, WIDTH, step).into_iter().chain(bristles_near(found, step)).collect()
     }
     fn turned_over_a_way(&self, found: &Constants) -> Option<Constants> {

@@ -24,7 +24,13 @@ impl EffectKind for Hysteresis {
         let (lower, upper) = ranges.joints[site[0]].position;
         values(PRESLIDING, (0..8).map(|halvings| 0.3 * (upper - lower) * 0.5_f64.powi(halvings)))
     }
-    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+    fn refine(
+        &self,
+        _site: &[usize],
+        _ranges: &SignalRanges,
+        found: &Constants,
+        step: usize,
+    ) -> Vec<Constants> {
         around(found, PRESLIDING, step)
     }
     fn mends_turning(&self) -> bool {

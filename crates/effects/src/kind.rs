@@ -58,8 +58,15 @@ pub trait EffectKind: Send + Sync {
         vec![Constants::new()]
     }
 
-    /// Constants near `found`, closer together than the scan's; `step` counts the refinements so far.
-    fn refine(&self, _found: &Constants, _step: usize) -> Vec<Constants> {
+    /// Constants near `found`, closer together than the scan's of the same site and ranges; `step` counts the
+    /// refinements so far.
+    fn refine(
+        &self,
+        _site: &[usize],
+        _ranges: &SignalRanges,
+        _found: &Constants,
+        _step: usize,
+    ) -> Vec<Constants> {
         Vec::new()
     }
 

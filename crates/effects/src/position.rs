@@ -111,7 +111,13 @@ impl EffectKind for TorqueRipple {
         let peaks = ranges.ripple_frequencies.get(site[0]).cloned().unwrap_or_default();
         product(&values(FREQUENCY, peaks), &values(HARMONICS, [1.0, 2.0]))
     }
-    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+    fn refine(
+        &self,
+        _site: &[usize],
+        _ranges: &SignalRanges,
+        found: &Constants,
+        step: usize,
+    ) -> Vec<Constants> {
         // The scan knows N to a hundredth; a phase slip over the range is what decides.
         let Some(&frequency) = found.get(FREQUENCY) else { return Vec::new() };
         let spread = 0.01 * 0.4_f64.powi(step as i32);
@@ -193,10 +199,18 @@ impl EffectKind for EndStop {
         };
         [side(1.0, upper), side(-1.0, lower)].concat()
     }
-    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+    fn refine(
+        &self,
+        site: &[usize],
+        ranges: &SignalRanges,
+        found: &Constants,
+        step: usize,
+    ) -> Vec<Constants> {
         let Some(&stop) = found.get(STOP) else { return Vec::new() };
         let exponent = constant(found, EXPONENT, 1.0);
-        let spread = 0.02 * 0.5_f64.powi(step as i32);
+        // A share of the joint's travel, as the scan's are: a slide of 0.1 m knows no steps of 0.02.
+        let travel = ranges.joints.get(site[0]).map_or(1.0, |joint| joint.position.1 - joint.position.0);
+        let spread = 0.02 * travel * 0.5_f64.powi(step as i32);
         let with = |stop: f64, exponent: f64| {
             let mut near = found.clone();
             near.insert(STOP.to_owned(), stop);

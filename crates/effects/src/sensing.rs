@@ -131,7 +131,13 @@ impl EffectKind for ActuatorSaturation {
             |limit: f64| Constants::from([(LIMIT.to_owned(), limit), (LEAST_LIMIT.to_owned(), lowest)]);
         (0..8).map(|power| with(lowest * step.powi(power))).collect()
     }
-    fn refine(&self, found: &Constants, step: usize) -> Vec<Constants> {
+    fn refine(
+        &self,
+        _site: &[usize],
+        _ranges: &SignalRanges,
+        found: &Constants,
+        step: usize,
+    ) -> Vec<Constants> {
         let Some(&limit) = found.get(LIMIT) else { return Vec::new() };
         let spread = 0.04 * 0.5_f64.powi(step as i32);
         let least = constant(found, LEAST_LIMIT, 0.0);

@@ -90,7 +90,8 @@ fn every_formula_is_its_effect() {
         let mut count = 0;
         for site in kind.sites(&tree) {
             let scanned = kind.scan(&site, &ranges);
-            let refined = scanned.last().map(|found| kind.refine(found, 0)).unwrap_or_default();
+            let refined =
+                scanned.last().map(|found| kind.refine(&site, &ranges, found, 0)).unwrap_or_default();
             for constants in scanned.into_iter().chain(refined) {
                 let effect = kind.build(&tree, &site, &constants);
                 let (spec, parameters) = (effect.spec(), effect.parameters());

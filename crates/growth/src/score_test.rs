@@ -234,12 +234,17 @@ impl ScoreTest {
         logs: &[MotionLog],
         mut best: Vec<Gain>,
     ) -> Result<Vec<Gain>, CurriculumError> {
+        let ranges = ranges(robot, logs);
         for step in 0..self.settings.refinements {
             let mut near: Vec<EffectSpec> = Vec::new();
             for gain in &best {
                 let kind = self.catalogue.kind(&gain.effect.kind)?;
-                let refined = kind.refine(&gain.effect.constants, step).into_iter();
-                near.extend(refined.map(|constants| EffectSpec { constants, ..gain.effect.clone() }));
+                let joints = gain.effect.joints.iter();
+                let site: Vec<usize> = joints.filter_map(|joint| robot.tree().joint_index(joint)).collect();
+                let refined = kind.refine(&site, &ranges, &gain.effect.constants, step);
+                near.extend(
+                    refined.into_iter().map(|constants| EffectSpec { constants, ..gain.effect.clone() }),
+                );
             }
             if near.is_empty() {
                 break;

@@ -3,7 +3,7 @@
 use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Tree, Workspace};
-use phiw_effects::Catalogue;
+use phiw_effects::{Catalogue, SignalRanges};
 use phiw_identification::{BlockSource, Data, EffectCatalogue, EffectSpec, Fold, identify};
 use phiw_residual::trace::{ScannedConstant, scanned_constants};
 use phiw_telemetry::{Conditioning, ConditioningOptions, Recording};
@@ -137,7 +137,7 @@ fn found(case: &Case, seed: u64) -> (f64, [f64; 2], bool) {
     let held_out = train.pop().into_iter().collect();
     let data = Data { train, held_out, sources: vec![&blocks as &dyn BlockSource], rest_speeds: vec![0.0] };
     let mut model = identify(&tree, effects, &data).unwrap();
-    let constants = scanned_constants(&catalogue, &mut model, &data).unwrap();
+    let constants = scanned_constants(&catalogue, &SignalRanges::default(), &mut model, &data).unwrap();
     let viscous = model.design.effect_parameters(0).start;
     let [low, high] = model.fit.intervals_95[viscous];
     let holds = low <= VISCOUS && VISCOUS <= high;
@@ -194,7 +194,9 @@ fn a_model_without_such_constants_costs_no_pass() {
     let before = model.fit.intervals_95.clone();
     let nothing =
         Data { train: Vec::new(), held_out: Vec::new(), sources: Vec::new(), rest_speeds: Vec::new() };
-    assert!(scanned_constants(&catalogue, &mut model, &nothing).unwrap().is_empty());
+    assert!(
+        scanned_constants(&catalogue, &SignalRanges::default(), &mut model, &nothing).unwrap().is_empty()
+    );
     assert_eq!(format!("{before:?}"), format!("{:?}", model.fit.intervals_95));
 }
 
@@ -221,7 +223,7 @@ fn the_way_in_which_a_sign_turns_is_no_constant_with_an_interval() {
         rest_speeds: vec![0.0],
     };
     let mut model = identify(&tree, effects, &data).unwrap();
-    let constants = scanned_constants(&catalogue, &mut model, &data).unwrap();
+    let constants = scanned_constants(&catalogue, &SignalRanges::default(), &mut model, &data).unwrap();
     let [width] = constants.as_slice() else { panic!("{constants:?}") };
     assert_eq!(width.name, "sign_width");
     let free = width.free.unwrap();

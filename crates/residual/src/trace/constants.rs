@@ -44,10 +44,10 @@ impl Search<'_> {
                 continue;
             }
             let kind = self.fixed.catalogue.kind(&spec.kind)?;
-            let mut near = kind.refine(&spec.constants, step);
+            let site: Vec<usize> =
+                spec.joints.iter().filter_map(|joint| self.fixed.tree.joint_index(joint)).collect();
+            let mut near = kind.refine(&site, &self.input.ranges, &spec.constants, step);
             if step == 0 && place < self.declared && !spec.constants.is_empty() {
-                let site: Vec<usize> =
-                    spec.joints.iter().filter_map(|joint| self.fixed.tree.joint_index(joint)).collect();
                 near.extend(kind.scan(&site, &self.input.ranges));
             }
             let specs = near.into_iter().map(|constants| EffectSpec { constants, ..spec.clone() });

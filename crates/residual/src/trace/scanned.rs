@@ -1,6 +1,6 @@
 //! Constants that were found by scanning, with their deviations.
 
-use phiw_effects::{Catalogue, Constants};
+use phiw_effects::{Catalogue, Constants, SignalRanges};
 use phiw_identification::fitting::{ByConstant, FreeConstant, accumulate, free_constants};
 use phiw_identification::{Data, Design, Effect, EffectCatalogue, IdentificationError, Identified};
 
@@ -23,7 +23,7 @@ pub struct ScannedConstant {
     pub free: Option<FreeConstant>,
 }
 
-/// The constants of a fitted model that its kinds refine, as sure as the training folds are of them; the
+/// The constants of a fitted model that its kinds refine within `ranges`, as sure as the training folds are of them; the
 /// model's own deviations and intervals are then of parameters with these constants free.
 ///
 /// One more pass over the training motion, where there is any such constant.
@@ -32,6 +32,7 @@ pub struct ScannedConstant {
 /// A log cannot be read any more.
 pub fn scanned_constants(
     catalogue: &Catalogue,
+    ranges: &SignalRanges,
     model: &mut Identified,
     data: &Data<'_>,
 ) -> Result<Vec<ScannedConstant>, IdentificationError> {
@@ -41,7 +42,8 @@ pub fn scanned_constants(
     let mut derivatives: Vec<Box<dyn Effect>> = Vec::new();
     for (index, effect) in design.effects().iter().enumerate() {
         let (spec, parameters) = (effect.spec(), effect.parameters());
-        let near = catalogue.kind(&spec.kind)?.refine(&spec.constants, 0);
+        let site: Vec<usize> = spec.joints.iter().filter_map(|joint| tree.joint_index(joint)).collect();
+        let near = catalogue.kind(&spec.kind)?.refine(&site, ranges, &spec.constants, 0);
         for (name, &value) in &spec.constants {
             // Where it stands for a parameter, that has the deviation.
             if parameters.iter().any(|parameter| parameter.name == *name) {

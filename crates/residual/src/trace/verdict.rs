@@ -119,7 +119,7 @@ impl Search<'_> {
         let mut model = Identified { design, fit: final_fit, train, held_out, train_folds, held_out_folds };
         let mut constants = Vec::new();
         if self.fixed.prior.is_none() {
-            constants = scanned_constants(self.fixed.catalogue, &mut model, data)?;
+            constants = scanned_constants(self.fixed.catalogue, &self.input.ranges, &mut model, data)?;
             let impossible = self.impossible(&model.design, &model.fit);
             let uncertain = self.uncertain(&model, effects.len())?;
             let untold = untold(&model.design, &model.fit, self.declared);
