@@ -102,6 +102,15 @@ impl TorqueError {
         (squares(&counted.collect::<Vec<f64>>()) / squares(&self.rms_torque)).sqrt()
     }
 
+    /// Mean over the torques of the logarithm of error over torque, counted as in [`Self::relative_from`]: in
+    /// it a joint of small torques counts as much as one of large ones.
+    #[must_use]
+    pub fn mean_logarithm_from(&self, share: f64) -> f64 {
+        let torques = self.rmse.iter().zip(&self.rms_torque).filter(|(_, torque)| **torque > 0.0);
+        let logarithms: Vec<f64> = torques.map(|(rmse, torque)| (rmse / torque).max(share).ln()).collect();
+        logarithms.iter().sum::<f64>() / logarithms.len().max(1) as f64
+    }
+
     /// Where the error of all torques together is larger than they are, those torques whose error is larger
     /// than themselves: no model at all would be a better one.
     pub fn torques_worse_than_none(&self) -> impl Iterator<Item = usize> {

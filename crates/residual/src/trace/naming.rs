@@ -272,8 +272,8 @@ impl Search<'_> {
     }
 
     /// Whether a form of something simpler is worth a name of its own: it must take away most of what the
-    /// simpler ones leave, be a share of the torque, and be large beside what it is a form of or leave next
-    /// to nothing.
+    /// simpler ones leave beyond the noise, be a share of the torque, and be large beside what it is a form
+    /// of or leave next to nothing but noise.
     pub(super) fn is_form_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
         let hypothesis = &trial.problem.hypotheses[member.hypothesis];
         hypothesis.torques.iter().any(|&torque| {
@@ -285,9 +285,14 @@ impl Search<'_> {
             let simpler: Vec<(usize, f64)> =
                 simpler.flat_map(|&other| trial.values_of(other, torque)).collect();
             let of_simpler = trial.torque(torque).size_of(&simpler);
+            // Nobody takes away noise; nor is more known of what is left than it is the same as noise.
+            let noise = trial.torque(torque).rows() * self.input.noise_floor[torque].powi(2);
+            let unknown = (self.options.thresholds.same_error.powi(2) - 1.0) * noise;
+            let [left_without, left_with] =
+                [without, with].map(|squares| (squares - noise).max(unknown).max(f64::MIN_POSITIVE));
             !self.is_as_it_was(torque, (without / trial.torque(torque).rows().max(1.0)).sqrt())
-                && taken >= self.options.thresholds.least_share_of_kin * without
-                && taken * without >= self.options.thresholds.least_of_others * of_simpler * with
+                && taken >= self.options.thresholds.least_share_of_kin * left_without
+                && taken * left_without >= self.options.thresholds.least_of_others * of_simpler * left_with
                 && (taken / whole).sqrt() >= self.options.thresholds.least_size
         })
     }

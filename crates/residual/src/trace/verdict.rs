@@ -37,9 +37,15 @@ impl Search<'_> {
     }
 
     /// Whether the model's error on motion held out is no worse than the declared one's, of all torques
-    /// together.
+    /// together. What is the same error there is no worse where it is made up for in the mean of the torques:
+    /// one joint of large torques that nothing foretells has no say about all others.
     pub(super) fn is_no_worse_than_declared(&self, tracing: &Tracing) -> bool {
-        self.counted(&tracing.model.held_out) <= (1.0 + ROUNDING) * self.counted(&tracing.before.1)
+        let (after, before) = (&tracing.model.held_out, &tracing.before.1);
+        let growth = (self.counted(after) / self.counted(before)).ln();
+        let share = self.options.thresholds.negligible_share();
+        let of_the_mean = after.mean_logarithm_from(share) - before.mean_logarithm_from(share);
+        let is_same = growth <= self.options.thresholds.same_error.ln();
+        growth <= ROUNDING || is_same && growth + of_the_mean <= 0.0
     }
 
     /// The error of all torques together, over them, where one that is as good as none counts as the largest
