@@ -407,3 +407,50 @@ fn gains_that_the_logs_do_not_tell_stay_at_nothing() {
     // Before, they were 1 % apart here.
     assert!((with / without - 1.0).abs() < 1e-6, "{without} without gains, {with} with them");
 }
+
+/// Where joints move one after the other in training and together in what is held out, the fit that judged
+/// what does harm there was not the one that is reported: true frictions left the model.
+#[test]
+fn frictions_of_joints_that_move_in_turn_keep_their_names() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/puma560.urdf");
+    let urdf = fs::read_to_string(file).unwrap();
+    let tree = read(&urdf);
+    let frictions = frictions(&tree);
+    for run in 0..3 {
+        let logs = [1, 2, 3, 4].map(|number| {
+            let seed = 10 * run + number;
+            log(&tree, &frictions, &Motion { seed, in_turn: number < 4, ..USUAL }, &|_, _, _| ())
+        });
+        let report = explained(&urdf, &logs, &[]);
+        let joints = |kind| named(&report, kind).len();
+        let frictions = [joints("viscous_friction"), joints("coulomb_friction")];
+        assert_eq!(frictions, [6, 6], "{run}: {:?}", report.warnings);
+    }
+}
+
+/// The torque of one joint was of an unstable drive, four hundred times that of the others and foretold by
+/// nothing. Its error grew by less than a thousandth, and all names of the others were taken back for it.
+#[test]
+fn one_joint_that_nothing_foretells_takes_no_names_from_the_others() {
+    let tree = read(synthetic::URDF);
+    let frictions = frictions(&tree);
+    for run in 0..4 {
+        let logs = [1, 2, 3].map(|number| {
+            let seed = 10 * run + number;
+            let mut log = log(&tree, &frictions, &Motion { seed, ..USUAL }, &|_, _, _| ());
+            let joints = tree.joint_count();
+            let mut random = RandomNumbers::new(1000 + seed);
+            let mut wild = 0.0;
+            for torque in log.tau.iter_mut().step_by(joints) {
+                wild = 0.8 * wild + random.uniform(-1.0, 1.0);
+                *torque += 1000.0 * wild * frictions[0][1];
+            }
+            log
+        });
+        let report = explained(synthetic::URDF, &logs, &[]);
+        for kind in ["viscous_friction", "coulomb_friction"] {
+            let others: BTreeSet<String> = tree.joint_names().skip(1).map(str::to_owned).collect();
+            assert!(named(&report, kind).is_superset(&others), "{run}, {kind}: {:?}", report.verdict);
+        }
+    }
+}

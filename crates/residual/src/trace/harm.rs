@@ -3,6 +3,8 @@
 use super::search::Search;
 use super::trial::Trial;
 use crate::selection::{Member, Products};
+use phiw_identification::IdentificationError;
+use phiw_identification::fitting::{OwnTorqueFit, TorqueError, torque_error};
 use rayon::prelude::*;
 
 /// What speaks against an effect.
@@ -91,6 +93,32 @@ impl Search<'_> {
         });
         let worst = growth.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))?;
         (0.5 * worst.0 > self.options.thresholds.same_error.ln()).then_some(worst.1)
+    }
+
+    /// Whether an effect that is [`Self::misleading`] on trial makes the errors on motion held out larger in
+    /// the model as it will be fitted, too. Where training motion hardly tells some parameters, that draws
+    /// them to nothing and the fit on trial does not: there any parameter moves these, and they the errors.
+    pub(super) fn is_misleading_as_fitted(&self, place: usize) -> Result<bool, IdentificationError> {
+        let (is_drawn, with) = self.held_out_error_as_fitted()?;
+        if !is_drawn {
+            return Ok(true);
+        }
+        let mut branch = self.clone();
+        branch.remove(place)?;
+        branch.refine()?;
+        let (_, without) = branch.held_out_error_as_fitted()?;
+        let share = self.options.thresholds.negligible_share();
+        let mean = with.mean_logarithm_from(share) - without.mean_logarithm_from(share);
+        let together = (self.counted(&with) / self.counted(&without)).ln();
+        Ok(mean.max(together) > self.options.thresholds.same_error.ln())
+    }
+
+    /// The error on motion held out of the model as it is fitted in the end, and whether the fit draws its
+    /// parameters to nothing.
+    fn held_out_error_as_fitted(&self) -> Result<(bool, TorqueError), IdentificationError> {
+        let OwnTorqueFit { fit, folds, .. } = self.final_fit(false)?;
+        let held_out = &folds.moving[self.whole.train.len()..];
+        Ok((fit.is_drawn, torque_error(held_out, &fit.parameters)?))
     }
 
     /// The sum of what is left of the torques held out, where what is as good as none counts as the largest

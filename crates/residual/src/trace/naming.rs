@@ -56,7 +56,9 @@ impl Search<'_> {
             let trial = self.trial()?;
             let mut harmful = self.harmful(&trial, harm);
             if harmful.is_empty() {
-                harmful = self.misleading(&trial).into_iter().collect();
+                let misleading = self.misleading(&trial);
+                let confirmed = misleading.map(|place| self.is_misleading_as_fitted(place)).transpose()?;
+                harmful = misleading.filter(|_| confirmed != Some(false)).into_iter().collect();
                 self.held_out_had_a_say |= !harmful.is_empty();
                 self.left_out_by_held_out.extend(harmful.iter().map(|&place| self.specs[place].clone()));
             }
