@@ -48,18 +48,32 @@ impl Products {
 
     /// RᵀR. The factor of few rows has as few that are not zero.
     pub fn of_factor(factor: &Factor) -> Self {
-        let rows = usize::try_from(factor.rows()).map_or(factor.columns(), |rows| rows.min(factor.columns()));
-        let products = Products::of_rows(factor.as_mat().subrows(0, rows));
-        Products { rows: factor.rows() as f64, ..products }.without_rounding()
+        Products::of_factor_beside(factor, factor.columns() - 1)
     }
 
-    /// The same where columns of which there is nothing but what rounding makes beside the largest are zero.
+    /// The same where the first `rigid_body` columns say what is rounding
+    /// ([`without_rounding`](Self::without_rounding)).
+    pub fn of_factor_beside(factor: &Factor, rigid_body: usize) -> Self {
+        let rows = usize::try_from(factor.rows()).map_or(factor.columns(), |rows| rows.min(factor.columns()));
+        let products = Products::of_rows(factor.as_mat().subrows(0, rows));
+        Products { rows: factor.rows() as f64, ..products }.without_rounding(rigid_body)
+    }
+
+    /// The same where columns of which there is nothing but what rounding makes beside the largest of the
+    /// rigid body's, which are the first, are zero; beside the largest of all where it has none. A candidate
+    /// that is made of the torque of a model without sense is larger than any, and says nothing of the
+    /// others.
     #[must_use]
-    pub fn without_rounding(mut self) -> Self {
+    pub fn without_rounding(mut self, rigid_body: usize) -> Self {
         let size = self.size;
         let square = |column: usize| self.values[column * size + column];
         let parameters = 0..size.saturating_sub(1);
-        let least = ROUNDING * ROUNDING * parameters.clone().map(square).fold(0.0, f64::max);
+        let largest = |columns: std::ops::Range<usize>| columns.map(square).fold(0.0, f64::max);
+        let largest = match largest(0..rigid_body) {
+            0.0 => largest(parameters.clone()),
+            largest => largest,
+        };
+        let least = ROUNDING * ROUNDING * largest;
         let rounded: Vec<usize> = parameters.filter(|&column| square(column) < least).collect();
         for column in rounded {
             for other in 0..size {
@@ -202,5 +216,18 @@ mod tests {
         assert_eq!(products.column(1), [0.0; 3]);
         assert!(products.column(0).iter().zip([1, 0, 1]).all(|(value, some)| (*value != 0.0) == (some == 1)));
         assert!(products.right_hand_side() > 1.0);
+    }
+
+    /// Logs in which joints move in turn gave parameters of 10⁸, and columns that are made of such a model's
+    /// torque made a rounding of the rigid body's: nothing but the wrists was fitted any more.
+    #[test]
+    fn a_candidate_without_sense_leaves_the_rigid_body_as_it_is() {
+        let row = |k: f64| [k.sin(), 1e15 * (3.0 * k).cos(), (2.0 * k).sin()];
+        let rows: Vec<f64> = (0..40).flat_map(|k| row(f64::from(k))).collect();
+        let factor = Factor::of_rows(3, &rows).unwrap();
+        let left = |products: Products| products.column(0)[0] != 0.0;
+        assert!(left(Products::of_factor_beside(&factor, 1)));
+        // Without a rigid body the largest of all says what is rounding.
+        assert!(!left(Products::of_factor_beside(&factor, 0)));
     }
 }

@@ -218,6 +218,7 @@ impl KeptColumns {
         if numbers * self.rows.unwrap_or_default() * size_of::<f64>() > KEPT_BYTES {
             self.blocks.clear();
         }
+        let base = design.base().count();
         let whole = |(pieces, layout): (Vec<(usize, Products)>, &RowLayout)| {
             let mut sums: Vec<Option<Products>> = vec![None; folds];
             for (fold, products) in pieces {
@@ -227,7 +228,8 @@ impl KeptColumns {
                 }
             }
             let zero = || Products::zero(layout.parameters.len() + 1);
-            sums.into_iter().map(|sum| sum.unwrap_or_else(zero).without_rounding()).collect()
+            let rigid_body = layout.parameters.partition_point(|&parameter| parameter < base);
+            sums.into_iter().map(|sum| sum.unwrap_or_else(zero).without_rounding(rigid_body)).collect()
         };
         of_torques.into_par_iter().zip(design.rows()).map(whole).collect()
     }

@@ -10,7 +10,7 @@ use phiw_identification::effect::ReferenceModel;
 use phiw_identification::fitting::accumulate;
 use phiw_identification::{Data, Design, Effect, EffectCatalogue, EffectSpec, Fold, IdentificationError};
 use phiw_regressor::factor::{Factor, FactorBuilder};
-use phiw_regressor::least_squares::GroupedFactor;
+use phiw_regressor::least_squares::{Group, GroupedFactor};
 use phiw_regressor::{BaseParameters, RegressorError};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -151,9 +151,13 @@ impl<'a> Fixed<'a> {
     ) -> Result<Stage, IdentificationError> {
         if let Some(prior) = &self.prior {
             let (design, folds) = self.factors(specs, candidates, reference, folds)?;
-            let of_torque = |torque: usize| {
-                folds.iter().map(|fold| Products::of_factor(&fold.groups()[torque].factor)).collect()
+            let of_fold = |group: &Group| {
+                let base = self.base.count();
+                let rigid_body = group.parameters.partition_point(|&parameter| parameter < base);
+                Products::of_factor_beside(&group.factor, rigid_body)
             };
+            let of_torque =
+                |torque: usize| folds.iter().map(|fold| of_fold(&fold.groups()[torque])).collect();
             return Ok(Stage {
                 model_effects: specs.len(),
                 not_finite: design.not_finite(),
