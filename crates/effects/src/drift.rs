@@ -16,6 +16,8 @@ const TIME_CONSTANT: &str = "time_constant";
 /// Shortest time constant that a refinement leads to \[s\]: what is over sooner is how a log begins, and no
 /// warming.
 const SHORTEST_S: f64 = 1.0;
+/// Longest time constant that a refined one may have, in sessions: an exponential falls by 30 % then.
+const LONGEST: f64 = 3.0;
 /// Temperatures enter over this span \[K\], so that the parameters are torques at a change that is usual.
 const TEMPERATURE_SPAN: f64 = 10.0;
 const ROOM_TEMPERATURE: f64 = 20.0;
@@ -35,12 +37,15 @@ impl EffectKind for ThermalDrift {
     fn refine(
         &self,
         _site: &[usize],
-        _ranges: &SignalRanges,
+        ranges: &SignalRanges,
         found: &Constants,
         step: usize,
     ) -> Vec<Constants> {
         let mut near = around(found, TIME_CONSTANT, step);
-        near.retain(|constants| constant(constants, TIME_CONSTANT, SHORTEST_S) >= SHORTEST_S);
+        // Over many times the session it is no drift any more but a friction that stays.
+        let longest = LONGEST * (ranges.session.1 - ranges.session.0);
+        let time = |constants: &Constants| constant(constants, TIME_CONSTANT, SHORTEST_S);
+        near.retain(|constants| (SHORTEST_S..=longest).contains(&time(constants)));
         near
     }
     fn telling_motion(&self) -> &'static str {
@@ -96,10 +101,24 @@ mod tests {
     #[test]
     fn a_drift_is_not_refined_to_the_first_moments_of_a_log() {
         let found = EffectSpec::new("thermal_drift", &["elbow"]).with("time_constant", 1.25).constants;
+        let ranges = SignalRanges { session: (0.0, 10.0), ..SignalRanges::default() };
         for step in 0..6 {
-            let near = ThermalDrift.refine(&[0], &SignalRanges::default(), &found, step);
+            let near = ThermalDrift.refine(&[0], &ranges, &found, step);
             assert!(!near.is_empty() && near.iter().all(|near| near["time_constant"] >= 1.0), "{near:?}");
         }
+    }
+
+    /// Logs of 80 s had a viscous friction that was called a drift over 7000 s.
+    #[test]
+    fn a_drift_is_not_refined_to_a_friction_that_stays() {
+        let mut found = EffectSpec::new("thermal_drift", &["elbow"]).with("time_constant", 80.0).constants;
+        let ranges = SignalRanges { session: (0.0, 80.0), ..SignalRanges::default() };
+        for step in [0; 20] {
+            let near = ThermalDrift.refine(&[0], &ranges, &found, step);
+            let longest = near.into_iter().max_by(|a, b| a["time_constant"].total_cmp(&b["time_constant"]));
+            found = longest.unwrap();
+        }
+        assert!((150.0..=240.0).contains(&found["time_constant"]), "{found:?}");
     }
 
     /// "Falls as it warms up" was said of friction that is less when cold.
