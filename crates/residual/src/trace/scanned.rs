@@ -23,8 +23,8 @@ pub struct ScannedConstant {
     pub free: Option<FreeConstant>,
 }
 
-/// The constants of a fitted model that its kinds refine within `ranges`, as sure as the training folds are of them; the
-/// model's own deviations and intervals are then of parameters with these constants free.
+/// The constants of a fitted model that its kinds refine within `ranges`, as sure as the training folds are
+/// of them; the model's own deviations and intervals are then of parameters with these constants free.
 ///
 /// One more pass over the training motion, where there is any such constant.
 ///
