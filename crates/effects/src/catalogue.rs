@@ -1,7 +1,7 @@
 //! The catalogue finds kinds of effects by name, and builds them from a model's file.
 
 use crate::declaration::{cannot_act, joint_indices, nearest};
-use crate::{EffectKind, FittedEffect, Mechanisms, ServoFriction};
+use crate::{Constants, EffectKind, FittedEffect, Mechanisms, Refinement, ServoFriction, SignalRanges};
 use crate::{coupling, drift, drive, efficiency, elasticity, external, friction, hysteresis};
 use crate::{logged_torque, position, position_map, sensing, torque_gain, torque_zero};
 use phiw_codegen::JointTorque;
@@ -62,6 +62,22 @@ impl Catalogue {
     /// All kinds.
     pub fn kinds(&self) -> impl Iterator<Item = &dyn EffectKind> {
         self.kinds.iter().map(Box::as_ref)
+    }
+
+    /// Constants near those of an effect ([`EffectKind::refine`]).
+    ///
+    /// # Errors
+    /// Its kind or a joint is unknown.
+    pub fn refined(
+        &self,
+        spec: &EffectSpec,
+        tree: &Tree,
+        ranges: &SignalRanges,
+        step: usize,
+    ) -> Result<Vec<Constants>, EffectError> {
+        let site = joint_indices(&spec.kind, &spec.joints, tree)?;
+        let from = Refinement { found: &spec.constants, site: &site, ranges, step };
+        Ok(self.kind(&spec.kind)?.refine(&from))
     }
 
     /// The place of a kind in the order of simplicity; none for one that is unknown here.

@@ -3,7 +3,7 @@
 
 use crate::columns::ParameterKind;
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, SignalRanges, constant, product, values};
+use crate::kind::{Constants, EffectKind, Refinement, SignalRanges, constant, product, values};
 use crate::mechanism::{Mechanism, Mechanisms};
 use crate::sign::{WIDTH, smooth_sign};
 use phiw_codegen::{Expression, JointTorque};
@@ -136,13 +136,7 @@ impl EffectKind for TransmissionCoupling {
         let speed = site.iter().map(|&joint| ranges.joints[joint].velocity_rms).fold(0.0, f64::max);
         product(&values(TERMS_CONSTANT, COMBINATIONS.map(f64::from)), &values(WIDTH, [0.02 * speed]))
     }
-    fn refine(
-        &self,
-        _site: &[usize],
-        _ranges: &SignalRanges,
-        found: &Constants,
-        step: usize,
-    ) -> Vec<Constants> {
+    fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
         if constant(found, TERMS_CONSTANT, 0.0) as u32 & 0b1100_1100 == 0 {
             return Vec::new();
         }

@@ -2,7 +2,7 @@
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, Signal, SignalRanges, around, constant, values};
+use crate::kind::{Constants, EffectKind, Refinement, Signal, SignalRanges, around, constant, values};
 use crate::sign::Sign;
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
@@ -16,7 +16,7 @@ const TIME_CONSTANT: &str = "time_constant";
 /// Shortest time constant that a refinement leads to \[s\]: what is over sooner is how a log begins, and no
 /// warming.
 const SHORTEST_S: f64 = 1.0;
-/// Longest time constant that a refined one may have, in sessions: an exponential falls by 30 % then.
+/// Longest time constant that a refined one may have, in sessions: an exponential falls by 28 % in one then.
 const LONGEST: f64 = 3.0;
 /// Temperatures enter over this span \[K\], so that the parameters are torques at a change that is usual.
 const TEMPERATURE_SPAN: f64 = 10.0;
@@ -34,13 +34,7 @@ impl EffectKind for ThermalDrift {
         }
         variants
     }
-    fn refine(
-        &self,
-        _site: &[usize],
-        ranges: &SignalRanges,
-        found: &Constants,
-        step: usize,
-    ) -> Vec<Constants> {
+    fn refine(&self, &Refinement { found, step, ranges, .. }: &Refinement<'_>) -> Vec<Constants> {
         let mut near = around(found, TIME_CONSTANT, step);
         // Over many times the session it is no drift any more but a friction that stays.
         let longest = LONGEST * (ranges.session.1 - ranges.session.0);
@@ -94,7 +88,7 @@ impl EffectKind for ThermalDrift {
 mod tests {
     use super::ThermalDrift;
     use crate::fitted::FittedEffect;
-    use crate::kind::{EffectKind, SignalRanges};
+    use crate::kind::{EffectKind, Refinement, SignalRanges};
     use phiw_identification::EffectSpec;
 
     /// A drift over 0.27 s was refined from one over 1.25 s: the first moments of a log of ten seconds.
@@ -103,18 +97,18 @@ mod tests {
         let found = EffectSpec::new("thermal_drift", &["elbow"]).with("time_constant", 1.25).constants;
         let ranges = SignalRanges { session: (0.0, 10.0), ..SignalRanges::default() };
         for step in 0..6 {
-            let near = ThermalDrift.refine(&[0], &ranges, &found, step);
+            let near = ThermalDrift.refine(&Refinement { found: &found, site: &[0], ranges: &ranges, step });
             assert!(!near.is_empty() && near.iter().all(|near| near["time_constant"] >= 1.0), "{near:?}");
         }
     }
 
-    /// Logs of 80 s had a viscous friction that was called a drift over 7000 s.
+    /// Logs of 20 s had a viscous friction that was called a drift over 7000 s.
     #[test]
     fn a_drift_is_not_refined_to_a_friction_that_stays() {
         let mut found = EffectSpec::new("thermal_drift", &["elbow"]).with("time_constant", 80.0).constants;
         let ranges = SignalRanges { session: (0.0, 80.0), ..SignalRanges::default() };
         for step in [0; 20] {
-            let near = ThermalDrift.refine(&[0], &ranges, &found, step);
+            let near = ThermalDrift.refine(&Refinement { found: &found, site: &[0], ranges: &ranges, step });
             let longest = near.into_iter().max_by(|a, b| a["time_constant"].total_cmp(&b["time_constant"]));
             found = longest.unwrap();
         }

@@ -3,7 +3,7 @@
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{
-    Constants, EffectKind, Signal, SignalRanges, SpecialCase, around, constant, product, values,
+    Constants, EffectKind, Refinement, Signal, SignalRanges, SpecialCase, around, constant, product, values,
 };
 use crate::sign::{Sign, WIDTH, few_sign_widths};
 use phiw_codegen::{Expression, Function, JointTorque};
@@ -39,13 +39,7 @@ impl EffectKind for DriveEfficiency {
         let widths: Vec<Constants> = few_sign_widths(site[0], ranges).into_iter().step_by(2).collect();
         product(&values(PART, [DRIVING, DRIVEN, BOTH]), &widths)
     }
-    fn refine(
-        &self,
-        _site: &[usize],
-        _ranges: &SignalRanges,
-        found: &Constants,
-        step: usize,
-    ) -> Vec<Constants> {
+    fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
         around(found, WIDTH, step)
     }
     fn declared_constants(&self) -> Option<Constants> {

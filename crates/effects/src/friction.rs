@@ -4,7 +4,7 @@ use crate::bristles::{Bristles, DEFLECTION, bristles_near, with_bristles};
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{
-    Constants, EffectKind, Signal, SignalRanges, SpecialCase, around, constant, product, values,
+    Constants, EffectKind, Refinement, Signal, SignalRanges, SpecialCase, around, constant, product, values,
 };
 use crate::mechanism::ServoFriction;
 use crate::sign::{POWER, Sign, WIDTH, few_sign_widths, sign_widths, signs_near};
@@ -56,13 +56,7 @@ impl EffectKind for Coulomb {
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         sign_widths(site[0], ranges)
     }
-    fn refine(
-        &self,
-        _site: &[usize],
-        _ranges: &SignalRanges,
-        found: &Constants,
-        step: usize,
-    ) -> Vec<Constants> {
+    fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
         signs_near(found, step).into_iter().chain(bristles_near(found, step)).collect()
     }
     fn turned_over_a_way(&self, found: &Constants) -> Option<Constants> {
@@ -118,13 +112,7 @@ impl EffectKind for Asymmetric {
     fn declared_constants(&self) -> Option<Constants> {
         Some(Constants::from([("part".to_owned(), 2.0)]))
     }
-    fn refine(
-        &self,
-        _site: &[usize],
-        _ranges: &SignalRanges,
-        found: &Constants,
-        step: usize,
-    ) -> Vec<Constants> {
+    fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
         around(found, WIDTH, step)
     }
     fn telling_motion(&self) -> &'static str {
@@ -220,13 +208,7 @@ impl EffectKind for Stribeck {
         let shapes = product(&speeds, &values(EXPONENT, [1.0, 2.0]));
         product(&shapes, &values(WIDTH, [0.02 * speed]))
     }
-    fn refine(
-        &self,
-        _site: &[usize],
-        _ranges: &SignalRanges,
-        found: &Constants,
-        step: usize,
-    ) -> Vec<Constants> {
+    fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
         let mut near = around(found, STRIBECK_VELOCITY, step);
         near.extend(around(found, WIDTH, step));
         near.extend(around(found, EXPONENT, step));
@@ -303,13 +285,7 @@ impl EffectKind for LoadDependent {
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         few_sign_widths(site[0], ranges)
     }
-    fn refine(
-        &self,
-        _site: &[usize],
-        _ranges: &SignalRanges,
-        found: &Constants,
-        step: usize,
-    ) -> Vec<Constants> {
+    fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
         around(found, WIDTH, step).into_iter().chain(bristles_near(found, step)).collect()
     }
     fn turned_over_a_way(&self, found: &Constants) -> Option<Constants> {

@@ -2,7 +2,7 @@
 
 use crate::columns::{Formula, OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, SignalRanges, around, constant, values};
+use crate::kind::{Constants, EffectKind, Refinement, SignalRanges, around, constant, values};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
 use phiw_identification::effect::Sample;
@@ -24,13 +24,7 @@ impl EffectKind for Hysteresis {
         let (lower, upper) = ranges.joints[site[0]].position;
         values(PRESLIDING, (0..8).map(|halvings| 0.3 * (upper - lower) * 0.5_f64.powi(halvings)))
     }
-    fn refine(
-        &self,
-        _site: &[usize],
-        _ranges: &SignalRanges,
-        found: &Constants,
-        step: usize,
-    ) -> Vec<Constants> {
+    fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
         around(found, PRESLIDING, step)
     }
     fn mends_turning(&self) -> bool {

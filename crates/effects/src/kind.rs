@@ -58,15 +58,8 @@ pub trait EffectKind: Send + Sync {
         vec![Constants::new()]
     }
 
-    /// Constants near `found`, closer together than the scan's of the same site and ranges; `step` counts the
-    /// refinements so far.
-    fn refine(
-        &self,
-        _site: &[usize],
-        _ranges: &SignalRanges,
-        _found: &Constants,
-        _step: usize,
-    ) -> Vec<Constants> {
+    /// Constants near those that were found, closer together than the scan's of the same site and ranges.
+    fn refine(&self, _from: &Refinement<'_>) -> Vec<Constants> {
         Vec::new()
     }
 
@@ -233,6 +226,19 @@ pub struct JointRange {
     pub torque_peak: f64,
     /// RMS of what the model so far leaves of the torque, zero where nothing is fitted yet \[N·m, N\].
     pub residual_rms: f64,
+}
+
+/// What constants are refined from.
+#[derive(Clone, Copy, Debug)]
+pub struct Refinement<'a> {
+    /// The constants that were found.
+    pub found: &'a Constants,
+    /// The joints that the effect acts on.
+    pub site: &'a [usize],
+    /// What the training logs cover.
+    pub ranges: &'a SignalRanges,
+    /// Number of refinements so far.
+    pub step: usize,
 }
 
 /// What the training logs cover: bounds for the constants to try.

@@ -27,7 +27,7 @@ mod trigonometric_spline;
 pub use catalogue::{Catalogue, sentence};
 pub use columns::{Formula, OwnTorque, ParameterKind};
 pub use fitted::FittedEffect;
-pub use kind::{Constants, EffectKind, JointRange, Signal, SignalRanges, SpecialCase};
+pub use kind::{Constants, EffectKind, JointRange, Refinement, Signal, SignalRanges, SpecialCase};
 pub use logged_torque::smoothing_corner_hz;
 pub use mechanism::{Mechanism, Mechanisms, ServoFriction};
 pub use sign::smooth_sign;

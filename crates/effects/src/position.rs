@@ -2,7 +2,9 @@
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, Signal, SignalRanges, SpecialCase, constant, product, values};
+use crate::kind::{
+    Constants, EffectKind, Refinement, Signal, SignalRanges, SpecialCase, constant, product, values,
+};
 use crate::mechanism::{Mechanism, Mechanisms};
 use phiw_codegen::{Expression, Function, JointTorque};
 use phiw_dynamics::{JointType, Tree};
@@ -111,13 +113,7 @@ impl EffectKind for TorqueRipple {
         let peaks = ranges.ripple_frequencies.get(site[0]).cloned().unwrap_or_default();
         product(&values(FREQUENCY, peaks), &values(HARMONICS, [1.0, 2.0]))
     }
-    fn refine(
-        &self,
-        _site: &[usize],
-        _ranges: &SignalRanges,
-        found: &Constants,
-        step: usize,
-    ) -> Vec<Constants> {
+    fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
         // The scan knows N to a hundredth; a phase slip over the range is what decides.
         let Some(&frequency) = found.get(FREQUENCY) else { return Vec::new() };
         let spread = 0.01 * 0.4_f64.powi(step as i32);
@@ -199,13 +195,7 @@ impl EffectKind for EndStop {
         };
         [side(1.0, upper), side(-1.0, lower)].concat()
     }
-    fn refine(
-        &self,
-        site: &[usize],
-        ranges: &SignalRanges,
-        found: &Constants,
-        step: usize,
-    ) -> Vec<Constants> {
+    fn refine(&self, &Refinement { found, step, site, ranges }: &Refinement<'_>) -> Vec<Constants> {
         let Some(&stop) = found.get(STOP) else { return Vec::new() };
         let exponent = constant(found, EXPONENT, 1.0);
         // A share of the joint's travel, as the scan's are: a slide of 0.1 m knows no steps of 0.02.

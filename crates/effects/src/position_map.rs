@@ -2,7 +2,7 @@
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant};
+use crate::kind::{Constants, EffectKind, Refinement, Signal, SignalRanges, constant};
 use crate::trigonometric_spline::TrigonometricSpline;
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::Effect;
@@ -53,13 +53,7 @@ impl EffectKind for PositionMap {
         let with = |knots: f64| ends.into_iter().chain([(KNOTS.to_owned(), knots)]).collect();
         vec![with(SCANNED)]
     }
-    fn refine(
-        &self,
-        _site: &[usize],
-        _ranges: &SignalRanges,
-        found: &Constants,
-        step: usize,
-    ) -> Vec<Constants> {
+    fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
         let (Some(&knots), Some(factor)) = (found.get(KNOTS), FACTORS.get(step)) else { return Vec::new() };
         let near = [(knots / factor).floor(), (knots * factor).ceil()].into_iter();
         let near = near.map(|knots| knots.clamp(FEWEST as f64, MOST as f64)).filter(|near| *near != knots);

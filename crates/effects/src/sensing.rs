@@ -2,7 +2,7 @@
 
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, Signal, SignalRanges, constant};
+use crate::kind::{Constants, EffectKind, Refinement, Signal, SignalRanges, constant};
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::effect::{EffectParameter, Entry, Evaluator, Needs, Sample};
 use phiw_identification::{Effect, EffectSpec};
@@ -131,13 +131,7 @@ impl EffectKind for ActuatorSaturation {
             |limit: f64| Constants::from([(LIMIT.to_owned(), limit), (LEAST_LIMIT.to_owned(), lowest)]);
         (0..8).map(|power| with(lowest * step.powi(power))).collect()
     }
-    fn refine(
-        &self,
-        _site: &[usize],
-        _ranges: &SignalRanges,
-        found: &Constants,
-        step: usize,
-    ) -> Vec<Constants> {
+    fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
         let Some(&limit) = found.get(LIMIT) else { return Vec::new() };
         let spread = 0.04 * 0.5_f64.powi(step as i32);
         let least = constant(found, LEAST_LIMIT, 0.0);

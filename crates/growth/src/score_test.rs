@@ -238,10 +238,7 @@ impl ScoreTest {
         for step in 0..self.settings.refinements {
             let mut near: Vec<EffectSpec> = Vec::new();
             for gain in &best {
-                let kind = self.catalogue.kind(&gain.effect.kind)?;
-                let joints = gain.effect.joints.iter();
-                let site: Vec<usize> = joints.filter_map(|joint| robot.tree().joint_index(joint)).collect();
-                let refined = kind.refine(&site, &ranges, &gain.effect.constants, step);
+                let refined = self.catalogue.refined(&gain.effect, robot.tree(), &ranges, step)?;
                 near.extend(
                     refined.into_iter().map(|constants| EffectSpec { constants, ..gain.effect.clone() }),
                 );

@@ -48,7 +48,7 @@ impl Products {
 
     /// RᵀR. The factor of few rows has as few that are not zero.
     pub fn of_factor(factor: &Factor) -> Self {
-        Products::of_factor_beside(factor, factor.columns() - 1)
+        Products::of_factor_beside(factor, factor.columns().saturating_sub(1))
     }
 
     /// The same where the first `rigid_body` columns say what is rounding

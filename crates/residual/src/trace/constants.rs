@@ -43,12 +43,12 @@ impl Search<'_> {
             if self.is_held(place) {
                 continue;
             }
-            let kind = self.fixed.catalogue.kind(&spec.kind)?;
-            let site: Vec<usize> =
-                spec.joints.iter().filter_map(|joint| self.fixed.tree.joint_index(joint)).collect();
-            let mut near = kind.refine(&site, &self.input.ranges, &spec.constants, step);
+            let (catalogue, tree) = (self.fixed.catalogue, self.fixed.tree);
+            let mut near = catalogue.refined(spec, tree, &self.input.ranges, step)?;
             if step == 0 && place < self.declared && !spec.constants.is_empty() {
-                near.extend(kind.scan(&site, &self.input.ranges));
+                let site: Vec<usize> =
+                    spec.joints.iter().filter_map(|joint| tree.joint_index(joint)).collect();
+                near.extend(catalogue.kind(&spec.kind)?.scan(&site, &self.input.ranges));
             }
             let specs = near.into_iter().map(|constants| EffectSpec { constants, ..spec.clone() });
             candidates.add_variants(self.fixed, present, place, specs.collect())?;

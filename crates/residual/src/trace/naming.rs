@@ -56,9 +56,11 @@ impl Search<'_> {
             let trial = self.trial()?;
             let mut harmful = self.harmful(&trial, harm);
             if harmful.is_empty() {
-                let misleading = self.misleading(&trial);
-                let confirmed = misleading.map(|place| self.is_misleading_as_fitted(place)).transpose()?;
-                harmful = misleading.filter(|_| confirmed != Some(false)).into_iter().collect();
+                if let Some(place) = self.misleading(&trial)
+                    && self.is_misleading_as_fitted(place)?
+                {
+                    harmful.push(place);
+                }
                 self.held_out_had_a_say |= !harmful.is_empty();
                 self.left_out_by_held_out.extend(harmful.iter().map(|&place| self.specs[place].clone()));
             }
@@ -287,7 +289,7 @@ impl Search<'_> {
             let simpler: Vec<(usize, f64)> =
                 simpler.flat_map(|&other| trial.values_of(other, torque)).collect();
             let of_simpler = trial.torque(torque).size_of(&simpler);
-            // Nobody takes away noise; nor is more known of what is left than it is the same as noise.
+            // Noise cannot be taken away, and what is left is known no better than errors are told apart.
             let noise = trial.torque(torque).rows() * self.input.noise_floor[torque].powi(2);
             let unknown = (self.options.thresholds.same_error.powi(2) - 1.0) * noise;
             let [left_without, left_with] =

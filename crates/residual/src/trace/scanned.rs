@@ -42,8 +42,7 @@ pub fn scanned_constants(
     let mut derivatives: Vec<Box<dyn Effect>> = Vec::new();
     for (index, effect) in design.effects().iter().enumerate() {
         let (spec, parameters) = (effect.spec(), effect.parameters());
-        let site: Vec<usize> = spec.joints.iter().filter_map(|joint| tree.joint_index(joint)).collect();
-        let near = catalogue.kind(&spec.kind)?.refine(&site, ranges, &spec.constants, 0);
+        let near = catalogue.refined(&spec, tree, ranges, 0)?;
         for (name, &value) in &spec.constants {
             // Where it stands for a parameter, that has the deviation.
             if parameters.iter().any(|parameter| parameter.name == *name) {
