@@ -37,9 +37,9 @@ impl Search<'_> {
     }
 
     /// Whether the model's error on motion held out is no worse than the declared one's, of all torques
-    /// together. It may be larger, but be the same error (`same_error`), where the mean of the torques' errors
-    /// is smaller by at least as much: one joint of large torques that nothing foretells has no say about all
-    /// others.
+    /// together. It may be larger, but be the same error (`same_error`), where the mean of the torques'
+    /// errors is smaller by at least as much: one joint of large torques that nothing foretells has no say
+    /// about all others.
     pub(super) fn is_no_worse_than_declared(&self, tracing: &Tracing) -> bool {
         let (after, before) = (&tracing.model.held_out, &tracing.before.1);
         let growth = (self.counted(after) / self.counted(before)).ln();
