@@ -9,6 +9,9 @@ use phiw_identification::effect::Sample;
 pub(crate) const DEFLECTION: &str = "bristle_deflection";
 /// Ways that are tried. A longer one is a hysteresis, which has a name of its own.
 const DEFLECTIONS: [f64; 5] = [1e-5, 3e-5, 1e-4, 3e-4, 1e-3];
+/// For how long a joint has moved before its log, at the speed at which it is met there \[s\]: one that
+/// rests where its log begins has bristles that are relaxed, one that moves has bent them.
+const MOVED_BEFORE: f64 = 0.1;
 
 /// A friction whose steady state is `steady`, and which lags behind it over the way of its joint: the force
 /// of LuGre's bristles without micro-damping (Canudas de Wit et al. 1995), of one whose steady state does not
@@ -32,9 +35,10 @@ impl<F: Fn(&Sample<'_>) -> f64 + Send + Sync> Formula for Bristles<F> {
                 position: sample.q()[self.joint],
                 velocity: sample.qd()[self.joint],
             };
-            // The motion before the log is unknown: the first force is the steady one.
-            let before = memory.unwrap_or(now);
-            columns[0] = before.followed_by(&now, sample.period(), self.deflection);
+            columns[0] = match *memory {
+                Some(before) => before.followed_by(&now, sample.period(), self.deflection),
+                None => now.at_the_beginning(self.deflection),
+            };
             *memory = Some(Turning { force: columns[0], ..now });
         }
     }
@@ -50,6 +54,11 @@ pub(crate) struct Turning {
 }
 
 impl Turning {
+    /// The force where the log begins.
+    fn at_the_beginning(&self, deflection: f64) -> f64 {
+        self.steady * (1.0 - (-self.velocity.abs() * MOVED_BEFORE / deflection).exp())
+    }
+
     /// The force after the way to where the joint is `now`, `period` \[s\] later: the exact solution of
     /// `deflection`·dF/d|q| = steady − F, where the velocity changes its sign at the time that it is zero
     /// between the two.
@@ -65,12 +74,14 @@ impl Turning {
     }
 }
 
-/// The constants of a friction with bristles instead of a sign that turns over a speed.
-pub(crate) fn with_bristles(found: &Constants) -> Constants {
+/// The constants of a friction with bristles instead of a sign that turns over a speed; they turn over `way`
+/// \[rad, m\], if that is not too long, or over one in the middle of what is tried.
+pub(crate) fn with_bristles(found: &Constants, way: Option<f64>) -> Constants {
+    let (longest, middle) = (DEFLECTIONS[DEFLECTIONS.len() - 1], DEFLECTIONS[DEFLECTIONS.len() / 2]);
     let mut with = found.clone();
     with.insert(WIDTH.to_owned(), 0.0);
     with.remove(POWER);
-    with.insert(DEFLECTION.to_owned(), DEFLECTIONS[DEFLECTIONS.len() / 2]);
+    with.insert(DEFLECTION.to_owned(), way.map_or(middle, |way| way.min(longest)));
     with
 }
 
@@ -130,7 +141,7 @@ mod tests {
     fn bristles_take_the_place_of_a_speed_and_stay_below_a_hysteresis() {
         let smooth = Constants::from([(WIDTH.to_owned(), 0.02), (POWER.to_owned(), 2.0)]);
         assert!(bristles_near(&smooth, 0).is_empty());
-        let mut found = with_bristles(&smooth);
+        let mut found = with_bristles(&smooth, None);
         assert!(found[WIDTH] == 0.0 && !found.contains_key(POWER));
         for _ in 0..20 {
             let near = bristles_near(&found, 0);
@@ -138,5 +149,22 @@ mod tests {
             found = near.into_iter().max_by(|a, b| a[DEFLECTION].total_cmp(&b[DEFLECTION])).unwrap();
         }
         assert_eq!(found[DEFLECTION], DEFLECTIONS[4]);
+    }
+
+    #[test]
+    fn bristles_begin_with_the_way_that_is_known_if_it_is_not_too_long() {
+        let over = |way| with_bristles(&Constants::new(), way)[DEFLECTION];
+        assert_eq!([over(Some(7e-4)), over(Some(0.02)), over(None)], [7e-4, DEFLECTIONS[4], DEFLECTIONS[2]]);
+    }
+
+    /// Point-to-point motion begins at rest, where the force is not that of sliding.
+    #[test]
+    fn bristles_are_relaxed_where_a_log_begins_at_rest_and_bent_where_it_begins_in_motion() {
+        let force = |velocity: f64| {
+            let now = Turning { force: 0.0, steady: velocity.signum(), position: 0.3, velocity };
+            now.at_the_beginning(5e-4)
+        };
+        assert_eq!(force(0.0), 0.0);
+        assert!((force(-0.5) + 1.0).abs() < 1e-9 && force(1e-3) < 0.2);
     }
 }

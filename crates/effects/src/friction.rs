@@ -59,8 +59,8 @@ impl EffectKind for Coulomb {
     fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
         signs_near(found, step).into_iter().chain(bristles_near(found, step)).collect()
     }
-    fn turned_over_a_way(&self, found: &Constants) -> Option<Constants> {
-        Some(with_bristles(found))
+    fn turned_over_a_way(&self, found: &Constants, way: Option<f64>) -> Option<Constants> {
+        Some(with_bristles(found, way))
     }
     fn may_change(&self) -> bool {
         true
@@ -215,8 +215,8 @@ impl EffectKind for Stribeck {
         near.extend(bristles_near(found, step));
         near
     }
-    fn turned_over_a_way(&self, found: &Constants) -> Option<Constants> {
-        Some(with_bristles(found))
+    fn turned_over_a_way(&self, found: &Constants, way: Option<f64>) -> Option<Constants> {
+        Some(with_bristles(found, way))
     }
     fn telling_motion(&self) -> &'static str {
         "a slow motion, well below the speed at which friction is lowest"
@@ -288,8 +288,8 @@ impl EffectKind for LoadDependent {
     fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
         around(found, WIDTH, step).into_iter().chain(bristles_near(found, step)).collect()
     }
-    fn turned_over_a_way(&self, found: &Constants) -> Option<Constants> {
-        Some(with_bristles(found))
+    fn turned_over_a_way(&self, found: &Constants, way: Option<f64>) -> Option<Constants> {
+        Some(with_bristles(found, way))
     }
     fn telling_motion(&self) -> &'static str {
         "the same motion with the arm stretched out and folded, or with a load"

@@ -30,6 +30,9 @@ impl EffectKind for Hysteresis {
     fn mends_turning(&self) -> bool {
         true
     }
+    fn way_of_turning(&self, found: &Constants) -> Option<f64> {
+        found.get(PRESLIDING).copied()
+    }
     fn telling_motion(&self) -> &'static str {
         "small slow strokes of growing size about one position"
     }

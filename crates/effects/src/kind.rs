@@ -113,8 +113,8 @@ pub trait EffectKind: Send + Sync {
     }
 
     /// The constants of a dry friction that turns over a way at a reversal and not over a speed, as bristles
-    /// do; `None` for what does not turn.
-    fn turned_over_a_way(&self, _found: &Constants) -> Option<Constants> {
+    /// do; `way` \[rad, m\] is about how long it is, where that is known. `None` for what does not turn.
+    fn turned_over_a_way(&self, _found: &Constants, _way: Option<f64>) -> Option<Constants> {
         None
     }
 
@@ -122,6 +122,11 @@ pub trait EffectKind: Send + Sync {
     /// the model has it.
     fn mends_turning(&self) -> bool {
         false
+    }
+
+    /// The way \[rad, m\] that it takes to turn after a reversal; `None` where it takes none.
+    fn way_of_turning(&self, _found: &Constants) -> Option<f64> {
+        None
     }
 
     /// The property of a joint that holds its only parameter, in a URDF or a simulator; none if neither can

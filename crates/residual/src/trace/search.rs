@@ -155,12 +155,17 @@ impl Search<'_> {
 
     /// Chooses and refines until nothing changes.
     pub(super) fn settle(&mut self) -> Result<(), IdentificationError> {
-        for _ in 0..ROUNDS {
+        for round in 1..=ROUNDS {
             let before = self.names();
             self.choose()?;
             self.refine()?;
             self.leave_out_what_is_not_realised()?;
-            if self.names() == before && !self.turn_over_a_way()? && !self.contest()? {
+            let is_settled = self.names() == before;
+            // What has not settled is not chosen again, and its frictions may still turn over a way.
+            if (is_settled || round == ROUNDS) && self.turn_over_a_way()? {
+                continue;
+            }
+            if is_settled && !self.contest()? {
                 break;
             }
         }

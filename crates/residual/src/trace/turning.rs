@@ -23,17 +23,18 @@ impl Search<'_> {
             if joints.len() != 1 || !catalogue.kind(&self.specs[place].kind)?.mends_turning() {
                 continue;
             }
+            let way = catalogue.kind(&self.specs[place].kind)?.way_of_turning(&self.specs[place].constants);
             let mut branch = self.clone();
             for other in 0..self.specs.len() {
                 let spec = &mut branch.specs[other];
                 let is_open = spec.joints == joints && !self.is_held(other);
-                if let Some(turned) = catalogue.kind(&spec.kind)?.turned_over_a_way(&spec.constants)
+                if let Some(turned) = catalogue.kind(&spec.kind)?.turned_over_a_way(&spec.constants, way)
                     && is_open
                 {
                     spec.constants = turned;
                 }
             }
-            let simpler = self.simpler_that_turns(place)?;
+            let simpler = self.simpler_that_turns(place, way)?;
             // A form of a friction gives way to the friction, if that does about as much.
             let mut may_lose = 0.0;
             if let Some(simpler) = simpler {
@@ -61,11 +62,15 @@ impl Search<'_> {
 
     /// The simpler kind, turning over a way, that the effect at `place` is a form of, where the model does
     /// not have it on that joint and it may be found.
-    fn simpler_that_turns(&self, place: usize) -> Result<Option<EffectSpec>, IdentificationError> {
+    fn simpler_that_turns(
+        &self,
+        place: usize,
+        way: Option<f64>,
+    ) -> Result<Option<EffectSpec>, IdentificationError> {
         let catalogue = self.fixed.catalogue;
         let own = &self.specs[place];
         for &kind in catalogue.kind(&own.kind)?.form_of() {
-            let Some(constants) = catalogue.kind(kind)?.turned_over_a_way(&Constants::new()) else {
+            let Some(constants) = catalogue.kind(kind)?.turned_over_a_way(&Constants::new(), way) else {
                 continue;
             };
             let is_this = |spec: &EffectSpec| spec.kind == kind && spec.joints == own.joints;

@@ -118,6 +118,36 @@ fn friction_of_bristles_is_found_with_nothing_declared() {
     assert!(!named.iter().any(|(kind, _)| kind == "hysteresis" || kind == "time_delay"), "{named:?}");
 }
 
+/// Frictions of all joints that turn over most of a milliradian were named hystereses with a little Coulomb
+/// friction beside them: the bristles began with another way, and never reached that of the hysteresis.
+#[test]
+fn frictions_of_bristles_of_all_joints_are_found_with_nothing_declared() {
+    let bristles = RefCell::new([(0.0_f64, 0.0_f64); 2]);
+    let secret = |state: &State<'_>, torque: &mut [f64]| {
+        let mut bristles = bristles.borrow_mut();
+        for (joint, (slides_at, deflection)) in [(4.0, 8e-4), (2.0, 5.5e-4)].into_iter().enumerate() {
+            let (force, before) = bristles[joint];
+            let way: f64 = state.q[joint] - before;
+            let steady = slides_at * way.signum();
+            let force = steady + (force - steady) * (-way.abs() / deflection).exp();
+            bristles[joint] = (force, state.q[joint]);
+            torque[joint] += force;
+        }
+    };
+    let tracing = traced_on(folds().0, &[], 11, &secret, false);
+    let named = named(&tracing);
+    assert!(!named.iter().any(|(kind, _)| kind == "hysteresis" || kind == "time_delay"), "{named:?}");
+    let ways: Vec<f64> = ["shoulder", "elbow"]
+        .iter()
+        .filter_map(|joint| {
+            let own = tracing.specs.iter().filter(|spec| spec.joints == [*joint]);
+            own.filter(|spec| spec.kind == "coulomb_friction")
+                .find_map(|spec| spec.constants.get("bristle_deflection").copied())
+        })
+        .collect();
+    assert!(ways.len() == 2 && ways[0] > ways[1] && ways[1] > 3e-4, "{ways:?} {:?}", tracing.specs);
+}
+
 #[test]
 fn a_ripple_is_named_with_its_frequency() {
     let ripple = |state: &State<'_>, torque: &mut [f64]| torque[0] += 0.4 * (9.0 * state.q[0] + 0.3).sin();
