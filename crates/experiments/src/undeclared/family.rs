@@ -21,12 +21,23 @@ pub enum Shape {
     Viscous { power: f64, reference: Vec<f64> },
     /// A sign that is smoothed over each joint's own width \[rad/s\].
     Coulomb { smoothing: Sign, widths: Vec<f64> },
-    /// Bristles that bend this far \[rad, m\]: at rest they hold what they held.
-    Bristles { distance: f64 },
+    /// Bristles, each joint's bending this far \[rad, m\]: at rest they hold what they held.
+    Bristles { distances: Vec<f64> },
     /// q̈.
     Rotor,
     /// 1.
     Offset,
+}
+
+/// Whether dry friction is that of bristles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bristles {
+    /// Its sign turns over a speed.
+    None,
+    /// They bend no further than any joint notices that moves, 10 to 100 µrad or µm, and all as far.
+    Stiff,
+    /// They bend 0.1 to 1 mrad or mm, those of each joint by themselves.
+    Soft,
 }
 
 impl Family {
@@ -37,7 +48,7 @@ impl Family {
         ordinary: &Ordinary,
         members: &[usize],
         speed: &[f64],
-        bristles: bool,
+        bristles: Bristles,
         rng: &mut CaseRng,
     ) -> Self {
         let (values, shape) = match kind {
@@ -45,8 +56,13 @@ impl Family {
                 let power = if rng.chance(0.4) { rng.uniform(0.92, 1.08) } else { 1.0 };
                 (&ordinary.viscous, Shape::Viscous { power, reference: speed.to_vec() })
             }
-            Kind::CoulombFriction if bristles => {
-                (&ordinary.coulomb, Shape::Bristles { distance: rng.log_uniform(1e-5, 1e-4) })
+            Kind::CoulombFriction if bristles == Bristles::Stiff => {
+                let distances = vec![rng.log_uniform(1e-5, 1e-4); speed.len()];
+                (&ordinary.coulomb, Shape::Bristles { distances })
+            }
+            Kind::CoulombFriction if bristles == Bristles::Soft => {
+                let distances = speed.iter().map(|_| rng.log_uniform(1e-4, 1e-3)).collect();
+                (&ordinary.coulomb, Shape::Bristles { distances })
             }
             Kind::CoulombFriction => {
                 let apart = if rng.chance(0.5) { 2.0 } else { 1.0 };
@@ -69,8 +85,8 @@ impl Family {
         if value == 0.0 {
             return vec![0.0; scene.times.len()];
         }
-        if let Shape::Bristles { distance } = &self.shape {
-            return lugre_along(scene, joint, *distance, value);
+        if let Shape::Bristles { distances } = &self.shape {
+            return lugre_along(scene, joint, distances[joint], value);
         }
         let states = &scene.motor;
         let shape = |sample: usize| {

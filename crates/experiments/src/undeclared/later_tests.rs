@@ -1,8 +1,10 @@
 //! What the situations that came later must do to a log.
 
 use super::case::{Case, DURATION, even_times};
+use super::family::Shape;
+use super::kind::{Kind, Name};
 use super::plant::record;
-use super::secret::Secret;
+use super::secret::{Form, Secret};
 use super::situation::Situation;
 use super::wide_tests::{column, mean, models, small};
 use std::collections::BTreeSet;
@@ -118,6 +120,28 @@ fn a_push_is_felt_while_it_lasts_and_at_no_other_time() {
             }
         }
         assert!(felt.iter().all(|felt| *felt));
+    });
+}
+
+#[test]
+fn soft_bristles_are_of_all_joints_and_each_bends_as_far_as_its_own() {
+    check(Situation::SoftBristles, |case, _| {
+        let shapes = case.plant.iter().filter_map(|secret| match &secret.form {
+            Form::Family(family) => Some(&family.shape),
+            _ => None,
+        });
+        let own: Vec<&Vec<f64>> = shapes
+            .filter_map(|shape| match shape {
+                Shape::Bristles { distances } => Some(distances),
+                _ => None,
+            })
+            .collect();
+        let rubs = case.plant.iter().any(|secret| secret.name == Name::Catalogue(Kind::CoulombFriction));
+        assert_eq!(own.len(), usize::from(rubs));
+        for distances in own {
+            assert!(distances.iter().all(|distance| (1e-4..1e-3).contains(distance)), "{distances:?}");
+            assert!(distances.windows(2).all(|pair| pair[0] != pair[1]), "{distances:?}");
+        }
     });
 }
 

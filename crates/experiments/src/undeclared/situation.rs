@@ -67,11 +67,13 @@ pub enum Situation {
     HeldPositions,
     /// Somebody pushes the robot once or a few times while the training logs are taken.
     Pushes,
+    /// Dry friction of all joints turns over 0.1 to 1 mrad or mm after a reversal, on each over its own.
+    SoftBristles,
 }
 
 impl Situation {
     /// All situations.
-    pub const ALL: [Situation; 27] = [
+    pub const ALL: [Situation; 28] = [
         Situation::White,
         Situation::ShortColour,
         Situation::Colour,
@@ -99,12 +101,13 @@ impl Situation {
         Situation::InTurn,
         Situation::HeldPositions,
         Situation::Pushes,
+        Situation::SoftBristles,
     ];
     /// Those of the first cases of each suite: so many there were when these were drawn first.
     pub const FIRST: usize = Situation::BLOCKS[0].1;
     /// Situations that came together: the index of their first case, and how many they are.
-    const BLOCKS: [(usize, usize); 6] =
-        [(0, 15), (50_000, 7), (60_000, 1), (70_000, 1), (80_000, 1), (90_000, 2)];
+    const BLOCKS: [(usize, usize); 7] =
+        [(0, 15), (50_000, 7), (60_000, 1), (70_000, 1), (80_000, 1), (90_000, 2), (95_000, 1)];
 
     /// The situation of the case of this index: those of its block in turn.
     pub fn of_index(index: usize) -> Self {

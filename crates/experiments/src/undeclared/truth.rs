@@ -100,10 +100,11 @@ fn allowed(case: &Case) -> Vec<Kind> {
     if case.spec.situation == Some(Situation::ShiftingZeros) {
         allowed.push(Kind::TorqueOffset);
     }
-    // Bristles are presliding: their torque depends on the way since the last reversal.
+    // Bristles are presliding: their torque depends on the way since the last reversal. Where all friction is
+    // of long ones that is what is asked: a friction with its way, and nothing beside it.
     let mut secrets = case.plant.iter().chain(case.secrets.iter().map(|drawn| &drawn.secret));
     let bristles = |secret: &Secret| matches!(&secret.form, Form::Family(family) if matches!(family.shape, Shape::Bristles { .. }));
-    if secrets.any(bristles) {
+    if case.spec.situation != Some(Situation::SoftBristles) && secrets.any(bristles) {
         allowed.push(Kind::Hysteresis);
     }
     allowed

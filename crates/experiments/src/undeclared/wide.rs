@@ -7,7 +7,7 @@ use super::case::{
 };
 use super::certainty::visible_beside_others;
 use super::draw::{Survey, catalogue, outside};
-use super::family::Family;
+use super::family::{Bristles, Family};
 use super::kind::{Kind, Name};
 use super::logging::Logging;
 use super::plant::{Ordinary, Record, States, record};
@@ -58,7 +58,11 @@ pub fn draw<'a>(spec: &Spec, situation: Situation, robot: &'a Robot, attempt: u6
     let rms: [&[f64]; 2] = [&survey.torque, &survey.speed];
     let logging = Logging::draw(situation, &robot.tree, rms, &mut sensors, &mut rng(Stream::Situation));
     sensors.logging = Some(logging);
-    let bristles = situation.rests() && plant_rng.chance(0.6);
+    let bristles = match situation {
+        Situation::SoftBristles => Bristles::Soft,
+        _ if situation.rests() && plant_rng.chance(0.6) => Bristles::Stiff,
+        _ => Bristles::None,
+    };
     let mut still = Vec::new();
     if situation == Situation::StillJoints {
         // Sizes are drawn from the motion that these joints could make.
@@ -194,7 +198,7 @@ fn family(
     spec: &Spec,
     full: &Ordinary,
     speed: &[f64],
-    bristles: bool,
+    bristles: Bristles,
     rng: &mut CaseRng,
 ) -> Secret {
     let count = speed.len();
