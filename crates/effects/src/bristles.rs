@@ -7,8 +7,11 @@ use phiw_identification::effect::Sample;
 
 /// The constant of a friction that turns over a way instead of over a speed: the way \[rad, m\].
 pub(crate) const DEFLECTION: &str = "bristle_deflection";
-/// Ways that are tried. A longer one is a hysteresis, which has a name of its own.
-const DEFLECTIONS: [f64; 5] = [1e-5, 3e-5, 1e-4, 3e-4, 1e-3];
+/// The longest way over which a dry friction turns \[rad, m\]. A longer one is a hysteresis, which has a name
+/// of its own.
+pub const LONGEST_BRISTLES: f64 = 1e-3;
+/// Ways that are tried.
+const DEFLECTIONS: [f64; 5] = [1e-5, 3e-5, 1e-4, 3e-4, LONGEST_BRISTLES];
 /// For how long a joint has moved before its log, at the speed at which it is met there \[s\]: one that
 /// rests where its log begins has bristles that are relaxed, one that moves has bent them.
 const MOVED_BEFORE: f64 = 0.1;
@@ -77,11 +80,11 @@ impl Turning {
 /// The constants of a friction with bristles instead of a sign that turns over a speed; they turn over `way`
 /// \[rad, m\], if that is not too long, or over one in the middle of what is tried.
 pub(crate) fn with_bristles(found: &Constants, way: Option<f64>) -> Constants {
-    let (longest, middle) = (DEFLECTIONS[DEFLECTIONS.len() - 1], DEFLECTIONS[DEFLECTIONS.len() / 2]);
+    let middle = DEFLECTIONS[DEFLECTIONS.len() / 2];
     let mut with = found.clone();
     with.insert(WIDTH.to_owned(), 0.0);
     with.remove(POWER);
-    with.insert(DEFLECTION.to_owned(), way.map_or(middle, |way| way.min(longest)));
+    with.insert(DEFLECTION.to_owned(), way.map_or(middle, |way| way.min(LONGEST_BRISTLES)));
     with
 }
 
@@ -91,13 +94,13 @@ pub(crate) fn bristles_near(found: &Constants, step: usize) -> Vec<Constants> {
     if step == 0 && found.contains_key(DEFLECTION) {
         near.extend(product(std::slice::from_ref(found), &values(DEFLECTION, DEFLECTIONS)));
     }
-    near.retain(|near| near[DEFLECTION] <= DEFLECTIONS[DEFLECTIONS.len() - 1]);
+    near.retain(|near| near[DEFLECTION] <= LONGEST_BRISTLES);
     near
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{DEFLECTION, DEFLECTIONS, Turning, bristles_near, with_bristles};
+    use super::{DEFLECTION, DEFLECTIONS, LONGEST_BRISTLES, Turning, bristles_near, with_bristles};
     use crate::kind::Constants;
     use crate::sign::{POWER, WIDTH};
     use proptest::prelude::*;
@@ -145,16 +148,19 @@ mod tests {
         assert!(found[WIDTH] == 0.0 && !found.contains_key(POWER));
         for _ in 0..20 {
             let near = bristles_near(&found, 0);
-            assert!(near.iter().all(|near| near[DEFLECTION] <= DEFLECTIONS[4] && near[WIDTH] == 0.0));
+            assert!(near.iter().all(|near| near[DEFLECTION] <= LONGEST_BRISTLES && near[WIDTH] == 0.0));
             found = near.into_iter().max_by(|a, b| a[DEFLECTION].total_cmp(&b[DEFLECTION])).unwrap();
         }
-        assert_eq!(found[DEFLECTION], DEFLECTIONS[4]);
+        assert_eq!(found[DEFLECTION], LONGEST_BRISTLES);
     }
 
     #[test]
     fn bristles_begin_with_the_way_that_is_known_if_it_is_not_too_long() {
         let over = |way| with_bristles(&Constants::new(), way)[DEFLECTION];
-        assert_eq!([over(Some(7e-4)), over(Some(0.02)), over(None)], [7e-4, DEFLECTIONS[4], DEFLECTIONS[2]]);
+        assert_eq!(
+            [over(Some(7e-4)), over(Some(0.02)), over(None)],
+            [7e-4, LONGEST_BRISTLES, DEFLECTIONS[2]]
+        );
     }
 
     /// Point-to-point motion begins at rest, where the force is not that of sliding.

@@ -209,13 +209,14 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Whether an effect is one of the robot, and not of its log, was not found to be uncertain, and does not
-    /// refine its special case.
+    /// Whether an effect is one of the robot, and not of its log, was not found to be uncertain, and refines
+    /// neither its special case nor a friction by how that turns.
     pub(super) fn may_have_a_name(&self, place: usize) -> bool {
         let EffectSpec { kind, joints, .. } = &self.specs[place];
         let of_the_log = self.fixed.catalogue.kind(kind).is_ok_and(EffectKind::is_of_the_log);
         !of_the_log
             && !self.refines_special_case(place)
+            && !self.is_how_a_friction_turns(place)
             && !self.uncertain.iter().any(|(other, on)| other == kind && on == joints)
     }
 

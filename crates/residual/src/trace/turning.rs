@@ -1,7 +1,7 @@
 //! Friction that turns over a way, in the place of what mended how it turned.
 
 use super::search::Search;
-use phiw_effects::Constants;
+use phiw_effects::{Constants, LONGEST_BRISTLES};
 use phiw_identification::{EffectSpec, IdentificationError};
 
 /// How much larger the criterion is to be with a friction that turns over a way in the place of a form of it:
@@ -58,6 +58,20 @@ impl Search<'_> {
             }
         }
         Ok(any)
+    }
+
+    /// Whether an effect is no more than how a friction of its joint turns, over a way as short as that of
+    /// bristles: then it refines that friction.
+    pub(super) fn is_how_a_friction_turns(&self, place: usize) -> bool {
+        let catalogue = self.fixed.catalogue;
+        let own = &self.specs[place];
+        let turns = |spec: &EffectSpec| {
+            let kind = catalogue.kind(&spec.kind);
+            kind.is_ok_and(|kind| kind.turned_over_a_way(&spec.constants, None).is_some())
+        };
+        let way = catalogue.kind(&own.kind).ok().and_then(|kind| kind.way_of_turning(&own.constants));
+        way.is_some_and(|way| way <= LONGEST_BRISTLES)
+            && self.specs.iter().any(|spec| spec.joints == own.joints && turns(spec))
     }
 
     /// The simpler kind, turning over a way, that the effect at `place` is a form of, where the model does
