@@ -2,7 +2,7 @@
 
 use crate::columns::Formula;
 use crate::kind::{Constants, around, product, values};
-use crate::sign::{POWER, WIDTH};
+use crate::sign::{LEAD, POWER, WIDTH};
 use phiw_identification::effect::Sample;
 
 /// The constant of a friction that turns over a way instead of over a speed: the way \[rad, m\].
@@ -84,6 +84,7 @@ pub(crate) fn with_bristles(found: &Constants, way: Option<f64>) -> Constants {
     let mut with = found.clone();
     with.insert(WIDTH.to_owned(), 0.0);
     with.remove(POWER);
+    with.remove(LEAD);
     with.insert(DEFLECTION.to_owned(), way.map_or(middle, |way| way.min(LONGEST_BRISTLES)));
     with
 }

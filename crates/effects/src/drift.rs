@@ -74,7 +74,7 @@ impl EffectKind for ThermalDrift {
             };
             let velocity = sample.qd()[joint];
             out[0] = factor * velocity;
-            out[1] = factor * sign.at(velocity);
+            out[1] = factor * sign.of_joint(sample, joint);
         };
         let parameters = [
             ("fv_cold", ParameterKind::PerVelocity, f64::NEG_INFINITY),

@@ -78,7 +78,7 @@ impl EffectKind for DriveEfficiency {
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
             let load = sample.reference_torque().get(joint).copied().unwrap_or_default();
             let velocity = sample.qd()[joint];
-            let loss = load.abs() * sign.at(velocity);
+            let loss = load.abs() * sign.of_joint(sample, joint);
             let drives = load * velocity > 0.0;
             if part == BOTH {
                 (out[0], out[1]) = if drives { (loss, 0.0) } else { (0.0, loss) };

@@ -85,7 +85,7 @@ impl<'a> FittedEffect<'a> {
 
     /// The sign of a joint's velocity, as smooth as the effect's own constant says.
     pub(crate) fn sign_of_velocity(&self, joint: &str) -> Expression {
-        Sign::of(&self.spec.constants).formula(Expression::velocity(joint))
+        Sign::of(&self.spec.constants).of_joint_as_formula(joint)
     }
 
     /// Its torque at its only joint, of the joint's name; none where it has not one joint.

@@ -7,7 +7,7 @@ use crate::kind::{
     Constants, EffectKind, Refinement, Signal, SignalRanges, SpecialCase, around, constant, product, values,
 };
 use crate::mechanism::ServoFriction;
-use crate::sign::{POWER, Sign, WIDTH, few_sign_widths, sign_widths, signs_near};
+use crate::sign::{LEAD, POWER, Sign, WIDTH, few_sign_widths, sign_widths, signs_near};
 use phiw_codegen::{Expression, Function, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
@@ -78,14 +78,14 @@ impl EffectKind for Coulomb {
         &[VISCOUS]
     }
     fn constants_of_the_site(&self) -> &'static [&'static str] {
-        &[WIDTH, POWER, DEFLECTION]
+        &[WIDTH, POWER, LEAD, DEFLECTION]
     }
     fn dissipates(&self) -> bool {
         true
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, sign) = (site[0], Sign::of(constants));
-        let steady = move |sample: &Sample<'_>| sign.at(sample.qd()[joint]);
+        let steady = move |sample: &Sample<'_>| sign.of_joint(sample, joint);
         let columns = Bristles { joint, deflection: constant(constants, DEFLECTION, 0.0), steady };
         let parameters = [("fc", ParameterKind::Torque, 0.0)];
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
@@ -140,7 +140,7 @@ impl EffectKind for Asymmetric {
         let coulomb = ("fc_difference", ParameterKind::Torque, f64::NEG_INFINITY);
         let part = constant(constants, "part", 2.0);
         let viscous_column = move |sample: &Sample<'_>| sample.qd()[joint].abs();
-        let coulomb_column = move |sample: &Sample<'_>| sign.at(sample.qd()[joint]).abs();
+        let coulomb_column = move |sample: &Sample<'_>| sign.of_joint(sample, joint).abs();
         let kind = self.name();
         if part == 0.0 {
             let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = viscous_column(sample);
@@ -267,7 +267,7 @@ impl EffectKind for Stribeck {
                 relative.powf(exponent)
             };
             // Far above the Stribeck velocity the exponential is below the last digit of one.
-            if power > 40.0 { 0.0 } else { (-power).exp() * sign.at(velocity) }
+            if power > 40.0 { 0.0 } else { (-power).exp() * sign.of_joint(sample, joint) }
         };
         let columns = Bristles { joint, deflection: constant(constants, DEFLECTION, 0.0), steady };
         let parameters = [("fs", ParameterKind::Torque, 0.0)];
@@ -315,7 +315,7 @@ impl EffectKind for LoadDependent {
         let (joint, sign) = (site[0], Sign::of(constants));
         let steady = move |sample: &Sample<'_>| {
             let load = sample.reference_torque().get(joint).copied().unwrap_or_default();
-            load.abs() * sign.at(sample.qd()[joint])
+            load.abs() * sign.of_joint(sample, joint)
         };
         let columns = Bristles { joint, deflection: constant(constants, DEFLECTION, 0.0), steady };
         let parameters = [("mu", ParameterKind::Ratio, 0.0)];

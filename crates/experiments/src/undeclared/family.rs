@@ -23,21 +23,26 @@ pub enum Shape {
     Coulomb { smoothing: Sign, widths: Vec<f64> },
     /// Bristles, each joint's bending this far \[rad, m\]: at rest they hold what they held.
     Bristles { distances: Vec<f64> },
+    /// Held by a soft constraint, as MuJoCo's friction loss: −(q̈ + q̇/`lead`) times a constant until it slips,
+    /// which at constant speed it does at each joint's own width \[s; rad/s, m/s\].
+    Constraint { lead: f64, widths: Vec<f64> },
     /// q̈.
     Rotor,
     /// 1.
     Offset,
 }
 
-/// Whether dry friction is that of bristles.
+/// How dry friction turns where the motion does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Bristles {
-    /// Its sign turns over a speed.
-    None,
-    /// They bend no further than any joint notices that moves, 10 to 100 µrad or µm, and all as far.
-    Stiff,
-    /// They bend 0.1 to 1 mrad or mm, those of each joint by themselves.
-    Soft,
+pub enum Turning {
+    /// Over a speed.
+    OverASpeed,
+    /// As bristles that bend no further than any joint notices that moves, 10 to 100 µrad or µm, all as far.
+    StiffBristles,
+    /// As bristles that bend 0.1 to 1 mrad or mm, those of each joint by themselves.
+    SoftBristles,
+    /// As a simulator's soft constraint, of one time constant for all joints.
+    SoftConstraint,
 }
 
 impl Family {
@@ -48,7 +53,7 @@ impl Family {
         ordinary: &Ordinary,
         members: &[usize],
         speed: &[f64],
-        bristles: Bristles,
+        turning: Turning,
         rng: &mut CaseRng,
     ) -> Self {
         let (values, shape) = match kind {
@@ -56,13 +61,19 @@ impl Family {
                 let power = if rng.chance(0.4) { rng.uniform(0.92, 1.08) } else { 1.0 };
                 (&ordinary.viscous, Shape::Viscous { power, reference: speed.to_vec() })
             }
-            Kind::CoulombFriction if bristles == Bristles::Stiff => {
+            Kind::CoulombFriction if turning == Turning::StiffBristles => {
                 let distances = vec![rng.log_uniform(1e-5, 1e-4); speed.len()];
                 (&ordinary.coulomb, Shape::Bristles { distances })
             }
-            Kind::CoulombFriction if bristles == Bristles::Soft => {
+            Kind::CoulombFriction if turning == Turning::SoftBristles => {
                 let distances = speed.iter().map(|_| rng.log_uniform(1e-4, 1e-3)).collect();
                 (&ordinary.coulomb, Shape::Bristles { distances })
+            }
+            Kind::CoulombFriction if turning == Turning::SoftConstraint => {
+                let lead = rng.log_uniform(3e-3, 0.02);
+                // The lighter the joint, the wider: from one that is as good as stiff to one that hardly slips.
+                let widths = speed.iter().map(|speed| speed * rng.log_uniform(3e-3, 0.5)).collect();
+                (&ordinary.coulomb, Shape::Constraint { lead, widths })
             }
             Kind::CoulombFriction => {
                 let apart = if rng.chance(0.5) { 2.0 } else { 1.0 };
@@ -98,6 +109,9 @@ impl Family {
                     reference * (v / reference).abs().powf(*power) * v.signum()
                 }
                 Shape::Coulomb { smoothing, widths } => smoothing.of(v, widths[joint]),
+                Shape::Constraint { lead, widths } => {
+                    ((v + lead * states.a(sample, joint)) / widths[joint]).clamp(-1.0, 1.0)
+                }
                 Shape::Rotor => states.a(sample, joint),
                 Shape::Offset | Shape::Bristles { .. } => 1.0,
             }

@@ -7,6 +7,7 @@ use super::plant::record;
 use super::secret::{Form, Secret};
 use super::situation::Situation;
 use super::wide_tests::{column, mean, models, small};
+use std::cell::Cell;
 use std::collections::BTreeSet;
 
 /// Checks three training logs of a situation on the smallest robot.
@@ -123,26 +124,52 @@ fn a_push_is_felt_while_it_lasts_and_at_no_other_time() {
     });
 }
 
+/// Shapes of the families of a case.
+fn shapes(case: &Case<'_>) -> Vec<Shape> {
+    let of = |secret: &Secret| match &secret.form {
+        Form::Family(family) => Some(family.shape.clone()),
+        _ => None,
+    };
+    case.plant.iter().filter_map(of).collect()
+}
+
+fn rubs(case: &Case<'_>) -> bool {
+    case.plant.iter().any(|secret| secret.name == Name::Catalogue(Kind::CoulombFriction))
+}
+
 #[test]
 fn soft_bristles_are_of_all_joints_and_each_bends_as_far_as_its_own() {
+    let seen = Cell::new(0);
     check(Situation::SoftBristles, |case, _| {
-        let shapes = case.plant.iter().filter_map(|secret| match &secret.form {
-            Form::Family(family) => Some(&family.shape),
+        let own = shapes(case).into_iter().filter_map(|shape| match shape {
+            Shape::Bristles { distances } => Some(distances),
             _ => None,
         });
-        let own: Vec<&Vec<f64>> = shapes
-            .filter_map(|shape| match shape {
-                Shape::Bristles { distances } => Some(distances),
-                _ => None,
-            })
-            .collect();
-        let rubs = case.plant.iter().any(|secret| secret.name == Name::Catalogue(Kind::CoulombFriction));
-        assert_eq!(own.len(), usize::from(rubs));
+        let own: Vec<Vec<f64>> = own.collect();
+        assert_eq!(own.len(), usize::from(rubs(case)));
         for distances in own {
             assert!(distances.iter().all(|distance| (1e-4..1e-3).contains(distance)), "{distances:?}");
             assert!(distances.windows(2).all(|pair| pair[0] != pair[1]), "{distances:?}");
+            seen.set(seen.get() + 1);
         }
     });
+    assert!(seen.get() > 0, "no case rubs");
+}
+
+/// MuJoCo's friction loss at a constant speed is in proportion to it up to the width, and it has turned before
+/// the velocity has.
+#[test]
+fn a_soft_constraint_leads_and_turns_over_a_width_of_each_joint() {
+    let seen = Cell::new(0);
+    check(Situation::SoftConstraint, |case, _| {
+        for shape in shapes(case) {
+            let Shape::Constraint { lead, widths } = shape else { continue };
+            assert!((3e-3..0.02).contains(&lead) && widths.iter().all(|width| *width > 0.0));
+            assert!(widths.windows(2).all(|pair| pair[0] != pair[1]), "{widths:?}");
+            seen.set(seen.get() + 1);
+        }
+    });
+    assert!(seen.get() > 0, "no case rubs");
 }
 
 #[test]

@@ -69,11 +69,14 @@ pub enum Situation {
     Pushes,
     /// Dry friction of all joints turns over 0.1 to 1 mrad or mm after a reversal, on each over its own.
     SoftBristles,
+    /// Dry friction of all joints is held by a soft constraint, as in MuJoCo: it leads the velocity by 3 to
+    /// 20 ms, and turns in a straight line over a speed of its own for each joint.
+    SoftConstraint,
 }
 
 impl Situation {
     /// All situations.
-    pub const ALL: [Situation; 28] = [
+    pub const ALL: [Situation; 29] = [
         Situation::White,
         Situation::ShortColour,
         Situation::Colour,
@@ -102,12 +105,13 @@ impl Situation {
         Situation::HeldPositions,
         Situation::Pushes,
         Situation::SoftBristles,
+        Situation::SoftConstraint,
     ];
     /// Those of the first cases of each suite: so many there were when these were drawn first.
     pub const FIRST: usize = Situation::BLOCKS[0].1;
     /// Situations that came together: the index of their first case, and how many they are.
-    const BLOCKS: [(usize, usize); 7] =
-        [(0, 15), (50_000, 7), (60_000, 1), (70_000, 1), (80_000, 1), (90_000, 2), (95_000, 1)];
+    const BLOCKS: [(usize, usize); 8] =
+        [(0, 15), (50_000, 7), (60_000, 1), (70_000, 1), (80_000, 1), (90_000, 2), (95_000, 1), (97_000, 1)];
 
     /// The situation of the case of this index: those of its block in turn.
     pub fn of_index(index: usize) -> Self {

@@ -7,7 +7,7 @@ use super::case::{
 };
 use super::certainty::visible_beside_others;
 use super::draw::{Survey, catalogue, outside};
-use super::family::{Bristles, Family};
+use super::family::{Family, Turning};
 use super::kind::{Kind, Name};
 use super::logging::Logging;
 use super::plant::{Ordinary, Record, States, record};
@@ -58,10 +58,11 @@ pub fn draw<'a>(spec: &Spec, situation: Situation, robot: &'a Robot, attempt: u6
     let rms: [&[f64]; 2] = [&survey.torque, &survey.speed];
     let logging = Logging::draw(situation, &robot.tree, rms, &mut sensors, &mut rng(Stream::Situation));
     sensors.logging = Some(logging);
-    let bristles = match situation {
-        Situation::SoftBristles => Bristles::Soft,
-        _ if situation.rests() && plant_rng.chance(0.6) => Bristles::Stiff,
-        _ => Bristles::None,
+    let turning = match situation {
+        Situation::SoftBristles => Turning::SoftBristles,
+        Situation::SoftConstraint => Turning::SoftConstraint,
+        _ if situation.rests() && plant_rng.chance(0.6) => Turning::StiffBristles,
+        _ => Turning::OverASpeed,
     };
     let mut still = Vec::new();
     if situation == Situation::StillJoints {
@@ -73,10 +74,8 @@ pub fn draw<'a>(spec: &Spec, situation: Situation, robot: &'a Robot, attempt: u6
             .collect();
         motions.iter_mut().for_each(|motion| motion.keep_still(&still));
     }
-    let families: Vec<Secret> = kinds
-        .iter()
-        .map(|kind| family(*kind, spec, &full, &survey.speed, bristles, &mut plant_rng))
-        .collect();
+    let families: Vec<Secret> =
+        kinds.iter().map(|kind| family(*kind, spec, &full, &survey.speed, turning, &mut plant_rng)).collect();
     let mut case = Case {
         spec: spec.clone(),
         robot,
@@ -198,7 +197,7 @@ fn family(
     spec: &Spec,
     full: &Ordinary,
     speed: &[f64],
-    bristles: Bristles,
+    turning: Turning,
     rng: &mut CaseRng,
 ) -> Secret {
     let count = speed.len();
@@ -210,7 +209,7 @@ fn family(
         c if c < 0.85 => (0..count.div_ceil(2)).collect(),
         _ => (0..count).filter(|joint| *joint != except).collect(),
     };
-    let family = Family::draw(kind, full, &joints, speed, bristles, rng);
+    let family = Family::draw(kind, full, &joints, speed, turning, rng);
     Secret { name: Name::Catalogue(kind), joints, form: Form::Family(family), scale: 1.0 }
 }
 

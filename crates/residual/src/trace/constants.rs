@@ -1,9 +1,10 @@
 //! Constants closer to the best, once an effect is in the model.
 
-use super::hypotheses::{Candidates, Present};
+use super::hypotheses::{Candidates, Present, known_of_the_site};
 use super::kept_columns::Keep;
 use super::search::Search;
 use crate::selection::{LEAST_STEP, choose_variants};
+use phiw_effects::Constants;
 use phiw_identification::{EffectSpec, IdentificationError};
 
 /// Passes to refine constants.
@@ -50,10 +51,21 @@ impl Search<'_> {
                     spec.joints.iter().filter_map(|joint| tree.joint_index(joint)).collect();
                 near.extend(catalogue.kind(&spec.kind)?.scan(&site, &self.input.ranges));
             }
+            near.extend(self.as_the_joint_turns(spec)?);
             let specs = near.into_iter().map(|constants| EffectSpec { constants, ..spec.clone() });
             candidates.add_variants(self.fixed, present, place, specs.collect())?;
         }
         Ok(candidates)
+    }
+
+    /// The constants of an effect with those that belong to its joint as other effects have them, where it has
+    /// others: it may have come before they were known.
+    fn as_the_joint_turns(&self, spec: &EffectSpec) -> Result<Option<Constants>, IdentificationError> {
+        let catalogue = self.fixed.catalogue;
+        let known = known_of_the_site(catalogue, catalogue.kind(&spec.kind)?, &self.specs, &spec.joints);
+        let depends = spec.constants.keys().any(|name| known.contains_key(name));
+        let constants: Constants = spec.constants.clone().into_iter().chain(known).collect();
+        Ok((depends && constants != spec.constants).then_some(constants))
     }
 
     /// Moves the point of linearisation of effects that have one.

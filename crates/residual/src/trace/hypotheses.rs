@@ -182,14 +182,7 @@ fn scan(
     present: &[EffectSpec],
     joints: &[String],
 ) -> Vec<Constants> {
-    let mut known = Constants::new();
-    for other in catalogue.kinds().filter(|other| other.name() != kind.name()) {
-        let spec = present.iter().find(|spec| spec.kind == other.name() && spec.joints == joints);
-        let Some(spec) = spec else { continue };
-        let constants =
-            spec.constants.iter().filter(|(name, _)| other.constants_of_the_site().contains(&name.as_str()));
-        known.extend(constants.map(|(name, value)| (name.clone(), *value)));
-    }
+    let known = known_of_the_site(catalogue, kind, present, joints);
     if known.is_empty() {
         return kind.scan(site, ranges);
     }
@@ -204,4 +197,22 @@ fn scan(
         }
     }
     unique
+}
+
+/// Constants that belong to the joints, as other effects of the model on them have them.
+pub(super) fn known_of_the_site(
+    catalogue: &Catalogue,
+    kind: &dyn EffectKind,
+    present: &[EffectSpec],
+    joints: &[String],
+) -> Constants {
+    let mut known = Constants::new();
+    for other in catalogue.kinds().filter(|other| other.name() != kind.name()) {
+        let spec = present.iter().find(|spec| spec.kind == other.name() && spec.joints == joints);
+        let Some(spec) = spec else { continue };
+        let constants =
+            spec.constants.iter().filter(|(name, _)| other.constants_of_the_site().contains(&name.as_str()));
+        known.extend(constants.map(|(name, value)| (name.clone(), *value)));
+    }
+    known
 }

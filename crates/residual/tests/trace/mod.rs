@@ -3,6 +3,7 @@
 
 mod declared;
 mod held_model;
+mod leading_friction;
 mod missing_effects;
 mod robot;
 mod structure;
