@@ -14,10 +14,9 @@ fn frictions_of_a_soft_constraint_are_frictions_and_no_delays() {
         }
     };
     let tracing = traced_on(folds().0, &[], 11, &secret, false);
-    let mut named = named(&tracing);
-    named.sort();
-    let kinds: Vec<&str> = named.iter().map(|(kind, _)| kind.as_str()).collect();
-    assert_eq!(kinds, ["coulomb_friction", "viscous_friction"], "{named:?}");
+    let named = named(&tracing);
+    let expected = ["coulomb_friction", "viscous_friction"];
+    assert!(named.len() == 4 && named.iter().all(|(kind, _)| expected.contains(&kind.as_str())), "{named:?}");
     let leads = tracing.specs.iter().filter(|spec| spec.kind == "coulomb_friction");
     let leads: Vec<f64> = leads.filter_map(|spec| spec.constants.get("sign_lead").copied()).collect();
     assert!(leads.len() == 2 && leads.iter().all(|lead| (0.008..0.011).contains(lead)), "{leads:?}");
