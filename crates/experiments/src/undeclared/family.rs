@@ -23,8 +23,8 @@ pub enum Shape {
     Coulomb { smoothing: Sign, widths: Vec<f64> },
     /// Bristles, each joint's bending this far \[rad, m\]: at rest they hold what they held.
     Bristles { distances: Vec<f64> },
-    /// Held by a soft constraint, as MuJoCo's friction loss: −(q̈ + q̇/`lead`) times a constant until it slips,
-    /// which at constant speed it does at each joint's own width \[s; rad/s, m/s\].
+    /// Held by a soft constraint, as MuJoCo's friction loss: −(q̈ + q̇/`lead`) times a constant until it
+    /// slips, which at constant speed it does at each joint's own width \[s; rad/s, m/s\].
     Constraint { lead: f64, widths: Vec<f64> },
     /// q̈.
     Rotor,
@@ -71,7 +71,7 @@ impl Family {
             }
             Kind::CoulombFriction if turning == Turning::SoftConstraint => {
                 let lead = rng.log_uniform(3e-3, 0.02);
-                // The lighter the joint, the wider: from one that is as good as stiff to one that hardly slips.
+                // The lighter the joint, the wider: from as good as stiff to one that hardly slips.
                 let widths = speed.iter().map(|speed| speed * rng.log_uniform(3e-3, 0.5)).collect();
                 (&ordinary.coulomb, Shape::Constraint { lead, widths })
             }

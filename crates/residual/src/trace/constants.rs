@@ -58,8 +58,8 @@ impl Search<'_> {
         Ok(candidates)
     }
 
-    /// The constants of an effect with those that belong to its joint as other effects have them, where it has
-    /// others: it may have come before they were known.
+    /// The constants of an effect with those that belong to its joint as other effects have them, where it
+    /// has others: it may have come before they were known.
     fn as_the_joint_turns(&self, spec: &EffectSpec) -> Result<Option<Constants>, IdentificationError> {
         let catalogue = self.fixed.catalogue;
         let known = known_of_the_site(catalogue, catalogue.kind(&spec.kind)?, &self.specs, &spec.joints);
