@@ -14,10 +14,9 @@ const POWERS: [f64; 4] = [0.0, 1.0, 2.0, STRAIGHT];
 const STRAIGHT: f64 = 8.0;
 /// The constant that says at which moment the velocity is the one whose sign it is: see [`Sign::lead`].
 pub(crate) const LEAD: &str = "sign_lead";
-/// The lead that is tried first where a sign is refined \[s\], shorter and longer ones from there: about that of
-/// MuJoCo's friction loss, 9.5 ms if nobody sets another time constant. No lag is tried: bristles are late,
-/// too, and over a way.
-const LEADS: [f64; 1] = [0.01];
+/// Leads that are tried first where a sign is refined \[s\]; the friction loss of MuJoCo leads by 9.5 ms if
+/// nobody sets another time constant. No lag is tried: bristles are late, too, and over a way.
+const LEADS: [f64; 2] = [0.003, 0.01];
 /// Widths that are tried with a lead where there was none \[rad/s, m/s\].
 const WIDTHS_OF_LEADING: [f64; 3] = [1e-3, 4e-3, 0.016];
 /// The longest lead \[s\]: to first order the velocity is not foretold for longer.
