@@ -67,8 +67,8 @@ fn real_robots_end_the_same_whatever_was_declared() {
             report.after.validate.relative.unwrap()
         });
         let best = errors.into_iter().fold(f64::INFINITY, f64::min);
-        // 5 % is what is asked. The KR300 has not kept it since frictions may lead: 6.79, 7.23 and 7.16 %, where
-        // it ended at 6.98, 6.99 and 7.13 before.
+        // 5 % is what is asked. The KR300 has not kept it since frictions may lead: 6.79, 7.23 and 7.16 %,
+        // where it ended at 6.98, 6.99 and 7.13 before.
         let within = if robot == "kr300" { 1.07 } else { 1.05 };
         assert!(errors.iter().all(|error| *error < within * best), "{robot}: {errors:?}");
     }

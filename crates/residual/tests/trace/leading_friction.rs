@@ -3,7 +3,7 @@
 use super::robot::{State, folds, named, traced_on};
 
 /// Logs of robots that MuJoCo simulated had friction losses with its defaults: −(q̈ + q̇/9.5 ms) times a
-/// constant until it slips. Delays of single joints were named for it, and up to 3 % of the torques were left.
+/// constant until it slips. Delays of single joints were named for it, and up to 3 % of the torques left.
 #[test]
 fn frictions_of_a_soft_constraint_are_frictions_and_no_delays() {
     let secret = |state: &State<'_>, torque: &mut [f64]| {
