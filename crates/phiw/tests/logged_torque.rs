@@ -99,7 +99,7 @@ fn a_torque_that_was_smoothed_is_said_and_accuses_nobody() {
     // 1/(1 + T²ω²) falls as they do where T² is half of it.
     let expected = 0.5 * 3.0 * 224.0 / 12.0 / synthetic::RATE.powi(2);
     let square = found.parameters["joint_1"]["time_constant_squared"].value;
-    // 34 % too large since frictions may lead (30 % was asked before): a lead takes a part of it.
+    // 34 % too large since frictions may lead (30 % was asked before); why is not known.
     assert!((square / expected - 1.0).abs() < 0.4, "{square} s², {expected} s²");
     let (before, after) = (report.before.validate.relative.unwrap(), report.after.validate.relative.unwrap());
     assert!(after < 0.7 * before, "{before} {after}");

@@ -156,8 +156,6 @@ fn soft_bristles_are_of_all_joints_and_each_bends_as_far_as_its_own() {
     assert!(seen.get() > 0, "no case rubs");
 }
 
-/// MuJoCo's friction loss at a constant speed is in proportion to it up to the width, and it has turned
-/// before the velocity has.
 #[test]
 fn a_soft_constraint_leads_and_turns_over_a_width_of_each_joint() {
     let seen = Cell::new(0);
