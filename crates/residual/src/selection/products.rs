@@ -147,32 +147,43 @@ impl Products {
 
     /// What is left of ‖Φw‖² beside other columns, whatever their parameters.
     pub fn size_beside(&self, w: &[(usize, f64)], others: &[usize]) -> f64 {
-        let inner = |a: &[(usize, f64)], b: &[(usize, f64)]| -> f64 {
-            let along = |column: usize| {
-                b.iter().map(|&(other, value)| self.column(column)[other] * value).sum::<f64>()
+        let mut columns: Vec<usize> =
+            w.iter().map(|&(column, _)| column).chain(others.iter().copied()).collect();
+        columns.sort_unstable();
+        columns.dedup();
+        // Sums of these columns, as their coefficients: none grows with the number of the others.
+        let inner = |a: &[f64], b: &[f64]| -> f64 {
+            let along = |column: usize| -> f64 {
+                let products = self.column(column);
+                columns.iter().zip(b).map(|(&other, value)| products[other] * value).sum()
             };
-            a.iter().map(|&(column, value)| value * along(column)).sum()
+            columns.iter().zip(a).map(|(&column, value)| value * along(column)).sum()
+        };
+        let sum_of = |w: &[(usize, f64)]| -> Vec<f64> {
+            let own =
+                |column: usize| w.iter().filter(|(own, _)| *own == column).map(|(_, value)| value).sum();
+            columns.iter().map(|&column| own(column)).collect()
         };
         // Gram and Schmidt, in the inner product of the rows.
-        let mut basis: Vec<Vec<(usize, f64)>> = Vec::new();
-        let beside = |w: &[(usize, f64)], basis: &[Vec<(usize, f64)>]| {
-            let mut left = w.to_vec();
+        let mut basis: Vec<Vec<f64>> = Vec::new();
+        let beside = |mut left: Vec<f64>, basis: &[Vec<f64>]| {
             for unit in basis {
                 let along = inner(unit, &left);
-                left.extend(unit.iter().map(|&(column, value)| (column, -along * value)));
+                left.iter_mut().zip(unit).for_each(|(left, unit)| *left -= along * unit);
             }
             left
         };
         for &column in others {
-            let own = [(column, 1.0)];
-            let left = beside(&own, &basis);
+            let own = sum_of(&[(column, 1.0)]);
+            let whole = inner(&own, &own);
+            let left = beside(own, &basis);
             let squares = inner(&left, &left);
-            if squares > 1e-9 * inner(&own, &own) {
+            if squares > 1e-9 * whole {
                 let length = squares.sqrt();
-                basis.push(left.into_iter().map(|(column, value)| (column, value / length)).collect());
+                basis.push(left.into_iter().map(|value| value / length).collect());
             }
         }
-        let left = beside(w, &basis);
+        let left = beside(sum_of(w), &basis);
         inner(&left, &left).max(0.0)
     }
 
@@ -186,6 +197,7 @@ impl Products {
 #[cfg(test)]
 mod tests {
     use super::Products;
+    use faer::prelude::SolveLstsq;
     use phiw_regressor::factor::Factor;
 
     /// A spring and a balancer on a short arc are the same but for a cube: next to nothing is left of either.
@@ -205,6 +217,23 @@ mod tests {
         assert!(left > 0.0 && left < 1e-3, "{left}");
         // Cosines are even, and take nothing of what is odd.
         assert!((products.size_beside(&own, &[2, 2]) / whole - 1.0).abs() < 1e-12);
+    }
+
+    /// Forty effects that could do each other's work took longer than anyone waited: what was left of one had
+    /// twice as many terms with each of the others.
+    #[test]
+    fn what_is_left_of_one_of_forty_columns_is_found_at_once() {
+        let value =
+            |row: usize, column: usize| (1.7 * (row * row) as f64 * (column as f64 + 2.0).sqrt()).sin();
+        let rows = faer::Mat::from_fn(90, 41, value);
+        let products = Products::of_rows(rows.as_ref());
+        let others: Vec<usize> = (1..40).collect();
+        // By least squares: the best combination of the others leaves as much.
+        let (own, beside) = (rows.col(0).to_owned(), rows.subcols(1, 39).to_owned());
+        let taken = &beside * beside.qr().solve_lstsq(own.as_mat());
+        let left: f64 = (0..90).map(|row| (own[row] - taken[(row, 0)]).powi(2)).sum();
+        assert!(left > 1.0, "{left}");
+        assert!((products.size_beside(&[(0, 2.0)], &others) - 4.0 * left).abs() < 1e-9 * left);
     }
 
     /// An external force named a moment of 10¹⁷ N·m: its column was rounding, and followed the noise.
