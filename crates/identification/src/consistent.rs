@@ -9,6 +9,7 @@ use crate::effect::QuadraticForm;
 use crate::fit::{Fit, TorqueError, merge, torque_error};
 use crate::mirrored::mirror_map;
 use crate::model::with_masses;
+use crate::own_torque::{LARGEST_GROWTH, largest_growth};
 use crate::{Data, Design, IdentificationError, Identified};
 pub use phiw_consistency::Ellipsoid;
 use phiw_consistency::{
@@ -106,8 +107,9 @@ pub struct Consistent {
 
 impl Identified {
     /// The model that phiw reports and predicts with: these bodies, which can exist, where they foretell
-    /// better than least squares' do. Intervals then hold the values of both. Columns that are made of the
-    /// model's own torque are made again from `data`.
+    /// better than least squares' do, and whether it is. Intervals then hold the values of both. Columns that
+    /// are made of the model's own torque are made again from `data`; where the error of a torque in training
+    /// is larger then than the one by which these bodies were judged, the model stays as it was.
     ///
     /// # Errors
     /// A log cannot be read any more.
@@ -115,30 +117,34 @@ impl Identified {
         mut self,
         possible: &Consistent,
         data: Option<&Data<'_>>,
-    ) -> Result<Self, IdentificationError> {
+    ) -> Result<(Self, bool), IdentificationError> {
         if !possible.foretells_better {
-            return Ok(self);
+            return Ok((self, false));
         }
+        let (mut train, mut held_out) = (possible.train.clone(), possible.held_out.clone());
+        if self.design.needs().of_reference() {
+            self.design = self.design.with_own_reference(&possible.parameters)?;
+            if let Some(data) = data {
+                let all = [data.train.as_slice(), &data.held_out].concat();
+                let mut train_folds = accumulate(&self.design, &all, &data.sources)?;
+                let held_out_folds = train_folds.split_off(data.train.len());
+                train = torque_error(&train_folds, &possible.parameters)?;
+                held_out = torque_error(&held_out_folds, &possible.parameters)?;
+                if largest_growth(&train.rmse, &possible.train.rmse) > LARGEST_GROWTH {
+                    self.design = self.design.with_own_reference(&self.fit.parameters)?;
+                    return Ok((self, false));
+                }
+                (self.train_folds, self.held_out_folds) = (train_folds, held_out_folds);
+            }
+        }
+        (self.train, self.held_out) = (train, held_out);
+        self.fit.parameters.clone_from(&possible.parameters);
         for (interval, value) in self.fit.intervals_95.iter_mut().zip(&possible.parameters) {
             if interval.iter().all(|end| end.is_finite()) {
                 *interval = [interval[0].min(*value), interval[1].max(*value)];
             }
         }
-        self.fit.parameters.clone_from(&possible.parameters);
-        self.train.clone_from(&possible.train);
-        self.held_out.clone_from(&possible.held_out);
-        if !self.design.needs().of_reference() {
-            return Ok(self);
-        }
-        self.design = self.design.with_own_reference(&self.fit.parameters)?;
-        if let Some(Data { train, held_out, sources, .. }) = data {
-            let all = [train.as_slice(), held_out].concat();
-            self.train_folds = accumulate(&self.design, &all, sources)?;
-            self.held_out_folds = self.train_folds.split_off(train.len());
-            self.train = torque_error(&self.train_folds, &self.fit.parameters)?;
-            self.held_out = torque_error(&self.held_out_folds, &self.fit.parameters)?;
-        }
-        Ok(self)
+        Ok((self, true))
     }
 }
 

@@ -8,7 +8,7 @@ use phiw_regressor::least_squares::GroupedFactor;
 /// Times that the columns are made anew, at most.
 const FITS: usize = 5;
 /// By how much the error of a torque may grow (RMS) once the columns are made of the fit's own torque.
-const LARGEST_GROWTH: f64 = 1.02;
+pub(crate) const LARGEST_GROWTH: f64 = 1.02;
 
 /// A fitted model with its own torque in the columns that need one.
 pub struct OwnTorqueFit {
@@ -69,8 +69,13 @@ impl OwnTorqueFit {
     /// The sum of the logarithms of the torques' errors, and the largest ratio of one to what the fit left.
     fn errors(&self, train: usize) -> Result<(f64, f64), IdentificationError> {
         let rmse = torque_error(&self.folds.moving[..train], &self.fit.parameters)?.rmse;
-        let ratios = rmse.iter().zip(&self.fit.residual_std).filter(|(_, left)| **left > 0.0);
-        let growth = ratios.map(|(rmse, left)| rmse / left).fold(0.0, f64::max);
+        let growth = largest_growth(&rmse, &self.fit.residual_std);
         Ok((rmse.iter().map(|rmse| rmse.max(f64::MIN_POSITIVE).ln()).sum(), growth))
     }
+}
+
+/// The largest ratio of the torques' errors to what they were before.
+pub(crate) fn largest_growth(rmse: &[f64], before: &[f64]) -> f64 {
+    let ratios = rmse.iter().zip(before).filter(|(_, before)| **before > 0.0);
+    ratios.map(|(rmse, before)| rmse / before).fold(0.0, f64::max)
 }

@@ -39,7 +39,8 @@ impl PossibleBodies {
             return Ok((identified, own));
         }
         let own = Self::beside(session, &identified)?;
-        Ok((identified.with_possible(&own.consistent, data)?, own))
+        let (identified, is_taken) = identified.with_possible(&own.consistent, data)?;
+        Ok((identified, own.taken_as_the_model(is_taken)))
     }
 
     /// Of a model that stays as it is: one that more than these logs has told.
@@ -47,8 +48,12 @@ impl PossibleBodies {
     /// # Errors
     /// What is known of the bodies contradicts itself.
     pub fn beside_held(session: &Session, identified: &Identified) -> Result<Self, Error> {
-        let own = Self::beside(session, identified)?;
-        Ok(PossibleBodies { consistent: Consistent { foretells_better: false, ..own.consistent }, ..own })
+        Ok(Self::beside(session, identified)?.taken_as_the_model(false))
+    }
+
+    fn taken_as_the_model(mut self, is_taken: bool) -> Self {
+        self.consistent.foretells_better = is_taken;
+        self
     }
 
     fn beside(session: &Session, identified: &Identified) -> Result<Self, Error> {
