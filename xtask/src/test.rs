@@ -31,7 +31,8 @@ const DEPENDENCIES: &[&str] = &["deny", "check", "licenses", "bans", "sources"];
 /// `--show-output` prints what passing tests said, so that a test that skipped itself is seen and counted.
 const TESTS: &[&str] = &["test", "--workspace", "--no-fail-fast", "--", "--show-output"];
 
-/// Runs every check, also after one has failed, and prints the tally as the last line.
+/// Runs every check, also after one has failed, and prints what failed tests said once more and the tally as
+/// the last line.
 ///
 /// # Errors
 /// Cargo cannot be started.
@@ -64,6 +65,7 @@ pub fn command(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         failed.push(named(&consumers));
     }
     failed.extend(python::test(&mut tally)?);
+    tally.said_by_failures().iter().for_each(|line| println!("{line}"));
     failed.iter().for_each(|problem| println!("failed: {problem}"));
     if unchecked_dependencies {
         println!("skipped: cargo-deny is not installed: licences and sources of dependencies unchecked");

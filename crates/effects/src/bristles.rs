@@ -10,8 +10,8 @@ pub(crate) const DEFLECTION: &str = "bristle_deflection";
 /// The longest way over which a dry friction turns \[rad, m\]. A longer one is a hysteresis, which has a name
 /// of its own.
 pub const LONGEST_BRISTLES: f64 = 1e-3;
-/// Ways that are tried.
-const DEFLECTIONS: [f64; 5] = [1e-5, 3e-5, 1e-4, 3e-4, LONGEST_BRISTLES];
+/// Ways over which a dry friction is first tried to turn \[rad, m\].
+pub const BRISTLE_WAYS: [f64; 5] = [1e-5, 3e-5, 1e-4, 3e-4, LONGEST_BRISTLES];
 /// For how long a joint has moved before its log, at the speed at which it is met there \[s\]: one that
 /// rests where its log begins has bristles that are relaxed, one that moves has bent them.
 const MOVED_BEFORE: f64 = 0.1;
@@ -80,7 +80,7 @@ impl Turning {
 /// The constants of a friction with bristles instead of a sign that turns over a speed; they turn over `way`
 /// \[rad, m\], if that is not too long, or over one in the middle of what is tried.
 pub(crate) fn with_bristles(found: &Constants, way: Option<f64>) -> Constants {
-    let middle = DEFLECTIONS[DEFLECTIONS.len() / 2];
+    let middle = BRISTLE_WAYS[BRISTLE_WAYS.len() / 2];
     let mut with = found.clone();
     with.insert(WIDTH.to_owned(), 0.0);
     with.remove(POWER);
@@ -93,7 +93,7 @@ pub(crate) fn with_bristles(found: &Constants, way: Option<f64>) -> Constants {
 pub(crate) fn bristles_near(found: &Constants, step: usize) -> Vec<Constants> {
     let mut near = around(found, DEFLECTION, step);
     if step == 0 && found.contains_key(DEFLECTION) {
-        near.extend(product(std::slice::from_ref(found), &values(DEFLECTION, DEFLECTIONS)));
+        near.extend(product(std::slice::from_ref(found), &values(DEFLECTION, BRISTLE_WAYS)));
     }
     near.retain(|near| near[DEFLECTION] <= LONGEST_BRISTLES);
     near
@@ -101,7 +101,7 @@ pub(crate) fn bristles_near(found: &Constants, step: usize) -> Vec<Constants> {
 
 #[cfg(test)]
 mod tests {
-    use super::{DEFLECTION, DEFLECTIONS, LONGEST_BRISTLES, Turning, bristles_near, with_bristles};
+    use super::{BRISTLE_WAYS, DEFLECTION, LONGEST_BRISTLES, Turning, bristles_near, with_bristles};
     use crate::kind::Constants;
     use crate::sign::{POWER, WIDTH};
     use proptest::prelude::*;
@@ -160,7 +160,7 @@ mod tests {
         let over = |way| with_bristles(&Constants::new(), way)[DEFLECTION];
         assert_eq!(
             [over(Some(7e-4)), over(Some(0.02)), over(None)],
-            [7e-4, LONGEST_BRISTLES, DEFLECTIONS[2]]
+            [7e-4, LONGEST_BRISTLES, BRISTLE_WAYS[2]]
         );
     }
 

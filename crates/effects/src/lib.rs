@@ -24,7 +24,7 @@ mod torque_gain;
 mod torque_zero;
 mod trigonometric_spline;
 
-pub use bristles::LONGEST_BRISTLES;
+pub use bristles::{BRISTLE_WAYS, LONGEST_BRISTLES};
 pub use catalogue::{Catalogue, sentence};
 pub use columns::{Formula, OwnTorque, ParameterKind};
 pub use fitted::FittedEffect;

@@ -1,5 +1,6 @@
 //! The sign of a velocity, and how it turns.
 
+use crate::bristles::DEFLECTION;
 use crate::kind::{Constants, SignalRanges, around, constant, product, values};
 use phiw_codegen::{Expression, Function};
 use phiw_identification::effect::Sample;
@@ -59,7 +60,8 @@ pub(crate) fn signs_near(found: &Constants, step: usize) -> Vec<Constants> {
         near.extend(product(std::slice::from_ref(found), &values(WIDTH, WIDTHS_OF_LEADING)));
     }
     near.extend(around(found, LEAD, step));
-    if step == 0 {
+    // Over a way nothing is known of the moment.
+    if step == 0 && !found.contains_key(DEFLECTION) {
         near.extend(product(std::slice::from_ref(found), &values(LEAD, LEADS)));
     }
     near.retain(|near| constant(near, LEAD, 0.0) <= LONGEST_LEAD);
@@ -167,7 +169,7 @@ impl Sign {
 
 #[cfg(test)]
 mod tests {
-    use super::{LEAD, LONGEST_LEAD, POWERS, STRAIGHT, Sign, WIDTH, signs_near};
+    use super::{DEFLECTION, LEAD, LONGEST_LEAD, POWERS, STRAIGHT, Sign, WIDTH, signs_near};
     use crate::kind::{Constants, values};
     use proptest::prelude::*;
 
@@ -218,6 +220,9 @@ mod tests {
         let plain = values(WIDTH, [0.0]).remove(0);
         let leads: Vec<f64> = signs_near(&plain, 0).iter().map(|near| Sign::of(near).lead).collect();
         assert!(leads.iter().any(|lead| *lead > 0.0) && leads.iter().all(|lead| *lead >= 0.0));
+        let over_a_way: Constants =
+            plain.clone().into_iter().chain([(DEFLECTION.to_owned(), 1e-4)]).collect();
+        assert!(signs_near(&over_a_way, 0).iter().all(|near| Sign::of(near).lead == 0.0));
         let mut found: Constants = plain.into_iter().chain([(LEAD.to_owned(), 0.01)]).collect();
         // One that leads may turn over a speed, which it could not before.
         assert!(signs_near(&found, 1).iter().any(|near| Sign::of(near).width > 0.0));

@@ -2,6 +2,8 @@
 
 /// Beginning of the line that a test prints instead of testing, where it lacks data.
 const SKIPPED: &str = "skipped: ";
+/// Lines of what a failed test printed that are kept.
+const KEPT_LINES: usize = 24;
 
 /// What became of the tests so far.
 ///
@@ -18,6 +20,12 @@ pub struct Tally {
     said_so: bool,
     /// Tests of the present binary that have said so; the binary counts them as passed.
     said_so_here: u64,
+    /// Within the outputs of failed tests.
+    in_failures: bool,
+    /// How many more lines of the failed test whose output is being read are kept.
+    kept_lines_left: usize,
+    /// What failed tests printed, as far as it is kept.
+    said_by_failures: Vec<String>,
 }
 
 impl Tally {
@@ -26,6 +34,7 @@ impl Tally {
         if let Some(result) = line.strip_prefix("test result: ") {
             let said_so = std::mem::take(&mut self.said_so_here);
             self.in_successes = false;
+            self.in_failures = false;
             self.passed += count(result, "passed").saturating_sub(said_so);
             self.failed += count(result, "failed");
             self.skipped += count(result, "ignored") + said_so;
@@ -34,12 +43,31 @@ impl Tally {
             self.said_so = false;
         } else if line == "failures:" {
             self.in_successes = false;
+            // The outputs come first, then, under the same heading, the names.
+            self.in_failures = !self.in_failures;
         } else if line.starts_with("---- ") && line.ends_with(" stdout ----") {
             self.said_so = false;
+            self.kept_lines_left = KEPT_LINES;
+            self.keep(line);
+        } else if self.in_failures {
+            self.keep(line);
         } else if line.starts_with(SKIPPED) && self.in_successes && !self.said_so {
             self.said_so = true;
             self.said_so_here += 1;
         }
+    }
+
+    /// Keeps a line that a failed test printed.
+    fn keep(&mut self, line: &str) {
+        if self.in_failures && self.kept_lines_left > 0 && !line.is_empty() {
+            self.kept_lines_left -= 1;
+            self.said_by_failures.push(line.to_owned());
+        }
+    }
+
+    /// The beginning of what each failed test printed: it stands far above the end of a long output.
+    pub fn said_by_failures(&self) -> &[String] {
+        &self.said_by_failures
     }
 
     /// Takes the next line of what pytest prints: the last one counts, `2 passed, 1 skipped in 0.10s`.
@@ -151,6 +179,45 @@ test result: FAILED. 0 passed; 1 failed; 0 ignored; 0 measured; 0 filtered out; 
 ",
             "0 passed, 1 failed, 0 skipped",
         );
+    }
+
+    #[test]
+    fn what_failed_tests_printed_is_kept_and_nothing_else() {
+        let long: Vec<String> = (0..100).map(|line| format!("line {line}")).collect();
+        let output = format!(
+            "\
+successes:
+
+---- talkative stdout ----
+all is well
+
+failures:
+
+---- robots stdout ----
+{}
+
+---- logs stdout ----
+thread 'logs' panicked
+
+failures:
+    robots
+    logs
+
+test result: FAILED. 1 passed; 2 failed; 0 ignored; 0 measured; 0 filtered out; finished in 0.00s
+
+successes:
+
+---- more stdout ----
+of the next binary
+",
+            long.join("\n")
+        );
+        let mut tally = Tally::default();
+        output.lines().for_each(|line| tally.read_line(line));
+        let kept = tally.said_by_failures();
+        assert_eq!(kept[..2], ["---- robots stdout ----", "line 0"]);
+        assert_eq!(kept[kept.len() - 2..], ["---- logs stdout ----", "thread 'logs' panicked"]);
+        assert!(kept.len() < 40, "{kept:?}");
     }
 
     #[test]

@@ -15,8 +15,16 @@ impl Search<'_> {
     /// linearised, and makes columns again that are made of the model's torque: one pass a step, for all of
     /// them.
     pub(super) fn refine(&mut self) -> Result<(), IdentificationError> {
+        self.refine_those(|_| true)
+    }
+
+    /// The same for those effects only.
+    pub(super) fn refine_those(
+        &mut self,
+        are_those: impl Fn(&EffectSpec) -> bool,
+    ) -> Result<(), IdentificationError> {
         for step in 0..REFINEMENTS {
-            let mut candidates = self.near(step)?;
+            let mut candidates = self.near(step, &are_those)?;
             let depends = self.fixed.build(&self.specs)?.iter().any(|effect| effect.needs().of_reference());
             if candidates.effects.is_empty() && !depends {
                 break;
@@ -36,12 +44,16 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// The model's effects, each with constants near its own.
-    fn near(&self, step: usize) -> Result<Candidates, IdentificationError> {
+    /// The model's effects, those that are asked for each with constants near its own.
+    fn near(
+        &self,
+        step: usize,
+        are_those: impl Fn(&EffectSpec) -> bool,
+    ) -> Result<Candidates, IdentificationError> {
         let present = Present { specs: &self.specs, declared: self.declared };
         let mut candidates = Candidates::of_model(self.fixed, present);
         for (place, spec) in self.specs.iter().enumerate() {
-            if self.is_held(place) {
+            if self.is_held(place) || !are_those(spec) {
                 continue;
             }
             let (catalogue, tree) = (self.fixed.catalogue, self.fixed.tree);

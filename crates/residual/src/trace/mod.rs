@@ -27,6 +27,7 @@ mod scanned;
 mod search;
 mod special_cases;
 mod stage;
+mod starts;
 mod textbook;
 mod thresholds;
 mod tracing;

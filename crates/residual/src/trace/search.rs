@@ -115,28 +115,8 @@ pub(super) struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The search from where it starts to its end. Where the torques agree better once one of them is a
-    /// multiple of what is logged, and still do in the end, it also starts with that in force, and the better
-    /// end is taken: to first order a factor of two is no factor, and other effects would stand for it.
-    fn run(self) -> Result<Tracing, IdentificationError> {
-        let with_multiples = self.with_multiples()?;
-        let declared = self.specs.len();
-        let plain = self.searched()?;
-        let Some(with_multiples) = with_multiples else { return plain.finish() };
-        if !plain.still_asks_for(&with_multiples.specs[declared..])? {
-            return plain.finish();
-        }
-        let with_multiples = with_multiples.searched()?;
-        let rows = plain.chosen.rows.clone();
-        let better = match with_multiples.value(&rows)? < plain.value(&rows)? {
-            true => with_multiples,
-            false => plain,
-        };
-        better.finish()
-    }
-
     /// The model at the end, with nothing yet left out for what it does on motion that it is not fitted to.
-    fn searched(mut self) -> Result<Self, IdentificationError> {
+    pub(super) fn searched(mut self) -> Result<Self, IdentificationError> {
         // A width that is wrong is a friction that is missing.
         self.refine()?;
         loop {
@@ -162,8 +142,11 @@ impl Search<'_> {
             self.leave_out_what_is_not_realised()?;
             let is_settled = self.names() == before;
             // What has not settled is not chosen again, and its frictions may still turn over a way.
-            if (is_settled || round == ROUNDS) && self.turn_over_a_way()? {
-                continue;
+            if is_settled || round == ROUNDS {
+                let over_a_way = self.turn_over_a_way()?;
+                if self.turn_together()? || over_a_way {
+                    continue;
+                }
             }
             if is_settled && !self.contest()? {
                 break;

@@ -53,7 +53,7 @@ impl Search<'_> {
     }
 
     /// Effects of the kinds that a joint's properties hold, on the joints that the model has without them.
-    fn textbook_of_other_joints(&self) -> Result<Vec<EffectSpec>, IdentificationError> {
+    pub(super) fn textbook_of_other_joints(&self) -> Result<Vec<EffectSpec>, IdentificationError> {
         let mut open = Vec::new();
         for kind in self.fixed.catalogue.kinds().filter(|kind| kind.joint_property().is_some()) {
             for site in kind.sites(self.fixed.tree) {

@@ -1,7 +1,8 @@
-//! Friction that turns over a way, in the place of what mended how it turned.
+//! Friction that turns over a way: all of a joint together, or in the place of what mended how it turned.
 
 use super::search::Search;
-use phiw_effects::{Constants, LONGEST_BRISTLES};
+use crate::selection::LEAST_STEP;
+use phiw_effects::{BRISTLE_WAYS, Constants, LONGEST_BRISTLES};
 use phiw_identification::{EffectSpec, IdentificationError};
 
 /// How much larger the criterion is to be with a friction that turns over a way in the place of a form of it:
@@ -58,6 +59,61 @@ impl Search<'_> {
             }
         }
         Ok(any)
+    }
+
+    /// Lets all frictions of a joint that has several turn over a way, where the criterion is then smaller:
+    /// of several that turn over a speed, or over another way, one alone is no better. Whether any do.
+    pub(super) fn turn_together(&mut self) -> Result<bool, IdentificationError> {
+        let mut own = None;
+        let mut any = false;
+        for joint in self.fixed.tree.joint_names().map(str::to_owned).collect::<Vec<_>>() {
+            let Some(mut branch) = self.over_the_best_way(&joint)? else { continue };
+            branch.refine_those(|spec| spec.joints == [joint.as_str()])?;
+            let value = branch.value(&branch.chosen.rows)?;
+            let present = match own {
+                Some(own) => own,
+                None => *own.insert(self.value(&self.chosen.rows)?),
+            };
+            if value < present - LEAST_STEP {
+                *self = branch;
+                own = Some(value);
+                any = true;
+            }
+        }
+        Ok(any)
+    }
+
+    /// The model with all frictions of a joint turning over the way, of those that are tried first, at which
+    /// the criterion is smallest. `None` for a joint that has not several, and for one whose turning
+    /// something mends: beside that another way is best than in its place.
+    fn over_the_best_way(&self, joint: &str) -> Result<Option<Self>, IdentificationError> {
+        let catalogue = self.fixed.catalogue;
+        let mut best: Option<(f64, Self)> = None;
+        for way in BRISTLE_WAYS {
+            let mut branch = self.clone();
+            let mut frictions = 0;
+            for place in (0..self.specs.len()).filter(|&place| self.specs[place].joints == [joint]) {
+                let spec = &mut branch.specs[place];
+                let kind = catalogue.kind(&spec.kind)?;
+                if kind.mends_turning() {
+                    return Ok(None);
+                }
+                if let Some(constants) = kind.turned_over_a_way(&spec.constants, Some(way))
+                    && !self.is_held(place)
+                {
+                    spec.constants = constants;
+                    frictions += 1;
+                }
+            }
+            if frictions < 2 {
+                return Ok(None);
+            }
+            let value = branch.value(&branch.chosen.rows)?;
+            if best.as_ref().is_none_or(|(smallest, _)| value < *smallest) {
+                best = Some((value, branch));
+            }
+        }
+        Ok(best.map(|(_, branch)| branch))
     }
 
     /// Whether an effect is no more than how a friction of its joint turns, over a way as short as that of
