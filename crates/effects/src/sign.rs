@@ -60,7 +60,7 @@ pub(crate) fn signs_near(found: &Constants, step: usize) -> Vec<Constants> {
         near.extend(product(std::slice::from_ref(found), &values(WIDTH, WIDTHS_OF_LEADING)));
     }
     near.extend(around(found, LEAD, step));
-    // Over a way nothing is known of the moment.
+    // A friction that turns over a way has no lead.
     if step == 0 && !found.contains_key(DEFLECTION) {
         near.extend(product(std::slice::from_ref(found), &values(LEAD, LEADS)));
     }

@@ -2,7 +2,8 @@
 //!
 //! Frictions and rotor inertias that are too small to be certain joint by joint are there nevertheless, and
 //! the logs may tell them all together. They join the final model as families whose members are drawn to
-//! nothing (`selection/families.rs`): each as far as the logs say.
+//! nothing (`selection/families.rs`): each as far as the logs say. A start of the search has them, too
+//! (`starts.rs`).
 
 use super::search::Search;
 use super::tracing::FoundEffect;
