@@ -13,8 +13,8 @@ impl Search<'_> {
     /// - Where structure is left in the end, or something was found beside what was declared, a start has
     ///   what the textbook has of every joint, declared by nobody. What is chosen early, beside all that is
     ///   still missing, may stand for something else to the end; the more is there at the start, the less can
-    ///   be taken for it. Structure is judged on motion held out, too, so that this has a say in whether there
-    ///   is such a start; which end is taken is decided on training motion alone.
+    ///   be taken for it. Structure is judged on motion held out, too, which so has a say in whether there is
+    ///   such a start; which end is taken is decided on training motion alone.
     pub(super) fn run(self) -> Result<Tracing, IdentificationError> {
         let mut best = self.clone().searched()?;
         if let Some(start) = self.with_multiples()?
