@@ -73,7 +73,7 @@ impl Effect for Elastic {
         (0..self.joints).map(|row| Entry { row, parameter: 0 }).collect()
     }
     fn needs(&self) -> Needs {
-        Needs { torque: true, derivatives: true, ..Needs::default() }
+        Needs { torque: true, rates: true, derivatives: true, ..Needs::default() }
     }
     fn compliance(&self) -> Option<(usize, f64)> {
         (self.compliance != 0.0).then_some((self.joint, self.compliance))

@@ -129,6 +129,11 @@ pub trait EffectKind: Send + Sync {
         None
     }
 
+    /// The constants with which a drive delivers no more than `limit` \[N·m, N\]; `None` for what is no limit.
+    fn with_torque_limit(&self, _limit: f64) -> Option<Constants> {
+        None
+    }
+
     /// The property of a joint that holds its only parameter, in a URDF or a simulator; none if neither can
     /// express it.
     fn joint_property(&self) -> Option<JointProperty> {

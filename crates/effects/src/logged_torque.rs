@@ -256,7 +256,7 @@ impl Effect for Logged {
         self.site.iter().map(|&row| Entry { row, parameter: 0 }).collect()
     }
     fn needs(&self) -> Needs {
-        Needs { torque: true, ..Needs::default() }
+        Needs { rates: true, ..Needs::default() }
     }
     fn is_causal(&self) -> bool {
         false

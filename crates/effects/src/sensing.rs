@@ -1,6 +1,6 @@
 //! Effects of measurement and drive on position and torque: encoder offset, saturation.
 
-use crate::columns::{OwnTorque, ParameterKind};
+use crate::columns::{Formula, OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Refinement, Signal, SignalRanges, constant};
 use phiw_dynamics::{JointType, Tree};
@@ -96,13 +96,16 @@ impl Evaluator for OffsetColumns<'_> {
 
 /// The logged torque is the commanded one; what is delivered clips at `limit`. The column is the part beyond
 /// it, where the motion asks for the limit too: noise of the measured torque must not explain itself, and
-/// what moves as only more than the limit can move it was not clipped. The parameter is one where the drive
-/// clips in truth.
+/// what moves as only more than the limit can move it was not clipped. Where a command swings from one limit
+/// to the other, the smoothed motion is late: for one period of its band after it was at the limit it may ask
+/// for anything up to that. The parameter is one where the drive clips in truth.
 pub struct ActuatorSaturation;
 
 const LIMIT: &str = "limit";
 /// The lowest limit that is plausible: the steps of refinement together once led below the torque's RMS.
 const LEAST_LIMIT: &str = "least_limit";
+/// The lowest limit over the one that a start has.
+const LEAST_OF_START: f64 = 0.8;
 /// Share of the limit that the model's torque reaches where the drive clips, and of the model's torque that
 /// the limit reaches; the model was fitted with the clipping, and is not exact.
 const REACHED: f64 = 0.9;
@@ -139,6 +142,10 @@ impl EffectKind for ActuatorSaturation {
         let with = |limit: f64| found.clone().into_iter().chain([(LIMIT.to_owned(), limit)]).collect();
         near.filter(|limit| *limit >= least).map(with).collect()
     }
+    fn with_torque_limit(&self, limit: f64) -> Option<Constants> {
+        let least = LEAST_OF_START * limit;
+        Some(Constants::from([(LIMIT.to_owned(), limit), (LEAST_LIMIT.to_owned(), least)]))
+    }
     fn telling_motion(&self) -> &'static str {
         "a motion that asks for more torque than the drive has"
     }
@@ -151,17 +158,39 @@ impl EffectKind for ActuatorSaturation {
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, limit) = (site[0], constant(constants, LIMIT, f64::INFINITY));
-        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
-            let torque = sample.tau().get(joint).copied().unwrap_or_default();
-            let of_motion = sample.total_torque().get(joint).copied().unwrap_or_default();
-            let of_motion = of_motion * torque.signum();
-            let reached = of_motion >= REACHED * limit && REACHED * of_motion <= limit;
-            out[0] = if reached { torque.signum() * (torque.abs() - limit).max(0.0) } else { 0.0 };
-        };
+        let columns = BeyondLimit { joint, limit };
         let parameters = [("clipped_share", ParameterKind::Ratio, CLIPPED_SHARE.0)];
         let needs = Needs { total_torque: true, ..Needs::default() };
         let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
         Box::new(effect.needing(needs).at_most(CLIPPED_SHARE.1))
+    }
+}
+
+/// The column of an [`ActuatorSaturation`].
+struct BeyondLimit {
+    joint: usize,
+    limit: f64,
+}
+
+impl Formula for BeyondLimit {
+    /// When the drive was last at its limit.
+    type Memory = Option<f64>;
+
+    fn columns(&self, at_limit: &mut Self::Memory, sample: &Sample<'_>, columns: &mut [f64]) {
+        let of_joint = |torques: &[f64]| torques.get(self.joint).copied().unwrap_or_default();
+        let torque = of_joint(sample.tau());
+        let beyond = (torque.abs() - self.limit).max(0.0);
+        let of_motion = of_joint(sample.total_torque()) * torque.signum();
+        columns[0] = 0.0;
+        if beyond > 0.0 && REACHED * of_motion.abs() <= self.limit {
+            if of_motion >= REACHED * self.limit {
+                *at_limit = Some(sample.time_in_log());
+            }
+            let is_late = |at: f64| (sample.time_in_log() - at) * sample.motion_bandwidth_hz() <= 1.0;
+            if at_limit.is_some_and(is_late) {
+                columns[0] = torque.signum() * beyond;
+            }
+        }
     }
 }
 

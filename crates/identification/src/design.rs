@@ -359,6 +359,19 @@ impl Design {
 
     /// Whether an effect corrects the signals, by what it does to some.
     pub fn corrects_signals(&self, effect: usize) -> bool {
+        let [some, corrected] = self.some_signals_corrected(effect);
+        self.corrects_motion(effect) || some.tau != corrected.tau
+    }
+
+    /// Whether an effect corrects the motion, and not the measured torques only.
+    pub fn corrects_motion(&self, effect: usize) -> bool {
+        let motion = |block: Block| [block.q, block.qd, block.qdd];
+        let [some, corrected] = self.some_signals_corrected(effect).map(motion);
+        some != corrected
+    }
+
+    /// Some signals, and the same as an effect corrects them.
+    fn some_signals_corrected(&self, effect: usize) -> [Block; 2] {
         let joints = self.tree.joint_count();
         let t: Vec<f64> = (0..16).map(|sample| 0.01 * f64::from(sample)).collect();
         let signal = |phase: f64| -> Vec<f64> {
@@ -369,8 +382,7 @@ impl Design {
         let block = Block::unfiltered(joints, t.clone(), signals, signal(3.0));
         let mut corrected = block.clone();
         self.effects[effect].correct(&mut corrected);
-        let of = |block: &Block| [block.q.clone(), block.qd.clone(), block.qdd.clone(), block.tau.clone()];
-        of(&block) != of(&corrected)
+        [block, corrected]
     }
 
     /// Working memory for one block.

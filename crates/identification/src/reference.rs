@@ -50,11 +50,13 @@ impl ReferenceModel {
         if needs.is_empty() || self.tree.is_floating() {
             return Ok(());
         }
-        let mut workspace = Workspace::new(&self.tree);
-        if needs.torque || needs.total_torque || needs.derivatives {
-            self.torque(block, &mut workspace, out)?;
+        if needs.torque || needs.total_torque || needs.rates {
+            self.torque(block, &mut out.torque)?;
             out.total_torque.clone_from(&out.torque);
             self.add_effects(block, &mut out.total_torque);
+        }
+        if needs.rates {
+            self.rates(block, out);
             differences(&block.t, joints, &out.total_torque, &mut out.total_torque_rate);
         }
         if needs.derivatives {
@@ -66,22 +68,36 @@ impl ReferenceModel {
         Ok(())
     }
 
-    /// The rigid body's torque over a block, and its rates.
-    fn torque(
-        &self,
-        block: &Block,
-        workspace: &mut Workspace<f64>,
-        out: &mut BlockReference,
-    ) -> Result<(), DimensionError> {
-        out.torque.resize(block.t.len() * block.joints, 0.0);
-        for sample in 0..block.t.len() {
-            let row = block.row(sample);
-            let (q, v, a) = (&block.q[row.clone()], &block.qd[row.clone()], &block.qdd[row.clone()]);
-            self.tree.inverse_dynamics(q, v, a, workspace, &mut out.torque[row])?;
+    /// The rigid body's torque over a block, several samples at once.
+    fn torque(&self, block: &Block, torque: &mut Vec<f64>) -> Result<(), DimensionError> {
+        let (joints, samples) = (block.joints, block.t.len());
+        torque.resize(samples * joints, 0.0);
+        let mut workspace = Workspace::new(&self.tree);
+        let mut state = [const { Vec::new() }; 3];
+        let mut of_samples = vec![Lanes([0.0; SAMPLES]); joints];
+        for first in (0..samples).step_by(SAMPLES) {
+            for (lanes, values) in state.iter_mut().zip([&block.q, &block.qd, &block.qdd]) {
+                lanes.clear();
+                // Lanes beyond the last sample repeat it.
+                let at = |joint: usize, lane: usize| values[(first + lane).min(samples - 1) * joints + joint];
+                lanes.extend((0..joints).map(|joint| Lanes(std::array::from_fn(|lane| at(joint, lane)))));
+            }
+            let [q, v, a] = &state;
+            pulp::Arch::new().dispatch(
+                #[inline(always)]
+                || self.tree.inverse_dynamics(q, v, a, &mut workspace, &mut of_samples),
+            )?;
+            for (lane, row) in torque[first * joints..].chunks_exact_mut(joints).take(SAMPLES).enumerate() {
+                row.iter_mut().zip(&of_samples).for_each(|(value, lanes)| *value = lanes.0[lane]);
+            }
         }
+        Ok(())
+    }
+
+    /// The rates of the rigid body's torque over a block.
+    fn rates(&self, block: &Block, out: &mut BlockReference) {
         let (first, second) = (&mut out.torque_rate, &mut out.torque_second_rate);
         self.local_rates(block).apply(block.joints, &out.torque, first, second);
-        Ok(())
     }
 
     /// What differentiates the torques over a block.
@@ -101,10 +117,10 @@ impl ReferenceModel {
         compliances: &[(usize, f64)],
     ) -> Result<Block, DimensionError> {
         let mut links = block.clone();
-        let mut workspace = Workspace::new(&self.tree);
         let mut out = BlockReference::default();
         for _ in 0..DEFLECTION_STEPS {
-            self.torque(&links, &mut workspace, &mut out)?;
+            self.torque(&links, &mut out.torque)?;
+            self.rates(&links, &mut out);
             for &(joint, compliance) in compliances {
                 let signals = [
                     (&mut links.q, &block.q, &out.torque),
@@ -212,6 +228,9 @@ const RATE_BAND: f64 = 2.5;
 /// Time between two evaluations of the derivatives \[s\].
 const DERIVATIVE_PERIOD: f64 = 0.02;
 
+/// Samples at which torques are computed at a time.
+const SAMPLES: usize = 8;
+
 /// What a torque is differentiated by.
 #[derive(Clone, Copy)]
 enum Along {
@@ -259,7 +278,10 @@ impl DualState {
         for first in (0..joints).step_by(DIRECTIONS) {
             let some = first..(first + DIRECTIONS).min(joints);
             some.clone().for_each(|joint| self.variable(along, joint).derivative.0[joint - first] = 1.0);
-            tree.inverse_dynamics(&self.q, &self.v, &self.a, workspace, &mut self.torque)?;
+            pulp::Arch::new().dispatch(
+                #[inline(always)]
+                || tree.inverse_dynamics(&self.q, &self.v, &self.a, workspace, &mut self.torque),
+            )?;
             some.clone().for_each(|joint| self.variable(along, joint).derivative = Lanes::zero());
             for (row, torque) in self.torque.iter().enumerate() {
                 let along = &torque.derivative.0[..some.len()];

@@ -5,8 +5,10 @@ use phiw_telemetry::Block;
 /// What columns need beside the signals; computed only when some effect asks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Needs {
-    /// The torques of the reference model, and their first and second rate of change.
+    /// The torques of the reference model.
     pub torque: bool,
+    /// The rates of change of its torques, first and second of the rigid body's, first of the total.
+    pub rates: bool,
     /// The torque of the reference model with its effects in it. A column made of it can stand for any of
     /// those effects, so it must not be compared with one of them.
     pub total_torque: bool,
@@ -23,6 +25,7 @@ impl Needs {
     pub fn union(self, other: Self) -> Self {
         Needs {
             torque: self.torque || other.torque,
+            rates: self.rates || other.rates,
             total_torque: self.total_torque || other.total_torque,
             derivatives: self.derivatives || other.derivatives,
             gravity: self.gravity || other.gravity,
@@ -32,7 +35,7 @@ impl Needs {
 
     /// Whether a reference model is needed.
     pub fn of_reference(self) -> bool {
-        self.torque || self.total_torque || self.derivatives || self.gravity
+        self.torque || self.rates || self.total_torque || self.derivatives || self.gravity
     }
 
     /// Whether nothing is needed.
@@ -101,6 +104,10 @@ impl<'a> Sample<'a> {
             [first, second, ..] => second - first,
             _ => 0.0,
         }
+    }
+    /// The band that positions, velocities and accelerations were smoothed to \[Hz\].
+    pub fn motion_bandwidth_hz(&self) -> f64 {
+        self.block.motion_bandwidth_hz
     }
     /// Positions \[rad, m\].
     pub fn q(&self) -> &'a [f64] {

@@ -30,7 +30,7 @@ impl Search<'_> {
                 break;
             }
             let effects = std::mem::take(&mut candidates.effects);
-            let stage = self.pass(effects, Keep::No)?;
+            let stage = self.pass(effects, Keep::WhileThereIsRoom)?;
             let mut problem = self.fixed.problem(stage, &mut candidates)?;
             problem.hypotheses.iter_mut().for_each(|hypothesis| hypothesis.declared = true);
             let outcome = choose_variants(&problem, candidates.present.clone(), self.policy());

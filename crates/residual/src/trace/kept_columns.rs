@@ -1,5 +1,9 @@
 //! One pass over the logs. What a column is made of is mostly the motion alone: such columns are the same in
 //! every pass, and are evaluated once.
+//!
+//! What is in force changes few of them. A measured torque that is shifted is another right-hand side. A torque
+//! whose log is a multiple has its columns times that factor. Links that are not where their encoders are have
+//! other columns of the rigid body. Only another motion has other columns throughout.
 
 use crate::selection::Products;
 use faer::Mat;
@@ -16,11 +20,13 @@ use std::sync::Arc;
 /// Columns that are kept, at most \[bytes\].
 const KEPT_BYTES: usize = 256 << 20;
 
-/// Whether candidates' columns come again in other passes.
+/// Whether columns come again in other passes.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Keep {
-    Yes,
-    No,
+    /// Those of candidates that are judged in every choice.
+    Always,
+    /// Those of constants on trial may come again, and are kept while half of the room is left.
+    WhileThereIsRoom,
 }
 
 /// What is asked of a pass.
@@ -46,8 +52,8 @@ pub(super) struct PassProducts {
 /// Filtered columns of earlier passes.
 #[derive(Default)]
 pub(super) struct KeptColumns {
-    /// The effects that were in force in the signals: with others every column is another.
-    in_force: Vec<EffectSpec>,
+    /// The effects that corrected the motion: with others every column is another.
+    of_motion: Vec<EffectSpec>,
     blocks: Vec<KeptBlock>,
     /// Where the columns of an effect are among those of effects.
     effects: HashMap<Key, Range<usize>>,
@@ -57,11 +63,11 @@ pub(super) struct KeptColumns {
     rows: Option<usize>,
 }
 
-/// The columns of one block.
+/// The columns of one block, of torques that are logged as they are.
 struct KeptBlock {
     /// For each torque whether a row counts.
     counts: Vec<Vec<bool>>,
-    /// For each torque the rigid body's columns, then the measured torque.
+    /// For each torque the rigid body's columns, of links that are where their encoders are.
     rigid_body: Vec<Vec<Vec<f64>>>,
     effects: Vec<Vec<f64>>,
 }
@@ -86,7 +92,8 @@ struct Piece {
     /// For each fold that it has rows in, the products of each torque.
     products: Vec<(usize, Vec<Products>)>,
     rows: usize,
-    rigid_body: Option<KeptBlock>,
+    /// What is kept of a block that nothing is kept of yet.
+    block: Option<KeptBlock>,
     /// New columns of effects.
     effects: Vec<Vec<f64>>,
 }
@@ -95,10 +102,12 @@ struct Piece {
 struct Evaluated {
     design: Design,
     has_rigid_body: bool,
+    /// Whether links lag behind their encoders: then the rigid body's columns are of this pass alone.
+    lags: bool,
     /// For each torque where its effects' columns are.
     places: Vec<Vec<Place>>,
-    /// Columns of the evaluation that are kept from now on.
-    kept: Vec<usize>,
+    /// Torque and column of the evaluation of what is kept from now on.
+    kept: Vec<(usize, usize)>,
 }
 
 impl KeptColumns {
@@ -107,45 +116,62 @@ impl KeptColumns {
     /// # Errors
     /// A log cannot be read, or a column of the model is not finite.
     pub fn products(&mut self, pass: Pass<'_>) -> Result<PassProducts, IdentificationError> {
-        // Where links lag behind their encoders, the columns are made where the links are, by the model's
-        // torque. And a model on trial with others in force is no reason to forget what the model has.
-        let lags = pass.design.effects().iter().any(|effect| effect.compliance().is_some());
-        let is_other = pass.in_force != self.in_force;
-        if lags || (is_other && pass.keep == Keep::No) {
-            let pass = Pass { keep: Keep::No, ..pass };
-            return KeptColumns { rows: self.rows, ..KeptColumns::default() }.evaluate(pass);
-        }
-        if is_other {
-            let in_force = pass.in_force.clone();
-            *self = KeptColumns { in_force, rows: self.rows, ..KeptColumns::default() };
+        let corrects_motion = |spec: &&EffectSpec| {
+            let effects = pass.design.effects();
+            let place = effects.iter().position(|effect| effect.spec() == **spec);
+            place.is_some_and(|place| pass.design.corrects_motion(place))
+        };
+        let of_motion: Vec<EffectSpec> = pass.in_force.iter().filter(corrects_motion).cloned().collect();
+        let is_other = of_motion != self.of_motion;
+        if is_other || self.rows.is_none() {
+            let mut other = KeptColumns { of_motion, rows: self.rows, ..KeptColumns::default() };
+            // A model on trial with another motion is no reason to forget what the model has.
+            if is_other && pass.keep == Keep::WhileThereIsRoom {
+                return other.evaluate(pass);
+            }
+            other.evaluate_rigid_body(&pass)?;
+            *self = other;
         }
         self.evaluate(pass)
+    }
+
+    /// The rigid body's columns, and how many rows there are: so there is room for others in the first pass.
+    fn evaluate_rigid_body(&mut self, pass: &Pass<'_>) -> Result<(), IdentificationError> {
+        let effects = pass.design.effects().iter().enumerate();
+        let of_motion = effects.filter(|(_, effect)| self.of_motion.contains(&effect.spec()));
+        let of_motion: Vec<usize> = of_motion.map(|(place, _)| place).collect();
+        let design = pass.design.part(&of_motion, true);
+        let reference = ReferenceModel::new(design.tree().clone());
+        let in_force = self.of_motion.clone();
+        self.evaluate(Pass { design: &design, in_force, reference, ..*pass })?;
+        Ok(())
     }
 
     fn evaluate(&mut self, pass: Pass<'_>) -> Result<PassProducts, IdentificationError> {
         let Pass { design, in_force, reference, folds, sources, keep } = pass;
         let in_force: HashSet<Key> = in_force.iter().map(key).collect();
         let keys: Vec<Key> = design.effects().iter().map(|effect| key(&effect.spec())).collect();
-        let is_evaluated = |&effect: &usize| {
+        let lags = design.effects().iter().any(|effect| effect.compliance().is_some());
+        // Such columns are of this pass alone.
+        let is_of_this_pass = |effect: usize| {
             let needs = design.effects()[effect].needs();
-            let own = &keys[effect];
-            needs.of_reference() || in_force.contains(own) || !self.effects.contains_key(own)
+            needs.of_reference() || (lags && needs.statics) || in_force.contains(&keys[effect])
         };
+        let is_evaluated =
+            |&effect: &usize| is_of_this_pass(effect) || !self.effects.contains_key(&keys[effect]);
         let chosen: Vec<usize> = (0..keys.len()).filter(is_evaluated).collect();
-        let has_rigid_body = self.blocks.is_empty();
+        let has_rigid_body = lags || self.blocks.is_empty();
         let part = design.part(&chosen, has_rigid_body).with_reference(reference);
         let evaluated = columns_of_effects(&part);
         let mut new = Vec::new();
         let mut kept = Vec::new();
-        for (at, &effect) in chosen.iter().enumerate().filter(|_| keep == Keep::Yes) {
-            let own = &design.effects()[effect];
+        for (at, &effect) in chosen.iter().enumerate() {
             let columns = &evaluated[at];
-            let room = self.room().saturating_sub(kept.len());
-            let stays = !own.needs().of_reference() && !in_force.contains(&keys[effect]);
-            if stays && columns.len() <= room {
+            let room = self.room(keep).saturating_sub(kept.len());
+            if !is_of_this_pass(effect) && columns.len() <= room {
                 let first = self.columns + kept.len();
                 new.push((effect, first..first + columns.len()));
-                kept.extend(columns.iter().map(|(_, column)| *column));
+                kept.extend(columns);
             }
         }
         let mut places: Vec<Vec<Place>> = vec![Vec::new(); design.rows().len()];
@@ -158,7 +184,7 @@ impl KeptColumns {
                 entries.for_each(|(entry, column)| places[entry.row].push(Place::Kept(column)));
             }
         }
-        let evaluated = Evaluated { design: part, has_rigid_body, places, kept };
+        let evaluated = Evaluated { design: part, has_rigid_body, lags, places, kept };
         let pieces = map_filtered_rows(&evaluated.design, sources, |block, rows| {
             self.piece(&evaluated, folds, block, &rows)
         })?;
@@ -175,28 +201,40 @@ impl KeptColumns {
     }
 
     /// Columns of effects that there is still room for: none before the number of rows is known.
-    fn room(&self) -> usize {
+    fn room(&self, keep: Keep) -> usize {
         let Some(rows) = self.rows.filter(|_| !self.blocks.is_empty()) else { return 0 };
         let rigid_body = self.blocks.first().map_or(0, |block| block.rigid_body.iter().map(Vec::len).sum());
-        (KEPT_BYTES / size_of::<f64>() / rows.max(1)).saturating_sub(rigid_body + self.columns)
+        let bytes = match keep {
+            Keep::Always => KEPT_BYTES,
+            Keep::WhileThereIsRoom => KEPT_BYTES / 2,
+        };
+        (bytes / size_of::<f64>() / rows.max(1)).saturating_sub(rigid_body + self.columns)
     }
 
     fn piece(&self, evaluated: &Evaluated, folds: &[Fold], block: usize, rows: &FilteredRows) -> Piece {
         let design = &evaluated.design;
-        let rigid_body = evaluated.has_rigid_body.then(|| KeptBlock {
+        let own = evaluated.has_rigid_body.then(|| KeptBlock {
             counts: (0..design.rows().len()).map(|torque| rows.counts(torque).collect()).collect(),
             rigid_body: rigid_body_of(design, rows),
             effects: Vec::new(),
         });
-        let products = match rigid_body.as_ref().or_else(|| self.blocks.get(block)) {
-            Some(kept) => products_of(&evaluated.places, folds, kept, rows),
+        let kept = self.blocks.get(block);
+        let products = match own.as_ref().or(kept) {
+            Some(block) => {
+                let effects = kept.map_or(&[][..], |kept| &kept.effects);
+                products_of(evaluated, folds, block, effects, rows)
+            }
             None => Vec::new(),
         };
+        let effects = evaluated.kept.iter().map(|&(torque, column)| {
+            let factor = design.logged_factors()[torque];
+            rows.column(column).iter().map(|value| value / factor).collect()
+        });
         Piece {
             products,
             rows: rows.t.len(),
-            rigid_body,
-            effects: evaluated.kept.iter().map(|&column| rows.column(column).to_vec()).collect(),
+            effects: effects.collect(),
+            block: own.filter(|_| !evaluated.lags),
         }
     }
 
@@ -205,7 +243,7 @@ impl KeptColumns {
         self.rows = Some(pieces.iter().map(|piece| piece.rows).sum());
         let mut of_torques: Vec<Vec<(usize, Products)>> = vec![Vec::new(); design.rows().len()];
         for (place, piece) in pieces.into_iter().enumerate() {
-            self.blocks.extend(piece.rigid_body);
+            self.blocks.extend(piece.block);
             if let Some(block) = self.blocks.get_mut(place) {
                 block.effects.extend(piece.effects);
             }
@@ -253,22 +291,23 @@ fn columns_of_effects(design: &Design) -> Vec<Vec<(usize, usize)>> {
     design.effects().iter().map(&mut of_effect).collect()
 }
 
-/// For each torque the columns before those of effects, then the measured torque.
+/// For each torque the columns before those of effects.
 fn rigid_body_of(design: &Design, rows: &FilteredRows) -> Vec<Vec<Vec<f64>>> {
     let first = design.base().count();
-    let of_torque = |row: &RowLayout| {
+    let of_torque = |(row, factor): (&RowLayout, &f64)| {
         let own = row.parameters.partition_point(|&parameter| parameter < first);
-        let columns = (row.range.start..row.range.start + own).chain([row.range.end - 1]);
-        columns.map(|column| rows.column(column).to_vec()).collect()
+        let column = |column: usize| rows.column(column).iter().map(|value| value / factor).collect();
+        (row.range.start..row.range.start + own).map(column).collect()
     };
-    design.rows().iter().map(of_torque).collect()
+    design.rows().iter().zip(design.logged_factors()).map(of_torque).collect()
 }
 
 /// For each fold that has rows in a block, the products of each torque.
 fn products_of(
-    places: &[Vec<Place>],
+    evaluated: &Evaluated,
     folds: &[Fold],
-    kept: &KeptBlock,
+    block: &KeptBlock,
+    kept: &[Vec<f64>],
     rows: &FilteredRows,
 ) -> Vec<(usize, Vec<Products>)> {
     let fold_of = |t: &f64| folds.iter().position(|fold| fold.contains(rows.log, *t));
@@ -277,26 +316,28 @@ fn products_of(
     present.sort_unstable();
     present.dedup();
     let of_torque = |fold: usize, torque: usize| {
-        let counts = &kept.counts[torque];
+        let counts = &block.counts[torque];
         let own: Vec<usize> =
             (0..counts.len()).filter(|&row| counts[row] && fold_of_row[row] == Some(fold)).collect();
-        let effects = places[torque].iter().map(|place| match *place {
-            Place::Kept(column) => kept.effects[column].as_slice(),
-            Place::Evaluated(column) => rows.column(column),
+        let factor = evaluated.design.logged_factors()[torque];
+        let effects = evaluated.places[torque].iter().map(|place| match *place {
+            Place::Kept(column) => (factor, kept[column].as_slice()),
+            Place::Evaluated(column) => (1.0, rows.column(column)),
         });
-        let (measured, rigid_body) = match kept.rigid_body[torque].split_last() {
-            Some((measured, rigid_body)) => (measured.as_slice(), rigid_body),
-            None => (&[][..], &[][..]),
-        };
-        let columns = rigid_body.iter().map(Vec::as_slice).chain(effects).chain([measured]);
-        let columns: Vec<&[f64]> = columns.collect();
+        let measured = rows.column(evaluated.design.rows()[torque].range.end - 1);
+        let rigid_body = block.rigid_body[torque].iter().map(|column| (factor, column.as_slice()));
+        let columns: Vec<(f64, &[f64])> = rigid_body.chain(effects).chain([(1.0, measured)]).collect();
         Products::of_rows(
-            Mat::from_fn(own.len(), columns.len(), |row, column| columns[column][own[row]]).as_ref(),
+            Mat::from_fn(own.len(), columns.len(), |row, column| {
+                let (factor, values) = columns[column];
+                factor * values[own[row]]
+            })
+            .as_ref(),
         )
     };
     present
         .into_iter()
-        .map(|fold| (fold, (0..places.len()).map(|torque| of_torque(fold, torque)).collect()))
+        .map(|fold| (fold, (0..evaluated.places.len()).map(|torque| of_torque(fold, torque)).collect()))
         .collect()
 }
 
@@ -388,23 +429,29 @@ mod tests {
             EffectSpec::new(kind, &[joints[usize::from(joint == "joint_2")].as_str()])
         };
         let all = EFFECTS.map(spec);
-        let absent = Catalogue::default().build(&spec(("encoder_offset", "joint_2")), &tree).unwrap();
-        let offset = absent.relinearised(&[0.3]).unwrap().spec();
-        let with_offset: Vec<EffectSpec> = [offset.clone()].into_iter().chain(all.clone()).collect();
+        let absent = |kind: &str| Catalogue::default().build(&spec((kind, "joint_2")), &tree).unwrap();
+        let in_force = [
+            absent("joint_elasticity").relinearised(&[3e-3]).unwrap().spec(),
+            absent("time_delay").relinearised(&[0.013]).unwrap().spec(),
+            absent("torque_gain").with_logged_factor(&[0.4]).unwrap().spec(),
+            absent("encoder_offset").relinearised(&[0.3]).unwrap().spec(),
+        ];
         let mut kept = KeptColumns::default();
         let mut random = RandomNumbers::new(3);
-        for round in 0..12 {
-            let keep = if random.uniform(0.0, 1.0) < 0.5 { Keep::Yes } else { Keep::No };
-            let (effects, in_force) = match round % 4 {
-                0 => (all.to_vec(), Vec::new()),
-                1 => (all[..3].to_vec(), Vec::new()),
-                2 => (all.iter().rev().cloned().collect(), Vec::new()),
-                _ => (with_offset.clone(), vec![offset.clone()]),
+        for round in 0..24 {
+            let keep = if random.uniform(0.0, 1.0) < 0.5 { Keep::Always } else { Keep::WhileThereIsRoom };
+            let effects = match round % 3 {
+                0 => all.to_vec(),
+                1 => all[..3].to_vec(),
+                _ => all.iter().rev().cloned().collect(),
             };
+            let in_force: Vec<EffectSpec> =
+                in_force.iter().filter(|_| random.uniform(0.0, 1.0) < 0.4).cloned().collect();
+            let effects: Vec<EffectSpec> = in_force.iter().chain(&effects).cloned().collect();
             assert_equal(products(&mut kept, &tree, &effects, in_force, keep));
         }
         // What is kept is what is used: once it is changed, so are the products.
-        let products = |kept: &mut KeptColumns| products(kept, &tree, &all, Vec::new(), Keep::Yes);
+        let products = |kept: &mut KeptColumns| products(kept, &tree, &all, Vec::new(), Keep::Always);
         (0..2).for_each(|_| assert_equal(products(&mut kept)));
         let first = kept.effects[&key(&all[0])].start;
         kept.blocks[0].effects[first].iter_mut().for_each(|value| *value += 1.0);

@@ -16,6 +16,7 @@ mod impossible;
 mod input;
 mod interchangeable;
 mod kept_columns;
+mod limits;
 mod multiples;
 mod naming;
 mod of_training_logs;

@@ -73,7 +73,7 @@ impl Search<'_> {
         with_textbook.declared = with_textbook.specs.len();
         let present = Present { specs: &with_textbook.specs, declared: with_textbook.declared };
         let mut candidates = Candidates::of_model(self.fixed, present);
-        let stage = with_textbook.pass(Vec::new(), Keep::No)?;
+        let stage = with_textbook.pass(Vec::new(), Keep::WhileThereIsRoom)?;
         let problem = self.fixed.problem(stage, &mut candidates)?;
         let independent = |rows: f64| (rows / problem.rows_per_independent).max(2.0);
         let rows: Vec<f64> = problem.torques.iter().map(|torque| independent(torque.whole.rows())).collect();

@@ -196,7 +196,7 @@ impl Search<'_> {
             self.asks_of_logs || !kind.is_of_training_logs()
         })?;
         let effects = std::mem::take(&mut candidates.effects);
-        let stage = self.pass(effects, Keep::Yes)?;
+        let stage = self.pass(effects, Keep::Always)?;
         let problem = self.fixed.problem(stage, &mut candidates)?;
         let outcome = select(&problem, candidates.present.clone(), self.policy());
         let spec = |member: &Member| candidates.list[member.hypothesis].specs[member.variant].clone();
@@ -283,7 +283,7 @@ impl Search<'_> {
     pub(super) fn value(&self, rows: &[f64]) -> Result<f64, IdentificationError> {
         let mut candidates =
             Candidates::of_model(self.fixed, Present { specs: &self.specs, declared: self.declared });
-        let stage = self.pass(Vec::new(), Keep::No)?;
+        let stage = self.pass(Vec::new(), Keep::WhileThereIsRoom)?;
         let problem = self.fixed.problem(stage, &mut candidates)?;
         Ok(value(&problem, &candidates.present, rows))
     }

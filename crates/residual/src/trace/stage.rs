@@ -203,7 +203,7 @@ impl<'a> Fixed<'a> {
             reference: ReferenceModel::new(self.tree.clone()),
             folds,
             sources: &self.data.sources,
-            keep: Keep::No,
+            keep: Keep::WhileThereIsRoom,
         };
         let torques = self.products(rigid_body)?.torques;
         let in_fold = |fold: usize| torques.iter().map(|folds| folds[fold].rows() > 0.0).collect();

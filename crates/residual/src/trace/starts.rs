@@ -1,7 +1,7 @@
 //! Where the search starts. Its end is the best of those that several starts lead to.
 
 use super::search::Search;
-use super::tracing::{Tracing, Verdict};
+use super::tracing::Tracing;
 use phiw_identification::{EffectSpec, IdentificationError};
 
 impl Search<'_> {
@@ -10,11 +10,10 @@ impl Search<'_> {
     /// - Where the torques agree better once one of them is a multiple of what is logged, and still do in the
     ///   end, a start has that in force: to first order a factor of two is no factor, and other effects would
     ///   stand for it.
-    /// - Where structure is left in the end, or something was found beside what was declared, a start has
-    ///   what the textbook has of every joint, declared by nobody. What is chosen early, beside all that is
-    ///   still missing, may stand for something else to the end; the more is there at the start, the less can
-    ///   be taken for it. Structure is judged on motion held out, too, which so has a say in whether there is
-    ///   such a start; which end is taken is decided on training motion alone.
+    /// - Where anything was found, a start has what the textbook has of every joint, declared by nobody. What is
+    ///   chosen early, beside all that is still missing, may stand for something else to the end; the more is
+    ///   there at the start, the less can be taken for it. It has the limits of drives, too, beyond which the
+    ///   command was logged (`limits.rs`).
     pub(super) fn run(self) -> Result<Tracing, IdentificationError> {
         let mut best = self.clone().searched()?;
         if let Some(start) = self.with_multiples()?
@@ -25,16 +24,14 @@ impl Search<'_> {
                 best = other;
             }
         }
-        let tracing = best.clone().finish()?;
-        let is_understood = matches!(tracing.verdict, Verdict::Sufficient | Verdict::Explained);
-        let found_beside_declared = self.declared > 0 && best.specs.len() > best.declared;
-        if is_understood && !found_beside_declared {
-            return Ok(tracing);
+        let is_found = best.specs.len() > best.declared;
+        if is_found
+            && let Some(other) = self.searched_from_the_textbook()?
+            && other.is_better_than(&best)?
+        {
+            best = other;
         }
-        match self.searched_from_the_textbook()? {
-            Some(other) if other.is_better_than(&best)? => other.finish(),
-            _ => Ok(tracing),
-        }
+        best.finish()
     }
 
     /// Whether the criterion is smaller here than there, with the effective rows of that end.
@@ -51,14 +48,15 @@ impl Search<'_> {
             return Ok(None);
         }
         let more = self.textbook_of_other_joints()?;
-        if more.is_empty() && self.declared == 0 {
-            return Ok(None);
-        }
         let mut search = self.clone();
         search.declared = 0;
         search.chosen.alternatives = vec![Vec::new(); search.specs.len()];
         for spec in more {
             search.add(spec)?;
+        }
+        search.add_limits()?;
+        if search.specs.len() == self.specs.len() && self.declared == 0 {
+            return Ok(None);
         }
         let mut end = search.searched()?;
         if self.declared > 0 {

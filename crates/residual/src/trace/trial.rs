@@ -37,7 +37,8 @@ impl Search<'_> {
         let mut candidates = Candidates::of_model(self.fixed, present);
         let folds: Vec<_> = self.folds.iter().chain(&self.fixed.data.held_out).copied().collect();
         let reference = self.fixed.reference(&self.specs, &self.parameters)?;
-        let mut stage = self.fixed.pass(&self.specs, Vec::new(), reference, &folds, Keep::No)?;
+        let mut stage =
+            self.fixed.pass(&self.specs, Vec::new(), reference, &folds, Keep::WhileThereIsRoom)?;
         let training = self.folds.len();
         let held_out =
             stage.torques.iter_mut().map(|folds| Products::sum(&folds.split_off(training))).collect();

@@ -4,6 +4,7 @@
 mod declared;
 mod held_model;
 mod leading_friction;
+mod limits;
 mod missing_effects;
 mod robot;
 mod structure;

@@ -98,8 +98,19 @@ pub fn traced_robot(
     held: bool,
 ) -> Tracing {
     let tree = read_urdf(urdf, &UrdfOptions::default()).unwrap().tree;
+    let clean = held.then(|| record(&tree, seed + 1, &|_, _| ()));
+    traced_recording(&tree, &record(&tree, seed, secret), clean.as_ref(), train, declared)
+}
+
+/// Traces a recording of such a robot; against the model of `clean`, if there is one.
+pub fn traced_recording(
+    tree: &Tree,
+    log: &Recording,
+    clean: Option<&Recording>,
+    train: Vec<Fold>,
+    declared: &[&str],
+) -> Tracing {
     let catalogue = Catalogue::default();
-    let log = record(&tree, seed, secret);
     let surveys = [log.survey().unwrap()];
     let conditioning = Conditioning::choose(&surveys, &ConditioningOptions::default()).unwrap();
     let ranges = SignalRanges::of_surveys(&surveys);
@@ -108,10 +119,10 @@ pub fn traced_robot(
         let sources: Vec<&dyn BlockSource> = vec![&blocks];
         let data = Data { train, held_out: folds().1, sources, rest_speeds: vec![0.01; 2] };
         let declared: Vec<Variants> =
-            declared.iter().flat_map(|kind| catalogue.declare(kind, &tree, &ranges).unwrap()).collect();
-        identify(&tree, declared, &data).unwrap()
+            declared.iter().flat_map(|kind| catalogue.declare(kind, tree, &ranges).unwrap()).collect();
+        identify(tree, declared, &data).unwrap()
     };
-    let clean = held.then(|| identified(&record(&tree, seed + 1, &|_, _| ()), folds().0));
+    let clean = clean.map(|clean| identified(clean, folds().0));
     let held = clean.as_ref().map(|clean| {
         let model = Model::of_fit(&clean.design, &clean.fit, &[], &[], (0.0, 0.0)).unwrap();
         HeldModel {
@@ -121,13 +132,13 @@ pub fn traced_robot(
             residual_std: model.residual_std,
         }
     });
-    let start = clean.unwrap_or_else(|| identified(&log, train.clone()));
+    let start = clean.unwrap_or_else(|| identified(log, train.clone()));
     let blocks = log.blocks(&conditioning).unwrap();
     let sources: Vec<&dyn BlockSource> = vec![&blocks];
     let data = Data { train, held_out: folds().1, sources, rest_speeds: vec![0.01; 2] };
     let plan = conditioning.plan(&surveys[0]).unwrap();
     let input = TraceInput {
-        tree: &tree,
+        tree,
         catalogue: &catalogue,
         data: &data,
         ranges,
@@ -135,7 +146,7 @@ pub fn traced_robot(
         parameters: start.fit.parameters.clone(),
         residual_std: start.fit.residual_std.clone(),
         held,
-        noise_floor: noise_floor(&tree, &[0.0; 2], &surveys, &conditioning, &data.sources).unwrap(),
+        noise_floor: noise_floor(tree, &[0.0; 2], &surveys, &conditioning, &data.sources).unwrap(),
         rows_per_independent: plan.output_rate_hz() / (2.0 * conditioning.parallel_cutoff_hz),
     };
     trace(input, &TraceOptions::default()).unwrap()

@@ -16,6 +16,7 @@ use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, FactorBuilder, ROUNDING};
 use phiw_regressor::least_squares::GroupedFactor;
 use rayon::prelude::*;
+pub(super) use shape::nameless_columns;
 use shape::{Shape, Torque};
 
 /// A residual that follows a signal, or two together.

@@ -118,7 +118,7 @@ pub(super) fn products(torque: &Torque<'_>) -> Vec<Shape> {
         torque.shape(
             &["t", "tau"],
             2 * TIME_NODES,
-            of_torque(),
+            Needs { rates: true, ..of_torque() },
             Box::new(move |sample, out| {
                 let (gain, delay) = out.split_at_mut(TIME_NODES);
                 time.write(sample.time(), gain);

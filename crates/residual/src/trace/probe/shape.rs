@@ -57,7 +57,7 @@ impl Torque<'_> {
     /// `count` columns over some signals.
     pub fn shape(&self, signals: &[&str], count: usize, needs: Needs, columns: ShapeColumns) -> Shape {
         let signals = signals.iter().map(|signal| (*signal).to_owned()).collect();
-        let effect = effect(self.fixed, self.row, count, needs, columns);
+        let effect = nameless_columns(self.fixed, self.row, count, needs, columns);
         Shape { signals, effect, least_share: LEAST_SHARE }
     }
 }
@@ -73,9 +73,10 @@ pub(super) fn torque_of(sample: &Sample<'_>, joint: usize) -> f64 {
 }
 
 /// Writes the columns of one sample.
-pub(super) type ShapeColumns = Box<dyn Fn(&Sample<'_>, &mut [f64]) + Send + Sync>;
+pub(in crate::trace) type ShapeColumns = Box<dyn Fn(&Sample<'_>, &mut [f64]) + Send + Sync>;
 
-fn effect(
+/// `count` columns in one joint's torque, as an effect without a name.
+pub(in crate::trace) fn nameless_columns(
     fixed: &Fixed<'_>,
     row: usize,
     count: usize,
