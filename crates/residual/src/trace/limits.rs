@@ -22,6 +22,9 @@ const SECOND: Ladder = Ladder { count: 17, step: 1.03 };
 /// Share of the rows beyond a limit, at most: a drive that mostly does something else than its command is
 /// none.
 const MOST_BEYOND: f64 = 0.5;
+/// Share of a torque's residual that a limit leaves at most, with all that it costs: noise with tails gains
+/// up to a fifth by one, and what takes less is found without a start.
+const MOST_LEFT: f64 = 0.5;
 
 struct Ladder {
     count: i32,
@@ -104,13 +107,12 @@ impl<'a> Search<'a> {
         let reference = self.fixed.reference(&self.specs, &self.parameters)?;
         let (_, folds) = self.fixed.factors(&self.specs, columns.collect(), reference, &self.folds)?;
         let train = merge(&folds)?;
-        let least = (1.0 - self.options.thresholds.least_share).ln();
         let likeliest = |(&torque, limits): (&usize, &Vec<f64>)| {
             let factor = without_what_is_untold(&train.groups()[torque].factor, 2 * limits.len())?;
             let peak = self.input.ranges.joints[torque].torque_peak;
             let gains = limits.iter().zip(gains(&factor, limits, peak));
             let best = gains.min_by(|(_, one), (_, other)| one.total_cmp(other));
-            Ok(best.filter(|(_, gain)| *gain < least).map(|(limit, _)| (torque, *limit)))
+            Ok(best.filter(|(_, gain)| *gain < MOST_LEFT.ln()).map(|(limit, _)| (torque, *limit)))
         };
         tried.iter().filter_map(|own| likeliest(own).transpose()).collect()
     }
@@ -173,4 +175,67 @@ fn gains(factor: &Factor, limits: &[f64], peak: f64) -> Vec<f64> {
         (with / without).ln() + 2.0 * share * ((peak - limit) / deviation).max(1.0).ln()
     };
     limits.iter().enumerate().map(gain).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{FIRST, MOST_LEFT, gains};
+    use phiw_dynamics::random_tree::RandomNumbers;
+    use phiw_regressor::factor::Factor;
+    use proptest::prelude::*;
+
+    /// The factor of a motion's column, the parts beyond limits, whether there are any, and the command.
+    fn factor(motion: &[f64], command: &[f64], limits: &[f64]) -> Factor {
+        let mut rows = Vec::new();
+        for (motion, command) in motion.iter().zip(command) {
+            let beyond: Vec<f64> =
+                limits.iter().map(|limit| command.signum() * (command.abs() - limit).max(0.0)).collect();
+            rows.push(*motion);
+            rows.extend(&beyond);
+            rows.extend(beyond.iter().map(|beyond| f64::from(u8::from(*beyond != 0.0))));
+            rows.push(*command);
+        }
+        Factor::of_rows(2 + 2 * limits.len(), &rows).unwrap()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+        /// Of a command that is anything beyond a limit the limit is the likeliest; of one that the motion asks
+        /// for, or that is noise, none is.
+        #[test]
+        fn the_likeliest_limit_is_that_of_the_drive(
+            seed in any::<u64>(),
+            limit in 0.5..1.5f64,
+            wound_up in 5.0..50.0f64,
+            noise in 0.01..0.1f64,
+            of_motion in 0.0..2.0f64,
+        ) {
+            let mut random = RandomNumbers::new(seed);
+            // A motion under a drive with a limit: it asks for the limit a third of the time.
+            let delivered: Vec<f64> =
+                (0..600).map(|row| (1.15 * limit * (0.07 * f64::from(row)).sin()).clamp(-limit, limit)).collect();
+            let motion: Vec<f64> = delivered.iter().map(|torque| 0.5 * torque).collect();
+            let wind_up = |(row, delivered): (usize, &f64)| {
+                let is_at_limit = delivered.abs() == limit && row % 90 < 60;
+                let more = if is_at_limit { random.uniform(0.0, wound_up) } else { 0.0 };
+                delivered + delivered.signum() * more + noise * random.uniform(-1.0, 1.0)
+            };
+            let command: Vec<f64> = delivered.iter().enumerate().map(wind_up).collect();
+            let peak = command.iter().fold(0.0_f64, |peak, command| peak.max(command.abs()));
+            let limits = FIRST.down_from(peak);
+            let of_limits = gains(&factor(&motion, &command, &limits), &limits, peak);
+            let best = (0..limits.len()).min_by(|&a, &b| of_limits[a].total_cmp(&of_limits[b])).unwrap();
+            prop_assert!((limits[best] / limit).ln().abs() < 1.5 * FIRST.step.ln() && of_limits[best] < MOST_LEFT.ln(),
+                "{} {limit} {of_limits:?}", limits[best]);
+
+            let command: Vec<f64> = motion
+                .iter()
+                .map(|motion| of_motion * motion + random.uniform(-1.0, 1.0) * random.uniform(0.0, 1.0))
+                .collect();
+            let peak = command.iter().fold(0.0_f64, |peak, command| peak.max(command.abs()));
+            let limits = FIRST.down_from(peak);
+            let of_limits = gains(&factor(&motion, &command, &limits), &limits, peak);
+            prop_assert!(of_limits.iter().all(|gain| *gain > 0.7 * MOST_LEFT.ln()), "{of_limits:?}");
+        }
+    }
 }
