@@ -43,8 +43,8 @@ impl Ladder {
 
 impl<'a> Search<'a> {
     /// Adds limits of drives where they take away what is left of a torque, with the parameters of a fit to
-    /// what is delivered.
-    pub(super) fn add_limits(&mut self) -> Result<(), IdentificationError> {
+    /// what is delivered. Whether there are any.
+    pub(super) fn add_limits(&mut self) -> Result<bool, IdentificationError> {
         let kinds = self.kinds_of_limits();
         let peak = |torque: usize| self.input.ranges.joints[torque].torque_peak;
         let first = kinds.keys().map(|&torque| (torque, FIRST.down_from(peak(torque)))).collect();
@@ -52,7 +52,7 @@ impl<'a> Search<'a> {
         let limits =
             self.limits(&coarse.into_iter().map(|(torque, at)| (torque, SECOND.about(at))).collect())?;
         if limits.is_empty() {
-            return Ok(());
+            return Ok(false);
         }
         self.parameters = self.fitted_to_what_is_delivered(&limits)?;
         for (torque, limit) in limits {
@@ -64,7 +64,7 @@ impl<'a> Search<'a> {
                 }
             }
         }
-        Ok(())
+        Ok(true)
     }
 
     /// For each torque that may have one the kind that is a limit, and its effect on it.

@@ -2,6 +2,7 @@
 
 use super::search::Search;
 use super::tracing::Tracing;
+use crate::selection::LEAST_STEP;
 use phiw_identification::{EffectSpec, IdentificationError};
 
 impl Search<'_> {
@@ -12,8 +13,9 @@ impl Search<'_> {
     ///   stand for it.
     /// - Where anything was found, a start has what the textbook has of every joint, declared by nobody. What is
     ///   chosen early, beside all that is still missing, may stand for something else to the end; the more is
-    ///   there at the start, the less can be taken for it. It has the limits of drives, too, beyond which the
-    ///   command was logged (`limits.rs`).
+    ///   there at the start, the less can be taken for it.
+    /// - That start has the limits of drives beyond which a command was logged (`limits.rs`); where there are
+    ///   any, it is searched from in any case.
     pub(super) fn run(self) -> Result<Tracing, IdentificationError> {
         let mut best = self.clone().searched()?;
         if let Some(start) = self.with_multiples()?
@@ -25,45 +27,53 @@ impl Search<'_> {
             }
         }
         let is_found = best.specs.len() > best.declared;
-        if is_found
-            && let Some(other) = self.searched_from_the_textbook()?
-            && other.is_better_than(&best)?
+        if self.fixed.prior.is_none()
+            && let Some(start) = self.with_the_textbook(is_found)?
         {
-            best = other;
+            let other = self.searched_from(start)?;
+            if other.is_better_than(&best)? {
+                best = other;
+            }
         }
         best.finish()
     }
 
-    /// Whether the criterion is smaller here than there, with the effective rows of that end.
+    /// Whether the criterion is smaller here than there, with the effective rows of that end, and parts of the
+    /// training motion are foretold no worse by fits to the others. What does the criterion good in few
+    /// places, as a coupling of joints that move one after the other, foretells nothing there.
     fn is_better_than(&self, other: &Self) -> Result<bool, IdentificationError> {
         let rows = &other.chosen.rows;
-        Ok(self.value(rows)? < other.value(rows)?)
+        if self.value(rows)? >= other.value(rows)? - LEAST_STEP {
+            return Ok(false);
+        }
+        let (own, other) = (self.trial()?, other.trial()?);
+        let [own_squares, other_squares] = [&own, &other].map(|end| end.foretold_squares(&end.fit));
+        Ok(own.gain(&other_squares, &own_squares) >= 0.0)
     }
 
-    /// The end from the start that has what the textbook has of every joint, declared by nobody, with what
-    /// was declared put into it only then: so the end hardly depends on what was declared. `None` for a held
-    /// model, and where that is the start of all.
-    fn searched_from_the_textbook(&self) -> Result<Option<Self>, IdentificationError> {
-        if self.fixed.prior.is_some() {
-            return Ok(None);
+    /// The start that has what the textbook has of every joint and limits of drives, all of it declared by
+    /// nobody; `None` where that is the start of all, and without limits where it is not `asked` for.
+    fn with_the_textbook(&self, asked: bool) -> Result<Option<Self>, IdentificationError> {
+        let mut start = self.clone();
+        start.declared = 0;
+        start.chosen.alternatives = vec![Vec::new(); start.specs.len()];
+        for spec in self.textbook_of_other_joints()? {
+            start.add(spec)?;
         }
-        let more = self.textbook_of_other_joints()?;
-        let mut search = self.clone();
-        search.declared = 0;
-        search.chosen.alternatives = vec![Vec::new(); search.specs.len()];
-        for spec in more {
-            search.add(spec)?;
-        }
-        search.add_limits()?;
-        if search.specs.len() == self.specs.len() && self.declared == 0 {
-            return Ok(None);
-        }
-        let mut end = search.searched()?;
+        let is_other = start.specs.len() > self.specs.len() || self.declared > 0;
+        let has_limits = start.add_limits()?;
+        Ok((has_limits || (asked && is_other)).then_some(start))
+    }
+
+    /// The end from a start that has declared nothing, with what was declared put into it only then: so the
+    /// end hardly depends on what was declared.
+    fn searched_from(&self, start: Self) -> Result<Self, IdentificationError> {
+        let mut end = start.searched()?;
         if self.declared > 0 {
             end.put_in_front(&self.specs[..self.declared])?;
             end = end.searched()?;
         }
-        Ok(Some(end))
+        Ok(end)
     }
 
     /// Counts effects as declared, and adds those that the model lacks.
