@@ -129,7 +129,8 @@ pub trait EffectKind: Send + Sync {
         None
     }
 
-    /// The constants with which a drive delivers no more than `limit` \[N·m, N\]; `None` for what is no limit.
+    /// The constants with which a drive delivers no more than `limit` \[N·m, N\]; `None` for what is no
+    /// limit.
     fn with_torque_limit(&self, _limit: f64) -> Option<Constants> {
         None
     }

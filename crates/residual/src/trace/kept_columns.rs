@@ -1,9 +1,9 @@
 //! One pass over the logs. What a column is made of is mostly the motion alone: such columns are the same in
 //! every pass, and are evaluated once.
 //!
-//! What is in force changes few of them. A measured torque that is shifted is another right-hand side. A torque
-//! whose log is a multiple has its columns times that factor. Links that are not where their encoders are have
-//! other columns of the rigid body. Only another motion has other columns throughout.
+//! What is in force changes few of them. A measured torque that is shifted is another right-hand side. A
+//! torque whose log is a multiple has its columns times that factor. Links that are not where their encoders
+//! are have other columns of the rigid body. Only another motion has other columns throughout.
 
 use crate::selection::Products;
 use faer::Mat;

@@ -1,8 +1,8 @@
 //! Limits of drives whose command is logged, for a start of the search.
 //!
-//! A controller winds its command up to many times what the drive delivers. Such samples outweigh all others in
-//! every fit, so that no limit looks right beside it. Where the command is beyond a limit, the motion tells
-//! the limit alone, and the command could be anything up to its peak.
+//! A controller winds its command up to many times what the drive delivers. Such samples outweigh all others
+//! in every fit, so that no limit looks right beside it. Where the command is beyond a limit, the motion
+//! tells the limit alone, and the command could be anything up to its peak.
 
 use super::probe::nameless_columns;
 use super::search::Search;
@@ -200,8 +200,8 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(32))]
-        /// Of a command that is anything beyond a limit the limit is the likeliest; of one that the motion asks
-        /// for, or that is noise, none is.
+        /// Of a command that is anything beyond a limit the limit is the likeliest; of one that the motion
+        /// asks for, or that is noise, none is.
         #[test]
         fn the_likeliest_limit_is_that_of_the_drive(
             seed in any::<u64>(),

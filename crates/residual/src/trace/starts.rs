@@ -5,8 +5,8 @@ use super::tracing::Tracing;
 use phiw_identification::{EffectSpec, IdentificationError};
 
 /// How much smaller the criterion is to be at the end from another start: of two ends that are about as good
-/// the first is kept, and names do not change for what some constants do. Where joints moved one after the other,
-/// an end with a coupling that is not there was better by 52; those of the KR300 differ by up to 600.
+/// the first is kept, and names do not change for what some constants do. Where joints moved one after the
+/// other, an end with a coupling that is not there was better by 52; those of the KR300 differ by up to 600.
 const ANOTHER_END_IS_WORTH: f64 = 100.0;
 
 impl Search<'_> {
@@ -15,9 +15,9 @@ impl Search<'_> {
     /// - Where the torques agree better once one of them is a multiple of what is logged, and still do in the
     ///   end, a start has that in force: to first order a factor of two is no factor, and other effects would
     ///   stand for it.
-    /// - Where anything was found, a start has what the textbook has of every joint, declared by nobody. What is
-    ///   chosen early, beside all that is still missing, may stand for something else to the end; the more is
-    ///   there at the start, the less can be taken for it.
+    /// - Where anything was found, a start has what the textbook has of every joint, declared by nobody. What
+    ///   is chosen early, beside all that is still missing, may stand for something else to the end; the more
+    ///   is there at the start, the less can be taken for it.
     /// - That start has the limits of drives beyond which a command was logged (`limits.rs`); where there are
     ///   any, it is searched from in any case.
     pub(super) fn run(self) -> Result<Tracing, IdentificationError> {
