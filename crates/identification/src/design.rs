@@ -359,8 +359,9 @@ impl Design {
 
     /// Whether an effect corrects the signals, by what it does to some.
     pub fn corrects_signals(&self, effect: usize) -> bool {
-        let [some, corrected] = self.some_signals_corrected(effect);
-        self.corrects_motion(effect) || some.tau != corrected.tau
+        let signals = |block: Block| [block.q, block.qd, block.qdd, block.tau];
+        let [some, corrected] = self.some_signals_corrected(effect).map(signals);
+        some != corrected
     }
 
     /// Whether an effect corrects the motion, and not the measured torques only.

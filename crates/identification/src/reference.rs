@@ -87,7 +87,9 @@ impl ReferenceModel {
                 #[inline(always)]
                 || self.tree.inverse_dynamics(q, v, a, &mut workspace, &mut of_samples),
             )?;
-            for (lane, row) in torque[first * joints..].chunks_exact_mut(joints).take(SAMPLES).enumerate() {
+            for (lane, row) in
+                torque[first * joints..].chunks_exact_mut(joints.max(1)).take(SAMPLES).enumerate()
+            {
                 row.iter_mut().zip(&of_samples).for_each(|(value, lanes)| *value = lanes.0[lane]);
             }
         }

@@ -9,7 +9,8 @@ use thiserror::Error;
 /// prints for every value what is named falsely, what is called sufficient, and how many effects are named.
 ///
 /// What a probe must foretell (`probe/`), how much error parameters may make (`remaining.rs`), when a value
-/// is beyond its bounds by chance (`admissible.rs`) and when an effect is a rival (`naming.rs`) stand as
+/// is beyond its bounds by chance (`admissible.rs`), when an effect is a rival (`naming.rs`), how much better
+/// an end from another start is to be (`starts.rs`) and when a drive's limit is one (`limits.rs`) stand as
 /// constants where they are used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {

@@ -67,7 +67,7 @@ fn limit_of(tracing: &Tracing) -> Option<f64> {
     tracing.specs.iter().find(is_it).map(|spec| spec.constants["limit"])
 }
 
-/// Commands of many times what the drive delivers outweighed all else: no limit was found, half of the torque
+/// Commands of many times what the drive delivers outweighed all else: no limit was found, most of the torque
 /// was left, and it was called explained.
 #[test]
 fn a_drive_whose_command_winds_up_is_at_its_limit() {
