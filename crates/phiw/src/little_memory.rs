@@ -35,7 +35,8 @@ pub fn in_a_process_of_its_own(command_line: &[OsString]) -> Option<u8> {
     let mut child = command.spawn().ok()?;
     let mut used_up = false;
     for mut line in child.stderr.take().map(BufReader::new)?.split(b'\n').map_while(Result::ok) {
-        used_up |= line.starts_with(STANDARD_LIBRARYS);
+        // It may have said so itself, and then have ended by what it could not clean up.
+        used_up |= line.starts_with(STANDARD_LIBRARYS) || line.ends_with(MESSAGE.as_bytes());
         // What follows is a note on how to see where. Where nobody listens, nothing is lost but the message.
         if !used_up {
             line.push(b'\n');

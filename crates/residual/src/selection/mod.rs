@@ -24,6 +24,7 @@ mod problem;
 mod products;
 mod screening;
 mod search;
+mod two_ends;
 mod wald;
 
 #[cfg(test)]
@@ -36,5 +37,6 @@ pub(crate) use fit::Fit;
 pub(crate) use multiple::{Multiple, multiples};
 pub(crate) use problem::{Hypothesis, Member, Prior, Problem, Torque, Variant};
 pub(crate) use products::Products;
-pub(crate) use search::{LEAST_STEP, Policy, choose_variants, select, value};
+pub(crate) use search::{LEAST_STEP, Policy, choose_variants, select};
+pub(crate) use two_ends::Judged;
 pub(crate) use wald::certainty;

@@ -1,6 +1,6 @@
 //! Forward to the end, then prune, then swap, until nothing is better.
 
-use super::criterion::{choice, criterion, price};
+use super::criterion::{choice, price};
 use super::cross_validation::cross_validated;
 use super::design_effect::effective_rows;
 use super::fit::Fit;
@@ -19,6 +19,8 @@ pub(crate) struct Policy {
     pub keep_tail: f64,
     /// Members at most beside what was declared.
     pub most_members: usize,
+    /// Whether anything may enter; otherwise members only leave.
+    pub grows: bool,
 }
 
 /// What could stand in the place of a member.
@@ -94,12 +96,6 @@ pub(crate) fn select(problem: &Problem, start: Vec<Member>, policy: Policy) -> O
     search.outcome()
 }
 
-/// The criterion of a model; comparable between problems of the same torques and hypotheses.
-pub(crate) fn value(problem: &Problem, members: &[Member], rows: &[f64]) -> f64 {
-    let fit = Fit::new(problem, problem.active(members), rows, None);
-    criterion(problem, members, &fit, rows)
-}
-
 /// The variants of the members of `start` at which the criterion is smallest.
 pub(crate) fn choose_variants(problem: &Problem, start: Vec<Member>, policy: Policy) -> Variants {
     let mut search = Search::new(problem, start, policy);
@@ -132,6 +128,13 @@ impl<'a> Search<'a> {
     }
 
     fn run(&mut self) {
+        if !self.policy.grows {
+            self.renew();
+            while self.prune() {}
+            self.renew();
+            self.doubt();
+            return;
+        }
         for round in 0..ROUNDS {
             let before = self.model.members.clone();
             // What the textbook has first, or a form of it takes its place. The effective rows are renewed

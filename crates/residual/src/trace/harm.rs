@@ -75,7 +75,8 @@ impl Search<'_> {
 
     /// The place of the effect that makes the errors on motion held out larger by most, if that is by more
     /// than `same_error`: in their geometric mean over the torques, or all together. A drift that one log
-    /// seems to show may be a disaster in the next.
+    /// seems to show may be a disaster in the next. But where an effect makes the errors on training motion
+    /// that is foretold smaller by more, motion held out is foretold badly for another reason.
     pub(super) fn misleading(&self, trial: &Trial) -> Option<usize> {
         let present = trial.held_out_squares(&trial.fit);
         let rows: f64 = trial.held_out.iter().map(Products::rows).sum();
@@ -89,10 +90,18 @@ impl Search<'_> {
             let of_torque =
                 |torque: usize| trial.held_out[torque].rows() * (present[torque] / without[torque]).ln();
             let mean = (0..present.len()).map(of_torque).sum::<f64>() / rows.max(1.0);
-            (mean.max((together(&present) / together(&without)).ln()), place)
+            (mean.max((together(&present) / together(&without)).ln()), member, place)
         });
-        let worst = growth.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))?;
-        (0.5 * worst.0 > self.options.thresholds.same_error.ln()).then_some(worst.1)
+        let least = 2.0 * self.options.thresholds.same_error.ln();
+        let mut grown: Vec<(f64, Member, usize)> = growth.filter(|(growth, ..)| *growth > least).collect();
+        grown.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.2.cmp(&b.2)));
+        let foretelling = trial.foretelling(&trial.fit);
+        let foretold = foretelling.squares();
+        let trained: f64 = (0..foretold.len()).map(|torque| trial.torque(torque).rows()).sum();
+        let misleads = |(growth, member, _): &(f64, Member, usize)| {
+            growth * trained > trial.gain(&foretelling.squares_without(*member), &foretold)
+        };
+        grown.into_iter().find(misleads).map(|(.., place)| place)
     }
 
     /// Whether an effect that is [`Self::misleading`] on trial makes the errors on motion held out larger in

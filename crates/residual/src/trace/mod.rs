@@ -16,6 +16,7 @@ mod impossible;
 mod input;
 mod interchangeable;
 mod kept_columns;
+mod leaning;
 mod limits;
 mod multiples;
 mod naming;

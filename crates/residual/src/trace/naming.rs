@@ -89,7 +89,9 @@ impl Search<'_> {
             !hypothesis.declared && !hypothesis.requires.is_empty()
         };
         let forms = trial.members.iter().zip(&trial.places);
-        let forms = forms.filter(|(member, place)| is_form(member) || self.refines_special_case(**place));
+        let forms = forms.filter(|(member, place)| {
+            is_form(member) || self.refines_special_case(**place) || self.leans_on_textbook(trial, **member)
+        });
         let forms: Vec<usize> = forms.map(|(_, place)| *place).collect();
         let simpler = |place: usize| {
             let own = &self.specs[place].joints;
@@ -239,7 +241,12 @@ impl Search<'_> {
             // What others are forms of is judged without these; a form beside the simpler ones only.
             let beside = match level {
                 Some(level) => simpler.get(level),
-                None if whole.is_required(&member) || self.is_refined(place) => simpler.first(),
+                None if whole.is_required(&member)
+                    || self.is_refined(place)
+                    || self.is_leaned_on(whole, member) =>
+                {
+                    simpler.first()
+                }
                 None => None,
             };
             let (trial, own) = match beside {

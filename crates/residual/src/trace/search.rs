@@ -9,7 +9,7 @@ use super::sample::Sample;
 use super::special_cases::Refined;
 use super::stage::{Fixed, Stage, specs_and_values};
 use super::tracing::{Tracing, Withdrawn};
-use crate::selection::{Member, Policy, Problem, select, value};
+use crate::selection::{Judged, Member, Policy, Problem, select};
 use phiw_effects::{Constants, SignalRanges};
 use phiw_identification::{Data, Design, Effect, EffectCatalogue, EffectSpec, Fold, IdentificationError};
 
@@ -44,6 +44,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         declared_stays: fixed.prior.is_some(),
         withdrawn: Vec::new(),
         folds: split_by_motion(&fixed, split(&data.train, 1))?,
+        grows: true,
         chosen: Chosen::default(),
         asks_of_logs: false,
         refuted: Vec::new(),
@@ -97,6 +98,8 @@ pub(super) struct Search<'a> {
     pub withdrawn: Vec<Withdrawn>,
     /// Stretches of the training motion.
     pub folds: Vec<Fold>,
+    /// Whether anything may be added; otherwise effects only leave.
+    pub grows: bool,
     pub chosen: Chosen,
     /// Whether what training logs may have of their own is sought, too.
     pub asks_of_logs: bool,
@@ -148,7 +151,7 @@ impl Search<'_> {
                     continue;
                 }
             }
-            if is_settled && !self.contest()? {
+            if is_settled && (!self.grows || !self.contest()?) {
                 break;
             }
         }
@@ -160,6 +163,7 @@ impl Search<'_> {
             finalists: FINALISTS,
             keep_tail: self.options.thresholds.false_name_probability,
             most_members: self.options.most_effects + self.declared,
+            grows: self.grows,
         }
     }
 
@@ -167,7 +171,7 @@ impl Search<'_> {
         self.fixed.prior.is_some() && place < self.declared
     }
 
-    fn names(&self) -> Vec<(String, Vec<String>)> {
+    pub(super) fn names(&self) -> Vec<(String, Vec<String>)> {
         let mut names: Vec<_> =
             self.specs.iter().map(|spec| (spec.kind.clone(), spec.joints.clone())).collect();
         names.sort();
@@ -281,11 +285,16 @@ impl Search<'_> {
 
     /// The criterion of the model as it is, with these effective rows of each torque.
     pub(super) fn value(&self, rows: &[f64]) -> Result<f64, IdentificationError> {
+        Ok(self.judged(rows)?.value())
+    }
+
+    /// The model as it is, fitted with these effective rows of each torque.
+    pub(super) fn judged(&self, rows: &[f64]) -> Result<Judged, IdentificationError> {
         let mut candidates =
             Candidates::of_model(self.fixed, Present { specs: &self.specs, declared: self.declared });
         let stage = self.pass(Vec::new(), Keep::WhileThereIsRoom)?;
         let problem = self.fixed.problem(stage, &mut candidates)?;
-        Ok(value(&problem, &candidates.present, rows))
+        Ok(Judged::new(problem, &candidates.present, rows))
     }
 
     /// Puts another effect, with its parameters at nothing, in the place of one.

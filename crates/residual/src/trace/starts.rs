@@ -2,41 +2,33 @@
 
 use super::search::Search;
 use super::tracing::Tracing;
+use crate::selection::LEAST_STEP;
 use phiw_identification::{EffectSpec, IdentificationError};
 
-/// How much smaller the criterion is to be at the end from another start: of two ends that are about as good
-/// the first is kept, and names do not change for what some constants do. Where joints moved one after the
-/// other (`frictions_of_joints_that_move_in_turn_keep_their_names`) an end with a coupling that is not there
-/// was better by 52; those of the KR300 differ by up to 600. Made of these two, and calibrated on nothing
-/// else.
-const ANOTHER_END_IS_WORTH: f64 = 100.0;
-
 impl Search<'_> {
-    /// The search from where it starts to its end, or to a better one from another start.
+    /// The search from where it starts to its end.
     ///
+    /// - Where the declared model lacks anything, the start has what the textbook has of every joint, declared
+    ///   by nobody, and so has nothing of what was declared. What is chosen early, beside all that is still
+    ///   missing, may stand for something else to the end; the more is there at the start, the less can be
+    ///   taken for it. And the end is the same whatever was declared: that joins it afterwards.
+    /// - That start has the limits of drives beyond which a command was logged (`limits.rs`).
     /// - Where the torques agree better once one of them is a multiple of what is logged, and still do in the
-    ///   end, a start has that in force: to first order a factor of two is no factor, and other effects would
-    ///   stand for it.
-    /// - Where anything was found, a start has what the textbook has of every joint, declared by nobody. What
-    ///   is chosen early, beside all that is still missing, may stand for something else to the end; the more
-    ///   is there at the start, the less can be taken for it.
-    /// - That start has the limits of drives beyond which a command was logged (`limits.rs`); where there are
-    ///   any, it is searched from in any case.
+    ///   end, another start has that in force, too: to first order a factor of two is no factor, and other
+    ///   effects would stand for it.
     pub(super) fn run(self) -> Result<Tracing, IdentificationError> {
-        let mut best = self.clone().searched()?;
-        if let Some(start) = self.with_multiples()?
-            && best.still_asks_for(&start.specs[self.specs.len()..])?
+        let start = if self.fixed.prior.is_none() { self.anew()? } else { None };
+        let mut best = match &start {
+            Some(start) => self.with_declared(start.clone().searched()?)?,
+            None => self.clone().searched()?,
+        };
+        let is_anew = start.is_some();
+        let start = start.as_ref().unwrap_or(&self);
+        if let Some(with_multiples) = start.with_multiples()?
+            && best.still_asks_for(&with_multiples.specs[start.specs.len()..])?
         {
-            let other = start.searched()?;
-            if other.is_better_than(&best)? {
-                best = other;
-            }
-        }
-        let is_found = best.specs.len() > best.declared;
-        if self.fixed.prior.is_none()
-            && let Some(start) = self.with_the_textbook(is_found)?
-        {
-            let other = self.searched_from(start)?;
+            let other = with_multiples.searched()?;
+            let other = if is_anew { self.with_declared(other)? } else { other };
             if other.is_better_than(&best)? {
                 best = other;
             }
@@ -44,35 +36,48 @@ impl Search<'_> {
         best.finish()
     }
 
-    /// Whether the criterion is clearly smaller here than there, with the effective rows of that end.
-    fn is_better_than(&self, other: &Self) -> Result<bool, IdentificationError> {
-        let rows = &other.chosen.rows;
-        Ok(self.value(rows)? < other.value(rows)? - ANOTHER_END_IS_WORTH)
-    }
-
     /// The start that has what the textbook has of every joint and limits of drives, all of it declared by
-    /// nobody; `None` where that is the start of all, and without limits where it is not `asked` for.
-    fn with_the_textbook(&self, asked: bool) -> Result<Option<Self>, IdentificationError> {
+    /// nobody; `None` where nothing is lacking in what is declared.
+    fn anew(&self) -> Result<Option<Self>, IdentificationError> {
         let mut start = self.clone();
-        start.declared = 0;
-        start.chosen.alternatives = vec![Vec::new(); start.specs.len()];
-        for spec in self.textbook_of_other_joints()? {
+        (start.specs, start.declared) = (Vec::new(), 0);
+        start.parameters = vec![0.0; self.fixed.base.count()];
+        for spec in start.textbook_of_other_joints()? {
             start.add(spec)?;
         }
-        let is_other = start.specs.len() > self.specs.len() || self.declared > 0;
+        start.refine()?;
         let has_limits = start.add_limits()?;
-        Ok((has_limits || (asked && is_other)).then_some(start))
+        Ok((has_limits || self.lacks_something()?).then_some(start))
     }
 
-    /// The end from a start that has declared nothing, with what was declared put into it only then: so the
-    /// end hardly depends on what was declared.
-    fn searched_from(&self, start: Self) -> Result<Self, IdentificationError> {
-        let mut end = start.searched()?;
+    /// Whether anything is to be added to what is declared.
+    fn lacks_something(&self) -> Result<bool, IdentificationError> {
+        let mut search = self.clone();
+        search.refine()?;
+        search.choose()?;
+        Ok(search.specs.len() > search.declared)
+    }
+
+    /// An end that was reached with nothing declared, with what was declared put into it: what that does the
+    /// work of leaves, and nothing enters.
+    fn with_declared(&self, mut end: Self) -> Result<Self, IdentificationError> {
         if self.declared > 0 {
             end.put_in_front(&self.specs[..self.declared])?;
+            end.grows = false;
             end = end.searched()?;
+            end.grows = true;
         }
         Ok(end)
+    }
+
+    /// Whether the criterion is smaller here than there, and the motion says so throughout, with the effective
+    /// rows of that end: what does no more than chance could do leaves the end that was there.
+    fn is_better_than(&self, other: &Self) -> Result<bool, IdentificationError> {
+        let rows = &other.chosen.rows;
+        let (own, other) = (self.judged(rows)?, other.judged(rows)?);
+        let tail = own.tail_of_being_better(&other, rows);
+        let is_smaller = own.value() < other.value() - LEAST_STEP;
+        Ok(is_smaller && tail < self.options.thresholds.false_name_probability)
     }
 
     /// Counts effects as declared, and adds those that the model lacks.

@@ -61,6 +61,12 @@ impl Trial {
         self.places.iter().position(|other| *other == place).map(|at| self.members[at])
     }
 
+    /// Whether it is one of the textbook's effects, and acts on none but these torques.
+    pub fn is_of_textbook(&self, member: Member, torques: &[usize]) -> bool {
+        let own = &self.problem.hypotheses[member.hypothesis];
+        own.textbook && own.torques.iter().all(|torque| torques.contains(torque))
+    }
+
     /// Whether another effect is a form of it.
     pub fn is_required(&self, member: &Member) -> bool {
         let requires = |other: &Member| &self.problem.hypotheses[other.hypothesis].requires;
