@@ -1,8 +1,8 @@
 //! Effects of several joints that do what frictions of each of them do.
 //!
-//! Where joints move one after the other, what turns with the sum of two speeds turns with the one or with the
-//! other: a coupling is two frictions that turn over another speed. It may refine them, and takes no name from
-//! them.
+//! Where joints move one after the other, what turns with the sum of two speeds turns with the one or with
+//! the other: a coupling is two frictions that turn over another speed. It may refine them, and takes no name
+//! from them.
 
 use super::search::Search;
 use super::trial::Trial;

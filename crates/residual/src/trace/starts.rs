@@ -1,4 +1,4 @@
-//! Where the search starts. Its end is the best of those that several starts lead to.
+//! Where the search starts, whatever was declared, and how what was declared joins its end.
 
 use super::search::Search;
 use super::tracing::Tracing;
@@ -8,8 +8,8 @@ use phiw_identification::{EffectSpec, IdentificationError};
 impl Search<'_> {
     /// The search from where it starts to its end.
     ///
-    /// - Where the declared model lacks anything, the start has what the textbook has of every joint, declared
-    ///   by nobody, and so has nothing of what was declared. What is chosen early, beside all that is still
+    /// - Where the declared model lacks anything, the start has what the textbook has of every joint,
+    ///   declared by nobody, and nothing of what was declared. What is chosen early, beside all that is still
     ///   missing, may stand for something else to the end; the more is there at the start, the less can be
     ///   taken for it. And the end is the same whatever was declared: that joins it afterwards.
     /// - That start has the limits of drives beyond which a command was logged (`limits.rs`).
@@ -70,8 +70,8 @@ impl Search<'_> {
         Ok(end)
     }
 
-    /// Whether the criterion is smaller here than there, and the motion says so throughout, with the effective
-    /// rows of that end: what does no more than chance could do leaves the end that was there.
+    /// Whether the criterion is smaller here than there, and the motion says so throughout, with the
+    /// effective rows of that end: what does no more than chance could do leaves the end that was there.
     fn is_better_than(&self, other: &Self) -> Result<bool, IdentificationError> {
         let rows = &other.chosen.rows;
         let (own, other) = (self.judged(rows)?, other.judged(rows)?);
