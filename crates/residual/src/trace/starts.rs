@@ -17,18 +17,18 @@ impl Search<'_> {
     ///   end, another start has that in force, too: to first order a factor of two is no factor, and other
     ///   effects would stand for it.
     pub(super) fn run(self) -> Result<Tracing, IdentificationError> {
-        let start = if self.fixed.prior.is_none() { self.anew()? } else { None };
+        let start = if self.fixed.prior.is_none() { self.textbook_start()? } else { None };
         let mut best = match &start {
             Some(start) => self.with_declared(start.clone().searched()?)?,
             None => self.clone().searched()?,
         };
-        let is_anew = start.is_some();
+        let is_from_textbook = start.is_some();
         let start = start.as_ref().unwrap_or(&self);
         if let Some(with_multiples) = start.with_multiples()?
             && best.still_asks_for(&with_multiples.specs[start.specs.len()..])?
         {
             let other = with_multiples.searched()?;
-            let other = if is_anew { self.with_declared(other)? } else { other };
+            let other = if is_from_textbook { self.with_declared(other)? } else { other };
             if other.is_better_than(&best)? {
                 best = other;
             }
@@ -37,8 +37,8 @@ impl Search<'_> {
     }
 
     /// The start that has what the textbook has of every joint and limits of drives, all of it declared by
-    /// nobody; `None` where nothing is lacking in what is declared.
-    fn anew(&self) -> Result<Option<Self>, IdentificationError> {
+    /// nobody; `None` where nothing is lacking in what is declared and no command was beyond a limit.
+    fn textbook_start(&self) -> Result<Option<Self>, IdentificationError> {
         let mut start = self.clone();
         (start.specs, start.declared) = (Vec::new(), 0);
         start.parameters = vec![0.0; self.fixed.base.count()];
