@@ -67,6 +67,7 @@ pub struct OwnTorque<F> {
     parameters: Vec<EffectParameter>,
     needs: Needs,
     linear_in_motion: bool,
+    turns_with_velocity: bool,
     quadratic: Option<QuadraticForm>,
     formula: F,
 }
@@ -98,6 +99,7 @@ impl<F: Formula> OwnTorque<F> {
             joint,
             needs: Needs::default(),
             linear_in_motion: false,
+            turns_with_velocity: false,
             quadratic: None,
             formula,
         }
@@ -118,6 +120,13 @@ impl<F: Formula> OwnTorque<F> {
     /// The same with a first parameter that is the joint's entry of a quadratic form.
     pub fn in_form(mut self, form: QuadraticForm) -> Self {
         self.quadratic = Some(form);
+        self
+    }
+
+    /// The same with columns that turn with the joint's velocity and with nothing else
+    /// ([`Effect::turns_with`]), if `they_do`.
+    pub fn turning_with_velocity(mut self, they_do: bool) -> Self {
+        self.turns_with_velocity = they_do;
         self
     }
 
@@ -143,6 +152,9 @@ impl<F: Formula> Effect for OwnTorque<F> {
     }
     fn is_linear_in_motion(&self, _parameter: usize) -> bool {
         self.linear_in_motion
+    }
+    fn turns_with(&self) -> Option<usize> {
+        self.turns_with_velocity.then_some(self.joint)
     }
     fn quadratic_terms(&self) -> Vec<QuadraticTerm> {
         let coordinates = [self.joint; 2];

@@ -87,8 +87,10 @@ impl EffectKind for Coulomb {
         let (joint, sign) = (site[0], Sign::of(constants));
         let steady = move |sample: &Sample<'_>| sign.of_joint(sample, joint);
         let columns = Bristles { joint, deflection: constant(constants, DEFLECTION, 0.0), steady };
+        let turns_at_once = sign.lead == 0.0 && columns.deflection == 0.0;
         let parameters = [("fc", ParameterKind::Torque, 0.0)];
-        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+        let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
+        Box::new(effect.turning_with_velocity(turns_at_once))
     }
 }
 
@@ -147,7 +149,8 @@ impl EffectKind for Asymmetric {
             Box::new(OwnTorque::new(kind, tree, joint, constants, &[viscous], columns))
         } else if part == 1.0 {
             let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = coulomb_column(sample);
-            Box::new(OwnTorque::new(kind, tree, joint, constants, &[coulomb], columns))
+            let effect = OwnTorque::new(kind, tree, joint, constants, &[coulomb], columns);
+            Box::new(effect.turning_with_velocity(sign.lead == 0.0))
         } else {
             let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
                 out[0] = viscous_column(sample);
@@ -270,8 +273,10 @@ impl EffectKind for Stribeck {
             if power > 40.0 { 0.0 } else { (-power).exp() * sign.of_joint(sample, joint) }
         };
         let columns = Bristles { joint, deflection: constant(constants, DEFLECTION, 0.0), steady };
+        let turns_at_once = sign.lead == 0.0 && columns.deflection == 0.0;
         let parameters = [("fs", ParameterKind::Torque, 0.0)];
-        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+        let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
+        Box::new(effect.turning_with_velocity(turns_at_once))
     }
 }
 

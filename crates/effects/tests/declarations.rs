@@ -126,6 +126,29 @@ impl Zoo {
         result
     }
 
+    /// For each joint, the columns of two moments that have nothing but the velocity of that joint in common,
+    /// nor anything before them.
+    fn with_one_velocity(&self, seed: u64) -> Vec<[Columns; 2]> {
+        let mut random = RandomNumbers::new(seed);
+        let joints = self.tree.joint_count();
+        let mut of_joint = |joint: usize| {
+            let states: [_; 4] = std::array::from_fn(|_| random_state(&self.tree, &mut random));
+            let velocity = states[0].v[joint];
+            [[0, 1], [2, 3]].map(|moments: [usize; 2]| {
+                let [before, now] = moments.map(|moment| &states[moment]);
+                let mut speeds = [before.v.clone(), now.v.clone()].concat();
+                speeds[joints + joint] = velocity;
+                let signals =
+                    [[before.q.clone(), now.q.clone()].concat(), speeds, [&before.a[..], &now.a].concat()];
+                let torques = (0..2 * joints).map(|_| random.uniform(-TORQUE, TORQUE)).collect();
+                let start = random.uniform(0.0, 50.0);
+                let block = Block::unfiltered(joints, vec![start, start + PERIOD], signals, torques);
+                self.columns(&block, 1).remove(1)
+            })
+        };
+        (0..joints).map(&mut of_joint).collect()
+    }
+
     /// The joints swing about a posture; the measured torques do as well.
     fn swing(&self, seed: u64, rows: usize) -> Block {
         let joints = self.tree.joint_count();
@@ -204,6 +227,25 @@ proptest! {
                 prop_assert!(!effect.is_causal() || !ahead[place], "{kind}: causal");
             }
         }
+    }
+
+    /// The likelihood of a motion takes the mean of such a column along the velocity of its joint.
+    #[test]
+    fn what_turns_with_a_velocity_changes_with_nothing_else(seed in 0u64..100_000, joints in 1usize..5) {
+        let zoo = Zoo::new(seed, joints);
+        let moments = zoo.with_one_velocity(seed);
+        let mut turning = 0;
+        for (kind, effect, places) in zoo.effects() {
+            let Some(joint) = effect.turns_with() else { continue };
+            prop_assert!(effect.entries().iter().all(|entry| entry.row == joint), "{kind}");
+            let [one, other] = &moments[joint];
+            for place in places {
+                prop_assert_eq!(&one[place], &other[place], "{}", kind);
+                turning += 1;
+            }
+        }
+        // Coulomb, asymmetric and Stribeck friction, with all constants that are tried.
+        prop_assert!(turning >= 25 * joints, "{turning}");
     }
 
     #[test]

@@ -124,6 +124,7 @@ impl Evidence {
             settings,
             factor,
             instants: Vec::new(),
+            turned: Vec::new(),
             foreseen: Vec::new(),
             rate_hz,
             in_order: None,

@@ -3,6 +3,7 @@
 use super::foresight;
 use super::in_order::InOrder;
 use super::stored::StoredFactor;
+use super::turning::{Turned, turned};
 use crate::{EstimationError, MotionLog};
 use phiw_identification::fitting::accumulate;
 use phiw_identification::{Design, Fold, IdentificationError};
@@ -19,8 +20,9 @@ pub enum RowsAt {
     Stamps,
     /// The middle of each period: what the motion was on average while one command was held. Position by
     /// Hermite's cubic, velocity Δq/T, acceleration Δq̇/T, so that inertia and viscous friction balance the
-    /// command exactly, however fast the motion changes within a period. Effects that are not linear in the
-    /// motion are taken as they were when the period began, so that its noise is not in them.
+    /// command exactly, however fast the motion changes within a period. Dry friction is the mean on the way
+    /// of the velocity. Other effects that are not linear in the motion are taken as they were when the
+    /// period began, so that its noise is not in them.
     #[default]
     Periods,
 }
@@ -71,6 +73,8 @@ pub struct Evidence {
     pub(super) settings: EvidenceSettings,
     pub(super) factor: GroupedFactor,
     pub(super) instants: Vec<Instant>,
+    /// For each instant, the slopes of what turns with a velocity in the periods that it stands for.
+    pub(super) turned: Vec<Vec<Turned>>,
     /// Of which parameters the columns are those of the periods' beginnings; none of them if it is empty.
     pub(super) foreseen: Vec<bool>,
     /// Rows a second of each torque \[Hz\]; none where they are as dense as those of the motions.
@@ -89,6 +93,8 @@ struct StoredEvidence {
     factor: StoredFactor,
     instants: Vec<Instant>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    turned: Vec<Vec<Turned>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     foreseen: Vec<bool>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     rate_hz: Option<f64>,
@@ -100,10 +106,11 @@ struct StoredEvidence {
 
 impl From<Evidence> for StoredEvidence {
     fn from(evidence: Evidence) -> Self {
-        let Evidence { settings, factor, instants, foreseen, rate_hz, in_order, encoder_logs } = evidence;
+        let Evidence { settings, factor, instants, turned, foreseen, rate_hz, in_order, encoder_logs } =
+            evidence;
         let rows_in_order = in_order.map(|in_order| StoredFactor::from(in_order.factor()));
         let factor = StoredFactor::from(&factor);
-        StoredEvidence { settings, factor, instants, foreseen, rate_hz, rows_in_order, encoder_logs }
+        StoredEvidence { settings, factor, instants, turned, foreseen, rate_hz, rows_in_order, encoder_logs }
     }
 }
 
@@ -111,12 +118,20 @@ impl TryFrom<StoredEvidence> for Evidence {
     type Error = IdentificationError;
 
     fn try_from(stored: StoredEvidence) -> Result<Self, IdentificationError> {
-        let StoredEvidence { settings, factor, instants, foreseen, rate_hz, rows_in_order, encoder_logs } =
-            stored;
+        let StoredEvidence {
+            settings,
+            factor,
+            instants,
+            turned,
+            foreseen,
+            rate_hz,
+            rows_in_order,
+            encoder_logs,
+        } = stored;
         let in_order: Option<GroupedFactor> = rows_in_order.map(TryInto::try_into).transpose()?;
         let in_order = in_order.map(InOrder::of_factor);
         let factor = factor.try_into()?;
-        Ok(Evidence { settings, factor, instants, foreseen, rate_hz, in_order, encoder_logs })
+        Ok(Evidence { settings, factor, instants, turned, foreseen, rate_hz, in_order, encoder_logs })
     }
 }
 
@@ -142,8 +157,8 @@ impl Evidence {
         }
         let asked = settings.in_order && settings.rows_at == RowsAt::Periods;
         let in_order = asked.then(|| InOrder::none(design)).transpose()?;
-        let (instants, encoder_logs) = (Vec::new(), Vec::new());
-        Ok(Evidence { settings, factor, instants, foreseen, rate_hz: None, in_order, encoder_logs })
+        let (instants, turned, encoder_logs) = (Vec::new(), Vec::new(), Vec::new());
+        Ok(Evidence { settings, factor, instants, turned, foreseen, rate_hz: None, in_order, encoder_logs })
     }
 
     /// The same for a robot that moves without noise: all columns are those of a period's mean motion.
@@ -167,6 +182,10 @@ impl Evidence {
             RowsAt::Periods => measured.over_periods(),
         };
         self.instants.extend(instants(&block, measured.period_s, self.settings.instant_every_s));
+        let stride = periods_of_an_instant(measured.period_s, self.settings.instant_every_s);
+        if !self.foreseen.is_empty() {
+            self.turned.extend(turned(design, &self.foreseen, measured, stride)?);
+        }
         let factor = match self.foreseen.as_slice() {
             [] => grouped_factor(design, block)?,
             foreseen => foresight::factor(design, foreseen, measured)?,
@@ -211,9 +230,14 @@ impl Evidence {
     }
 }
 
+/// Periods that an instant stands for, but the last of a log.
+pub(super) fn periods_of_an_instant(period_s: f64, every_s: f64) -> usize {
+    ((every_s / period_s).round() as usize).max(1)
+}
+
 /// Evenly spaced samples, each in the middle of those that it stands for.
 pub(super) fn instants(block: &Block, period_s: f64, every_s: f64) -> Vec<Instant> {
-    let stride = ((every_s / period_s).round() as usize).max(1);
+    let stride = periods_of_an_instant(period_s, every_s);
     let stretches = block.len().div_ceil(stride);
     let stretch = |index: usize| {
         let end = ((index + 1) * stride).min(block.len());

@@ -2,12 +2,11 @@
 //!
 //! Noise in a torque moves the robot within the period, and so is in the mean speed and the mean acceleration
 //! of that period. Where a column is linear in both (rigid body, viscous friction, rotor inertia) the
-//! log-determinant of the likelihood accounts for it exactly. Where it is not (a friction that turns with the
-//! sign), nothing simple does: near a reversal the sign is the noise's own, and the slope of a column that
-//! turns within 0.01 rad/s can not be computed from an instant that stands for many rows. Such a column is
-//! taken of what was known when the period began: then its product with the noise is nothing on average,
-//! whatever its form.
+//! log-determinant of the likelihood accounts for it exactly, and where it is a function of one joint's
+//! velocity (dry friction) nearly so ([`super::turning`]). Any other column is taken of what was known when
+//! the period began: then its product with the noise is nothing on average, whatever its form.
 
+use super::turning::TurningColumns;
 use crate::{EstimationError, MotionLog};
 use phiw_identification::{Design, Effect};
 use phiw_regressor::factor::FactorBuilder;
@@ -39,8 +38,8 @@ fn of_parameters(design: &Design, asked: impl Fn(&dyn Effect, usize) -> bool) ->
     answers
 }
 
-/// Rows of a log over its periods, columns of foreseen parameters taken of the periods' beginnings, `[row ×
-/// evaluation width]`, one after the other to `take`.
+/// Rows of a log over its periods, columns of foreseen parameters taken of the periods' beginnings or, where
+/// they turn with the velocity, of their means, `[row × evaluation width]`, one after the other to `take`.
 ///
 /// # Errors
 /// The log is not of this robot; what `take` returns.
@@ -58,6 +57,8 @@ pub(super) fn rows(
     begun_scratch.begin(&begun)?;
     let mut row = vec![0.0; design.evaluation_width()];
     let mut begun_row = row.clone();
+    let turning = TurningColumns::of(design, foreseen);
+    let means = turning.means((&begun, &block), measured)?;
     for sample in 0..block.len() {
         scratch.evaluate(&block, sample, &mut row)?;
         begun_scratch.evaluate(&begun, sample, &mut begun_row)?;
@@ -65,6 +66,10 @@ pub(super) fn rows(
             let start = layout.range.start;
             let columns = layout.parameters.iter().enumerate().filter(|(_, parameter)| foreseen[**parameter]);
             columns.for_each(|(column, _)| row[start + column] = begun_row[start + column]);
+        }
+        let means = means.iter().skip(sample * turning.columns().len());
+        for (column, mean) in turning.columns().iter().zip(means) {
+            row[column.place] = mean.map_or(row[column.place], |mean| mean.value);
         }
         take(&row)?;
     }

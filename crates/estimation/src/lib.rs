@@ -30,6 +30,8 @@ mod settings;
 mod smoothing;
 mod stored;
 mod torques;
+mod turning;
+mod turning_response;
 
 pub use bayesian::{BayesianLeastSquares, LogNoise};
 pub use concentrated::{ConcentratedLikelihood, TorqueNoise};

@@ -32,8 +32,9 @@ use phiw_regressor::least_squares::GroupedFactor;
 /// σ must be known: the noise of the actuators, as a data sheet gives it. With σ free, a robot with more
 /// inertia and more noise is nearly as likely, and little is gained over least squares.
 ///
-/// Right for rows over periods ([`super::RowsAt::Periods`]) and exact encoders. Columns that are not linear
-/// in the motion are those of a period's beginning and have no share in J. Noise in the logged torque, which
+/// Right for rows over periods ([`super::RowsAt::Periods`]) and exact encoders. Columns that turn with the
+/// velocity are means over the period, whose slopes are in J; others that are not linear in the motion are
+/// those of a period's beginning and have no share in J. Noise in the logged torque, which
 /// moves nothing, is taken for noise that does; where that dominates, [`super::WeightedLeastSquares`] is
 /// right.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,9 +7,10 @@
 //! of friction alone, log(1 + x/2), is then so far off that a thousand rows take the difference for friction.
 
 use super::sensitivity::{Sensitivity, element, packed, place};
+use super::turning_response::{JointResponse, TurningResponse};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par, Side};
-use phiw_dynamics::dense::Cholesky;
+use phiw_dynamics::dense::{Cholesky, dot};
 
 /// Up to here p is summed as a series; beyond, e^−x is nothing beside 1.
 const LARGE: f64 = 8.0;
@@ -44,6 +45,8 @@ pub(super) struct Response {
     pub slopes: [Mat<f64>; 2],
     /// Cholesky's factor of A + ½T·F, near enough for a curvature.
     pub factor: Cholesky,
+    /// Of each joint with frictions that turn.
+    turning: Vec<TurningResponse>,
 }
 
 /// Inertia and damping of an instant as their eigenvectors see them: Cholesky's factor of A, x and the
@@ -52,8 +55,10 @@ pub(super) struct Modes {
     factor: Cholesky,
     values: Vec<f64>,
     vectors: Mat<f64>,
-    /// A + ½T·F, packed.
-    half_damped: Mat<f64>,
+    /// Cholesky's factor of A + ½T·F; none where that is no inertia.
+    half_damped: Option<Cholesky>,
+    /// Of each joint with frictions that turn.
+    turning: Vec<TurningResponse>,
 }
 
 impl Modes {
@@ -62,17 +67,42 @@ impl Modes {
         let n = sensitivity.directions;
         let (inertia, mut damping) = (&sensitivity.inertia * w, &sensitivity.damping * w);
         let factor = factor(n, inertia.col_as_slice(0))?;
-        let half_damped = inertia + &damping * faer::Scale(0.5);
+        let half_damped = self::factor(n, (inertia + &damping * faer::Scale(0.5)).col_as_slice(0));
         reduce(&factor, damping.col_as_slice_mut(0));
         let reduced = damping.col_as_slice(0);
         let entry = |row: usize, column: usize| element(reduced, row.max(column), row.min(column));
         let eigen = Mat::from_fn(n, n, entry).self_adjoint_eigen(Side::Lower).ok()?;
         let values = (0..n).map(|mode| eigen.S()[mode]).collect();
-        Some(Modes { factor, values, vectors: eigen.U().to_owned(), half_damped })
+        let vectors = eigen.U().to_owned();
+        let mut modes = Modes { factor, values, vectors, half_damped, turning: Vec::new() };
+        for turning in &sensitivity.turning {
+            let (response, moved) = modes.joint(&turning.toward)?;
+            modes.turning.push(TurningResponse::of(turning, response, moved, w, sensitivity.weight));
+        }
+        Some(modes)
     }
 
+    /// What a joint that moves by `toward` with each direction does under a torque of one, and G⁻¹ of that;
+    /// none where G is no inertia.
+    fn joint(&self, toward: &[f64]) -> Option<(JointResponse, Vec<f64>)> {
+        let mut reduced = toward.to_vec();
+        self.factor.solve_lower(&mut reduced);
+        let along = |mode: usize| dot(self.vectors.col_as_slice(mode), &reduced).powi(2);
+        let share = |(mode, x): (usize, &f64)| along(mode) * (1.0 - x * damped_slope(*x));
+        let velocity = self.values.iter().enumerate().map(share).sum();
+        let half_damped = self.half_damped.as_ref()?;
+        let mut moved = toward.to_vec();
+        half_damped.solve_lower(&mut moved);
+        let acceleration = dot(&moved, &moved);
+        half_damped.solve_upper(&mut moved);
+        Some((JointResponse { velocity, acceleration }, moved))
+    }
+
+    /// That of a row, in the mean of those that the instant stands for.
     pub fn log_determinant(&self) -> f64 {
-        self.factor.log_determinant() + self.values.iter().map(|&x| damped(x)).sum::<f64>()
+        self.factor.log_determinant()
+            + self.values.iter().map(|&x| damped(x)).sum::<f64>()
+            + self.turning.iter().map(|turning| turning.log_determinant).sum::<f64>()
     }
 }
 
@@ -108,17 +138,18 @@ impl Response {
             }
             slope
         };
-        Some(Response {
-            slopes: [sum(&|x| 1.0 - x * damped_slope(x)), sum(&damped_slope)],
-            factor: factor(n, modes.half_damped.col_as_slice(0))?,
-        })
+        let mut slopes = [sum(&|x| 1.0 - x * damped_slope(x)), sum(&damped_slope)];
+        modes.turning.iter().for_each(|turning| turning.add_slopes(&mut slopes));
+        Some(Response { slopes, factor: modes.half_damped.clone()?, turning: modes.turning.clone() })
     }
 
     /// Derivatives of the log-determinant by the parameters from `first` on.
     pub fn gradient(&self, sensitivity: &Sensitivity, first: usize) -> Mat<f64> {
         let [by_inertia, by_damping] = &self.slopes;
-        sensitivity.inertia.get(.., first..).transpose() * by_inertia
-            + sensitivity.damping.get(.., first..).transpose() * by_damping
+        let mut gradient = sensitivity.inertia.get(.., first..).transpose() * by_inertia
+            + sensitivity.damping.get(.., first..).transpose() * by_damping;
+        self.turning.iter().for_each(|turning| turning.add_gradient(first, &mut gradient));
+        gradient
     }
 
     /// Adds `weight` times tr(G⁻¹ S_k G⁻¹ S_l) to element (k, l − `first`), for all parameters k and those l
@@ -132,7 +163,10 @@ impl Response {
     ) {
         let columns = &sensitivity.inertia + &sensitivity.damping * faer::Scale(0.5);
         let moved = self.squeezed() * columns.get(.., first..);
-        matmul(curvature, Accum::Add, columns.transpose(), &moved, weight, Par::Seq);
+        matmul(&mut *curvature, Accum::Add, columns.transpose(), &moved, weight, Par::Seq);
+        for turning in &self.turning {
+            turning.add_curvature(&columns, first, weight, curvature);
+        }
     }
 
     /// The matrix that makes G⁻¹ S G⁻¹ of a packed S.
@@ -198,6 +232,8 @@ fn reduce(factor: &Cholesky, column: &mut [f64]) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::sensitivity::Turning;
+    use super::super::turning::Turned;
     use super::*;
     use faer::prelude::Solve;
     use rand::{RngExt, SeedableRng};
@@ -212,7 +248,21 @@ mod tests {
                 own + size * rng.random_range(-1.0..1.0)
             })
         };
-        Sensitivity { weight: 1.0, directions: n, inertia: columns(0.05), damping: columns(0.05) }
+        let (inertia, damping) = (columns(0.05), columns(0.05));
+        Sensitivity { weight: 1.0, directions: n, inertia, damping, turning: Vec::new() }
+    }
+
+    /// The same with two more parameters, of frictions that turn in three of the four rows that it stands
+    /// for.
+    fn turning(rng: &mut ChaCha8Rng, n: usize, parameters: usize) -> Sensitivity {
+        let mut with = sensitivity(rng, n, parameters);
+        for columns in [&mut with.inertia, &mut with.damping] {
+            columns.resize_with(packed(n), parameters + 2, |_, _| 0.0);
+        }
+        let slopes = (0..6).map(|_| rng.random_range(0.0..1.5)).collect();
+        let turned = Turned { joint: 0, parameters: vec![parameters, parameters + 1], slopes };
+        let toward = (0..n).map(|_| rng.random_range(-1.0..1.0)).collect();
+        Sensitivity { weight: 4.0, turning: vec![Turning { toward, turned }], ..with }
     }
 
     #[test]
@@ -221,20 +271,72 @@ mod tests {
         for n in [1, 2, 5] {
             let sensitivity = sensitivity(&mut rng, n, 4);
             let w = Mat::from_fn(4, 1, |k, _| [1.0, 0.4, -0.3, 0.2][k]);
-            let response = Response::of(&sensitivity, &w).unwrap();
-            let gradient = response.gradient(&sensitivity, 0);
+            let gradient = Response::of(&sensitivity, &w).unwrap().gradient(&sensitivity, 0);
             for parameter in 0..4 {
                 let at = |step: f64| {
                     let mut moved = w.clone();
                     moved[(parameter, 0)] += step;
                     log_determinant(&sensitivity, &moved).unwrap()
                 };
+                let (slope, found) = ((at(1e-5) - at(-1e-5)) / 2e-5, gradient[(parameter, 0)]);
+                assert!((slope - found).abs() < 1e-7, "{slope} {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn slopes_of_frictions_that_turn_are_those_of_the_log_determinant() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for n in [1, 2, 5] {
+            let sensitivity = turning(&mut rng, n, 4);
+            let w = Mat::from_fn(6, 1, |k, _| [1.0, 0.4, -0.3, 0.2, 0.7, 0.3][k]);
+            let response = Response::of(&sensitivity, &w).unwrap();
+            let gradient = response.gradient(&sensitivity, 0);
+            for parameter in 0..6 {
+                let at = |step: f64| {
+                    let mut moved = w.clone();
+                    moved[(parameter, 0)] += step;
+                    log_determinant(&sensitivity, &moved).unwrap()
+                };
                 let slope = (at(1e-5) - at(-1e-5)) / 2e-5;
+                let found = gradient[(parameter, 0)];
+                // How a joint moves under a torque is counted near enough by the parameters of the inertia.
+                let near = if parameter < 4 { 1e-2 } else { 1e-7 };
                 assert!(
-                    (slope - gradient[(parameter, 0)]).abs() < 1e-7,
-                    "{slope} {}",
-                    gradient[(parameter, 0)]
+                    (slope - found).abs() < near * (1.0 + slope.abs()),
+                    "{n} {parameter}: {slope} {found}"
                 );
+            }
+        }
+    }
+
+    /// The slopes' own slopes are the oracle, of the parameters of frictions that turn.
+    #[test]
+    fn a_curvature_of_frictions_that_turn_is_that_of_the_log_determinant() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        for n in [1, 2, 5] {
+            let sensitivity = turning(&mut rng, n, 4);
+            let w = Mat::from_fn(6, 1, |k, _| [1.0, 0.4, -0.3, 0.2, 0.7, 0.3][k]);
+            for first in [0, 4] {
+                let mut curvature = Mat::zeros(6, 6 - first);
+                let response = Response::of(&sensitivity, &w).unwrap();
+                response.add_curvature(&sensitivity, first, 1.0, &mut curvature);
+                for parameter in 4..6 {
+                    let at = |step: f64| {
+                        let mut moved = w.clone();
+                        moved[(parameter, 0)] += step;
+                        Response::of(&sensitivity, &moved).unwrap().gradient(&sensitivity, 0)
+                    };
+                    let slopes = (at(1e-5) - at(-1e-5)) * faer::Scale(-1.0 / 2e-5);
+                    for other in 0..6 {
+                        let (found, expected) = (curvature[(other, parameter - first)], slopes[(other, 0)]);
+                        let near = if other < 4 { 1e-2 } else { 1e-7 };
+                        assert!(
+                            (found - expected).abs() < near * (1.0 + expected.abs()),
+                            "{n} {parameter} {other}: {found} {expected}"
+                        );
+                    }
+                }
             }
         }
     }
@@ -282,6 +384,7 @@ mod tests {
                 directions: 1,
                 inertia: column(1.0),
                 damping: column(period_s * damping / inertia),
+                turning: Vec::new(),
             };
             // A = 1·w with w = inertia, and T·F in proportion.
             let response = Response::of(&sensitivity, &column(inertia)).unwrap();

@@ -6,9 +6,11 @@
 //! has. All that it asks of a candidate are its products with what the model leaves, with the model's columns
 //! and with itself.
 
+use super::evidence::periods_of_an_instant;
 use super::likelihood::column;
 use super::response::Response;
 use super::sensitivity::Sensitivity;
+use super::turning::turned;
 use super::{Evidence, MotionLikelihood, RowsAt, foresight};
 use crate::{EstimationError, MotionLog, Robot, RobotModel};
 use faer::linalg::matmul::matmul;
@@ -77,7 +79,7 @@ impl MotionLikelihood {
             })?;
             score.flush();
         }
-        self.add_determinants(robot, model, candidates, &foreseen, &evidence, &responses, &mut score)?;
+        self.add_determinants(robot, model, (candidates, logs), &foreseen, &evidence, &mut score)?;
         let ahead = foresight::looking_ahead(&design);
 
         let (mut own_score, mut cross) = (gradient, std::mem::replace(&mut score.cross, Mat::zeros(0, 0)));
@@ -110,18 +112,19 @@ impl MotionLikelihood {
     }
 
     /// The share of the log-determinants: of candidates that the noise of a period moves with the robot.
-    #[expect(clippy::too_many_arguments, reason = "it is the second half of the function above")]
     fn add_determinants(
         &self,
         robot: &Robot,
         model: &RobotModel,
-        candidates: &[EffectSpec],
+        (candidates, logs): (&[EffectSpec], &[MotionLog]),
         foreseen: &[bool],
         evidence: &Evidence,
-        responses: &[Option<Response>],
         score: &mut Score<'_>,
     ) -> Result<(), EstimationError> {
-        let moves = |index: &usize| score.range(*index).any(|parameter| !foreseen[score.present + parameter]);
+        let moves = |index: &usize| {
+            let turns = score.design.effects()[score.effects + index].turns_with().is_some();
+            turns || score.range(*index).any(|parameter| !foreseen[score.present + parameter])
+        };
         let moving: Vec<usize> = (0..candidates.len()).filter(moves).collect();
         if moving.is_empty() {
             return Ok(());
@@ -134,15 +137,22 @@ impl MotionLikelihood {
             Some(place) => foreseen[score.present + places[place]],
         };
         let present = score.present;
+        let mut w = column(&score.w);
+        w.resize_with(design.parameter_count(), 1, |_, _| 0.0);
+        let stills: Vec<bool> = (0..design.parameter_count()).map(still).collect();
+        let mut all_turned = Vec::with_capacity(evidence.instants().len());
+        for log in logs {
+            let stride = periods_of_an_instant(log.period_s, evidence.settings.instant_every_s);
+            all_turned.extend(turned(&design, &stills, log, stride)?);
+        }
         let mut curvature = Mat::zeros(design.parameter_count(), places.len());
         let every = self.score.instants_every.max(1);
-        let instants = || evidence.instants().iter().zip(responses).enumerate();
-        let all: f64 = instants().map(|(_, (instant, _))| instant.weight).sum();
-        let part: f64 =
-            instants().skip(every / 2).step_by(every).map(|(_, (instant, _))| instant.weight).sum();
-        for (index, (instant, response)) in instants() {
-            let Some(response) = response else { continue };
-            let sensitivity = Sensitivity::of(&design, instant, &self.standing_on, still)?;
+        let instants = || evidence.instants().iter();
+        let all: f64 = instants().map(|instant| instant.weight).sum();
+        let part: f64 = instants().skip(every / 2).step_by(every).map(|instant| instant.weight).sum();
+        for (index, (instant, turned)) in instants().zip(&all_turned).enumerate() {
+            let sensitivity = Sensitivity::of(&design, (instant, turned), &self.standing_on, still)?;
+            let Some(response) = Response::of(&sensitivity, &w) else { continue };
             let slopes = response.gradient(&sensitivity, present);
             for (place, &parameter) in places.iter().enumerate() {
                 score.gradient[parameter] -= sensitivity.weight * slopes[(place, 0)];

@@ -1,5 +1,6 @@
 //! How a noise in the torque moves the robot, as a linear function of the parameters.
 
+use super::turning::Turned;
 use super::{Evidence, Instant};
 use crate::EstimationError;
 use crate::free_directions::free_directions;
@@ -27,6 +28,16 @@ pub(super) struct Sensitivity {
     pub inertia: Mat<f64>,
     /// The same of each T·F_k.
     pub damping: Mat<f64>,
+    /// Frictions that turn with the velocity of a joint in the rows that it stands for.
+    pub turning: Vec<Turning>,
+}
+
+/// The frictions of a joint that turn with its velocity.
+pub(super) struct Turning {
+    /// What the joint moves by with each of the directions.
+    pub toward: Vec<f64>,
+    /// The slopes of the columns.
+    pub turned: Turned,
 }
 
 /// Numbers in the lower triangle of an n × n matrix.
@@ -49,10 +60,10 @@ pub(super) fn element(packed: &[f64], row: usize, column: usize) -> f64 {
 impl Sensitivity {
     /// By evaluating the design's columns around the instant: exact in the acceleration, in which they are
     /// linear. `standing` bodies do not move. Columns that `foreseen` has are of the period's beginning, and
-    /// do not move with its noise.
+    /// do not move with its noise, but for those that are `turned`.
     pub fn of(
         design: &Design,
-        instant: &Instant,
+        (instant, turned): (&Instant, &[Turned]),
         standing: &[usize],
         foreseen: impl Fn(usize) -> bool,
     ) -> Result<Self, EstimationError> {
@@ -92,7 +103,12 @@ impl Sensitivity {
                 }
             }
         }
-        Ok(Sensitivity { weight: instant.weight, directions: n, inertia, damping })
+        let along = |turned: &Turned| Turning {
+            toward: (0..n).map(|direction| directions[(turned.joint, direction)]).collect(),
+            turned: turned.clone(),
+        };
+        let turning = turned.iter().map(along).collect();
+        Ok(Sensitivity { weight: instant.weight, directions: n, inertia, damping, turning })
     }
 
     /// Those of all instants.
@@ -102,7 +118,11 @@ impl Sensitivity {
         standing: &[usize],
     ) -> Result<Vec<Self>, EstimationError> {
         let foreseen = |parameter: usize| evidence.is_foreseen(parameter);
-        evidence.instants().iter().map(|instant| Self::of(design, instant, standing, foreseen)).collect()
+        let of = |(index, instant): (usize, &Instant)| {
+            let turned = evidence.turned.get(index).map_or(&[][..], Vec::as_slice);
+            Self::of(design, (instant, turned), standing, foreseen)
+        };
+        evidence.instants().iter().enumerate().map(of).collect()
     }
 }
 

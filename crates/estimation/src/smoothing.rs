@@ -194,7 +194,7 @@ impl Belief<'_> {
         let (mut first, n) = (0, measured.joints);
         let mut stretches = Vec::new();
         for instant in instants(&block, measured.period_s, self.instant_every_s) {
-            let sensitivity = Sensitivity::of(self.design, &instant, &[], foreseen)?;
+            let sensitivity = Sensitivity::of(self.design, (&instant, &[]), &[], foreseen)?;
             let matrix = |columns: &Mat<f64>| -> Vec<f64> {
                 let packed = columns * &w;
                 let packed = packed.col_as_slice(0);

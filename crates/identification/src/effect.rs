@@ -105,6 +105,15 @@ pub trait Effect: Send + Sync {
     fn is_linear_in_motion(&self, _parameter: usize) -> bool {
         false
     }
+    /// The joint with whose velocity its columns turn, if they are functions of that of the same sample and
+    /// of nothing else that changes within a control period, in that joint's own torque. Coulomb friction is
+    /// one: what it takes of a period in which the joint reverses is its mean on the way from one velocity to
+    /// the next.
+    ///
+    /// None is always safe.
+    fn turns_with(&self) -> Option<usize> {
+        None
+    }
     /// Whether the columns of a sample depend on that sample and earlier ones alone. A rate of change of the
     /// torque depends on later samples too.
     fn is_causal(&self) -> bool {
