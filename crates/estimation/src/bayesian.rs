@@ -119,17 +119,7 @@ impl Evidence {
     /// What somebody else has reduced: rows of \[Φ f\] of logs that were conditioned, as `phiw identify` has
     /// them, `rate_hz` of each torque a second \[Hz\].
     pub fn of_factor(factor: GroupedFactor, rate_hz: Option<f64>) -> Self {
-        let settings = super::RowsAt::Stamps.into();
-        Evidence {
-            settings,
-            factor,
-            instants: Vec::new(),
-            turned: Vec::new(),
-            foreseen: Vec::new(),
-            rate_hz,
-            in_order: None,
-            encoder_logs: Vec::new(),
-        }
+        Evidence::of_rows(factor, rate_hz)
     }
 
     /// The same of rows that have been weighted and taken together, over these `parameters` of `count`: what

@@ -3,11 +3,12 @@
 use super::body_prior::BodyPrior;
 use super::concentrated_settings::ConcentratedSettings;
 use super::in_order::{Colour, InOrder};
-use super::likelihood::column;
+use super::likelihood::{column, under_own_friction};
 use super::misfit::{TorqueMisfit, misfits};
 use super::profile::{Curvature, Minimum, Profile};
 use super::sensitivity::Sensitivity;
 use super::smoothing::{Belief, Smoothed};
+use super::turning::Believed;
 use super::{Estimate, Estimator, Evidence};
 use crate::{EstimationError, MotionLog, RobotModel};
 use faer::prelude::Solve;
@@ -168,7 +169,8 @@ impl ConcentratedLikelihood {
         let smooth = |(index, log): (usize, &MotionLog)| belief.smoothed(log, index as u64);
         let smoothed: Result<Vec<_>, EstimationError> =
             evidence.encoder_logs.par_iter().enumerate().map(smooth).collect();
-        let mut again = Evidence::none(design, evidence.settings)?;
+        let believed = Believed { parameters: w.to_vec(), standing_on: Vec::new() };
+        let mut again = Evidence::none(design, evidence.settings)?.believing(believed);
         let mut spread: Option<Spread> = None;
         for smoothed in smoothed? {
             let Some(Smoothed { most_likely, drawn, spread: factors, noise }) = smoothed else {
@@ -197,7 +199,7 @@ impl ConcentratedLikelihood {
         w: &[f64],
         look: impl Fn(&Parts<'_>, &[Colour], &[f64]) -> Result<T, EstimationError>,
     ) -> Result<T, EstimationError> {
-        let mut own: Option<Evidence> = None;
+        let mut own = evidence.under(design, w, &self.standing_on)?;
         for _ in 0..DRAWS {
             let parts = self.parts(design, own.as_ref().unwrap_or(evidence))?;
             let colours = parts.colours(self, w);
@@ -330,6 +332,44 @@ impl Estimator for ConcentratedLikelihood {
         present: &RobotModel,
         present_parameters: &[f64],
     ) -> Result<Estimate, EstimationError> {
+        under_own_friction(design, evidence, &self.standing_on, present_parameters, |evidence, start| {
+            self.minimum(design, evidence, present, start)
+        })
+    }
+
+    fn misfit(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        parameters: &[f64],
+    ) -> Result<Option<Vec<TorqueMisfit>>, EstimationError> {
+        self.looked_at(design, evidence, parameters, |parts, colours, _| {
+            misfits(parts.in_order, parameters, colours).map(Some)
+        })
+    }
+
+    /// At the colours that the parameters themselves leave, so that models are compared each at its best.
+    fn negative_log_likelihood(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        parameters: &[f64],
+    ) -> Result<Option<f64>, EstimationError> {
+        let under = evidence.under(design, parameters, &self.standing_on)?;
+        let parts = self.parts(design, under.as_ref().unwrap_or(evidence))?;
+        let colours = parts.colours(self, parameters);
+        Ok(Some(parts.profile(self, &colours)?.likelihood(&column(parameters))))
+    }
+}
+
+impl ConcentratedLikelihood {
+    fn minimum(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        present: &RobotModel,
+        present_parameters: &[f64],
+    ) -> Result<Estimate, EstimationError> {
         let parts = self.parts(design, evidence)?;
         let rigid = design.base().count();
         let mut x = parts.prior.start(&present.standard, &present_parameters[rigid..]);
@@ -404,28 +444,5 @@ impl Estimator for ConcentratedLikelihood {
             covariance,
             noise: Some(colours.iter().zip(&std_of_noise).map(TorqueNoise::of_news).collect()),
         })
-    }
-
-    fn misfit(
-        &self,
-        design: &Design,
-        evidence: &Evidence,
-        parameters: &[f64],
-    ) -> Result<Option<Vec<TorqueMisfit>>, EstimationError> {
-        self.looked_at(design, evidence, parameters, |parts, colours, _| {
-            misfits(parts.in_order, parameters, colours).map(Some)
-        })
-    }
-
-    /// At the colours that the parameters themselves leave, so that models are compared each at its best.
-    fn negative_log_likelihood(
-        &self,
-        design: &Design,
-        evidence: &Evidence,
-        parameters: &[f64],
-    ) -> Result<Option<f64>, EstimationError> {
-        let parts = self.parts(design, evidence)?;
-        let colours = parts.colours(self, parameters);
-        Ok(Some(parts.profile(self, &colours)?.likelihood(&column(parameters))))
     }
 }

@@ -3,7 +3,7 @@
 use super::foresight;
 use super::in_order::InOrder;
 use super::stored::StoredFactor;
-use super::turning::{Turned, turned};
+use super::turning::{Believed, Turned, TurningColumns, turned};
 use crate::{EstimationError, MotionLog};
 use phiw_identification::fitting::accumulate;
 use phiw_identification::{Design, Fold, IdentificationError};
@@ -74,7 +74,7 @@ pub struct Evidence {
     pub(super) factor: GroupedFactor,
     pub(super) instants: Vec<Instant>,
     /// For each instant, the slopes of what turns with a velocity in the periods that it stands for.
-    pub(super) turned: Vec<Vec<Turned>>,
+    pub(super) turned: Vec<Turned>,
     /// Of which parameters the columns are those of the periods' beginnings; none of them if it is empty.
     pub(super) foreseen: Vec<bool>,
     /// Rows a second of each torque \[Hz\]; none where they are as dense as those of the motions.
@@ -84,6 +84,10 @@ pub struct Evidence {
     /// Logs of encoders, where rows are asked for in order: their motion is found again under a better
     /// belief.
     pub(super) encoder_logs: Vec<MotionLog>,
+    /// Other logs of a robot with frictions that turn: how is found again under a better belief.
+    turning_logs: Vec<MotionLog>,
+    /// Under which belief it was found.
+    believed: Option<Believed>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -93,7 +97,7 @@ struct StoredEvidence {
     factor: StoredFactor,
     instants: Vec<Instant>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    turned: Vec<Vec<Turned>>,
+    turned: Vec<Turned>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     foreseen: Vec<bool>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -102,15 +106,37 @@ struct StoredEvidence {
     rows_in_order: Option<StoredFactor>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     encoder_logs: Vec<MotionLog>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    turning_logs: Vec<MotionLog>,
 }
 
 impl From<Evidence> for StoredEvidence {
     fn from(evidence: Evidence) -> Self {
-        let Evidence { settings, factor, instants, turned, foreseen, rate_hz, in_order, encoder_logs } =
-            evidence;
+        let Evidence {
+            settings,
+            factor,
+            instants,
+            turned,
+            foreseen,
+            rate_hz,
+            in_order,
+            encoder_logs,
+            turning_logs,
+            ..
+        } = evidence;
         let rows_in_order = in_order.map(|in_order| StoredFactor::from(in_order.factor()));
         let factor = StoredFactor::from(&factor);
-        StoredEvidence { settings, factor, instants, turned, foreseen, rate_hz, rows_in_order, encoder_logs }
+        StoredEvidence {
+            settings,
+            factor,
+            instants,
+            turned,
+            foreseen,
+            rate_hz,
+            rows_in_order,
+            encoder_logs,
+            turning_logs,
+        }
     }
 }
 
@@ -127,11 +153,23 @@ impl TryFrom<StoredEvidence> for Evidence {
             rate_hz,
             rows_in_order,
             encoder_logs,
+            turning_logs,
         } = stored;
         let in_order: Option<GroupedFactor> = rows_in_order.map(TryInto::try_into).transpose()?;
         let in_order = in_order.map(InOrder::of_factor);
         let factor = factor.try_into()?;
-        Ok(Evidence { settings, factor, instants, turned, foreseen, rate_hz, in_order, encoder_logs })
+        Ok(Evidence {
+            settings,
+            factor,
+            instants,
+            turned,
+            foreseen,
+            rate_hz,
+            in_order,
+            encoder_logs,
+            turning_logs,
+            believed: None,
+        })
     }
 }
 
@@ -157,8 +195,62 @@ impl Evidence {
         }
         let asked = settings.in_order && settings.rows_at == RowsAt::Periods;
         let in_order = asked.then(|| InOrder::none(design)).transpose()?;
-        let (instants, turned, encoder_logs) = (Vec::new(), Vec::new(), Vec::new());
-        Ok(Evidence { settings, factor, instants, turned, foreseen, rate_hz: None, in_order, encoder_logs })
+        Ok(Evidence {
+            settings,
+            factor,
+            instants: Vec::new(),
+            turned: Vec::new(),
+            foreseen,
+            rate_hz: None,
+            in_order,
+            encoder_logs: Vec::new(),
+            turning_logs: Vec::new(),
+            believed: None,
+        })
+    }
+
+    /// Rows that somebody else has reduced.
+    pub(super) fn of_rows(factor: GroupedFactor, rate_hz: Option<f64>) -> Self {
+        Evidence {
+            settings: RowsAt::Stamps.into(),
+            factor,
+            instants: Vec::new(),
+            turned: Vec::new(),
+            foreseen: Vec::new(),
+            rate_hz,
+            in_order: None,
+            encoder_logs: Vec::new(),
+            turning_logs: Vec::new(),
+            believed: None,
+        }
+    }
+
+    /// The same evidence with how frictions turn within a period as it is under `parameters` of the design;
+    /// none where no friction turns, or its logs are of encoders, which are smoothed under a belief anyway.
+    ///
+    /// # Errors
+    /// The design is not that of the evidence.
+    pub(super) fn under(
+        &self,
+        design: &Design,
+        parameters: &[f64],
+        standing_on: &[usize],
+    ) -> Result<Option<Self>, EstimationError> {
+        if self.turning_logs.is_empty() {
+            return Ok(None);
+        }
+        let believed = Believed { parameters: parameters.to_vec(), standing_on: standing_on.to_vec() };
+        let mut again = Evidence::none(design, self.settings)?.believing(believed);
+        for log in &self.turning_logs {
+            again.add(design, log)?;
+        }
+        again.rate_hz = self.rate_hz;
+        Ok(Some(again))
+    }
+
+    /// The same, in which logs are looked at under a belief; it has none yet.
+    pub(super) fn believing(self, believed: Believed) -> Self {
+        Evidence { believed: Some(believed), ..self }
     }
 
     /// The same for a robot that moves without noise: all columns are those of a period's mean motion.
@@ -184,20 +276,27 @@ impl Evidence {
         self.instants.extend(instants(&block, measured.period_s, self.settings.instant_every_s));
         let stride = periods_of_an_instant(measured.period_s, self.settings.instant_every_s);
         if !self.foreseen.is_empty() {
-            self.turned.extend(turned(design, &self.foreseen, measured, stride)?);
+            let believed = self.believed.as_ref();
+            self.turned.extend(turned(design, &self.foreseen, (measured, stride), believed)?);
         }
         let factor = match self.foreseen.as_slice() {
             [] => grouped_factor(design, block)?,
-            foreseen => foresight::factor(design, foreseen, measured)?,
+            foreseen => foresight::factor(design, foreseen, (measured, self.believed.as_ref()))?,
         };
         self.factor = self.factor.merge(&factor)?;
         if let Some(in_order) = &mut self.in_order {
-            in_order.add(design, &self.foreseen, measured)?;
+            in_order.add(design, &self.foreseen, (measured, self.believed.as_ref()))?;
             match measured.readings.is_some() && (is_first || !self.encoder_logs.is_empty()) {
                 true => self.encoder_logs.push(measured.clone()),
                 // Of others the motion was measured: all logs are taken as they are.
                 false => self.encoder_logs.clear(),
             }
+        }
+        let has_all = (is_first || !self.turning_logs.is_empty()) && self.encoder_logs.is_empty();
+        if has_all && !TurningColumns::of(design, &self.foreseen)?.columns().is_empty() {
+            self.turning_logs.push(measured.clone());
+        } else {
+            self.turning_logs.clear();
         }
         Ok(())
     }

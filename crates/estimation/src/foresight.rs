@@ -6,7 +6,7 @@
 //! velocity (dry friction) nearly so ([`super::turning`]). Any other column is taken of what was known when
 //! the period began: then its product with the noise is nothing on average, whatever its form.
 
-use super::turning::TurningColumns;
+use super::turning::{Believed, TurningColumns};
 use crate::{EstimationError, MotionLog};
 use phiw_identification::{Design, Effect};
 use phiw_regressor::factor::FactorBuilder;
@@ -46,7 +46,7 @@ fn of_parameters(design: &Design, asked: impl Fn(&dyn Effect, usize) -> bool) ->
 pub(super) fn rows(
     design: &Design,
     foreseen: &[bool],
-    measured: &MotionLog,
+    (measured, believed): (&MotionLog, Option<&Believed>),
     mut take: impl FnMut(&[f64]) -> Result<(), EstimationError>,
 ) -> Result<(), EstimationError> {
     let (mut block, mut begun) = (measured.over_periods(), measured.begun());
@@ -57,8 +57,8 @@ pub(super) fn rows(
     begun_scratch.begin(&begun)?;
     let mut row = vec![0.0; design.evaluation_width()];
     let mut begun_row = row.clone();
-    let turning = TurningColumns::of(design, foreseen);
-    let means = turning.means((&begun, &block), measured)?;
+    let turning = TurningColumns::of(design, foreseen)?;
+    let means = turning.means((&begun, &block), measured, believed)?;
     for sample in 0..block.len() {
         scratch.evaluate(&block, sample, &mut row)?;
         begun_scratch.evaluate(&begun, sample, &mut begun_row)?;
@@ -83,7 +83,7 @@ pub(super) fn rows(
 pub(super) fn factor(
     design: &Design,
     foreseen: &[bool],
-    measured: &MotionLog,
+    measured: (&MotionLog, Option<&Believed>),
 ) -> Result<GroupedFactor, EstimationError> {
     let mut builders: Vec<FactorBuilder> =
         design.rows().iter().map(|layout| FactorBuilder::new(layout.range.len())).collect();

@@ -5,6 +5,7 @@
 //! rows for any ρ. What the log's torque has beside the command ([`MotionLog::commands`]) is a column of its
 //! own, so that how much of it the motion felt can be asked later, too.
 
+use super::turning::Believed;
 use crate::{EstimationError, Evidence, MotionLog, foresight};
 use faer::Mat;
 use phiw_identification::Design;
@@ -90,7 +91,7 @@ impl InOrder {
         &mut self,
         design: &Design,
         foreseen: &[bool],
-        measured: &MotionLog,
+        (measured, believed): (&MotionLog, Option<&Believed>),
     ) -> Result<(), EstimationError> {
         let limits: Vec<f64> =
             (0..measured.joints).map(|joint| design.tree().joint(joint).limits.effort).collect();
@@ -109,7 +110,7 @@ impl InOrder {
         let mut before: Vec<Vec<f64>> =
             self.factor.groups().iter().map(|group| vec![0.0; group.factor.columns() / 2]).collect();
         let (mut index, mut joined) = (0, Vec::new());
-        foresight::rows(design, foreseen, measured, |row| {
+        foresight::rows(design, foreseen, (measured, believed), |row| {
             let here = counted[index];
             let follows = index > 0 && counted[index - 1] + 1 == here;
             index += 1;
@@ -262,11 +263,11 @@ mod tests {
         let [q, qd, tau, command] = [0.1, 0.3, 0.5, 0.8].map(wave);
         let log = MotionLog { joints, period_s: 0.01, q, qd, tau, command, ..MotionLog::default() };
         let mut in_order = InOrder::none(&design)?;
-        in_order.add(&design, &[], &log)?;
+        in_order.add(&design, &[], (&log, None))?;
         let colour = Colour { correlation: 0.6, felt: 0.3 };
         let whitened = in_order.whitened(&vec![colour; design.rows().len()])?;
         let mut all = Vec::new();
-        foresight::rows(&design, &vec![false; design.parameter_count()], &log, |row| {
+        foresight::rows(&design, &vec![false; design.parameter_count()], (&log, None), |row| {
             all.push(row.to_vec());
             Ok(())
         })?;

@@ -31,6 +31,7 @@ mod smoothing;
 mod stored;
 mod torques;
 mod turning;
+mod turning_path;
 mod turning_response;
 
 pub use bayesian::{BayesianLeastSquares, LogNoise};

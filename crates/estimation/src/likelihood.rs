@@ -115,6 +115,55 @@ impl Estimator for MotionLikelihood {
         present: &RobotModel,
         present_parameters: &[f64],
     ) -> Result<Estimate, EstimationError> {
+        under_own_friction(design, evidence, &self.standing_on, present_parameters, |evidence, start| {
+            self.minimum(design, evidence, present, start)
+        })
+    }
+
+    fn torque_noise(&self) -> Option<&[f64]> {
+        Some(&self.torque_noise)
+    }
+
+    fn negative_log_likelihood(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        parameters: &[f64],
+    ) -> Result<Option<f64>, EstimationError> {
+        let under = evidence.under(design, parameters, &self.standing_on)?;
+        let problem = self.problem(design, under.as_ref().unwrap_or(evidence))?;
+        Ok(Some(problem.cost(&column(parameters))))
+    }
+}
+
+/// Times that an estimate is made anew with frictions that turn as the last one says.
+const FRICTION_ROUNDS: usize = 3;
+
+/// An estimate whose frictions turn within a period as it says itself: `estimate` from evidence and
+/// parameters to begin with, made again until it does.
+pub(super) fn under_own_friction(
+    design: &Design,
+    evidence: &Evidence,
+    standing_on: &[usize],
+    present_parameters: &[f64],
+    mut estimate: impl FnMut(&Evidence, &[f64]) -> Result<Estimate, EstimationError>,
+) -> Result<Estimate, EstimationError> {
+    let mut found = estimate(evidence, present_parameters)?;
+    for _ in 0..FRICTION_ROUNDS {
+        let Some(under) = evidence.under(design, &found.parameters, standing_on)? else { break };
+        found = estimate(&under, &found.parameters)?;
+    }
+    Ok(found)
+}
+
+impl MotionLikelihood {
+    fn minimum(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        present: &RobotModel,
+        present_parameters: &[f64],
+    ) -> Result<Estimate, EstimationError> {
         let problem = self.problem(design, evidence)?;
         let mut w = column(present_parameters);
         if problem.log_determinants(&w).is_none() {
@@ -156,19 +205,6 @@ impl Estimator for MotionLikelihood {
             covariance,
             noise: Some(self.torque_noise.iter().map(|&std| TorqueNoise::white(std)).collect()),
         })
-    }
-
-    fn torque_noise(&self) -> Option<&[f64]> {
-        Some(&self.torque_noise)
-    }
-
-    fn negative_log_likelihood(
-        &self,
-        design: &Design,
-        evidence: &Evidence,
-        parameters: &[f64],
-    ) -> Result<Option<f64>, EstimationError> {
-        Ok(Some(self.problem(design, evidence)?.cost(&column(parameters))))
     }
 }
 

@@ -7,7 +7,7 @@
 //! of friction alone, log(1 + x/2), is then so far off that a thousand rows take the difference for friction.
 
 use super::sensitivity::{Sensitivity, element, packed, place};
-use super::turning_response::{JointResponse, TurningResponse};
+use super::turning_response::{TurningJoint, TurningResponse};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par, Side};
 use phiw_dynamics::dense::{Cholesky, dot};
@@ -45,8 +45,8 @@ pub(super) struct Response {
     pub slopes: [Mat<f64>; 2],
     /// Cholesky's factor of A + ½T·F, near enough for a curvature.
     pub factor: Cholesky,
-    /// Of each joint with frictions that turn.
-    turning: Vec<TurningResponse>,
+    /// Of frictions that turn.
+    turning: Option<TurningResponse>,
 }
 
 /// Inertia and damping of an instant as their eigenvectors see them: Cholesky's factor of A, x and the
@@ -57,8 +57,8 @@ pub(super) struct Modes {
     vectors: Mat<f64>,
     /// Cholesky's factor of A + ½T·F; none where that is no inertia.
     half_damped: Option<Cholesky>,
-    /// Of each joint with frictions that turn.
-    turning: Vec<TurningResponse>,
+    /// Of frictions that turn.
+    turning: Option<TurningResponse>,
 }
 
 impl Modes {
@@ -74,17 +74,22 @@ impl Modes {
         let eigen = Mat::from_fn(n, n, entry).self_adjoint_eigen(Side::Lower).ok()?;
         let values = (0..n).map(|mode| eigen.S()[mode]).collect();
         let vectors = eigen.U().to_owned();
-        let mut modes = Modes { factor, values, vectors, half_damped, turning: Vec::new() };
-        for turning in &sensitivity.turning {
-            let (response, moved) = modes.joint(&turning.toward)?;
-            modes.turning.push(TurningResponse::of(turning, response, moved, w, sensitivity.weight));
+        let mut modes = Modes { factor, values, vectors, half_damped, turning: None };
+        let turning = &sensitivity.turning;
+        if !turning.turned.slopes.is_empty() {
+            let mut joints = Vec::with_capacity(turning.toward.len());
+            for toward in &turning.toward {
+                let (velocity, moved) = modes.joint(toward)?;
+                joints.push(TurningJoint { velocity, moved, toward: toward.clone() });
+            }
+            modes.turning = TurningResponse::of(&turning.turned, joints, w, sensitivity.weight);
         }
         Some(modes)
     }
 
-    /// What a joint that moves by `toward` with each direction does under a torque of one, and G⁻¹ of that;
-    /// none where G is no inertia.
-    fn joint(&self, toward: &[f64]) -> Option<(JointResponse, Vec<f64>)> {
+    /// By how much a torque of one on a joint that moves by `toward` with each direction changes its velocity
+    /// in a period, over the period, and G⁻¹ of that; none where G is no inertia.
+    pub fn joint(&self, toward: &[f64]) -> Option<(f64, Vec<f64>)> {
         let mut reduced = toward.to_vec();
         self.factor.solve_lower(&mut reduced);
         let along = |mode: usize| dot(self.vectors.col_as_slice(mode), &reduced).powi(2);
@@ -93,16 +98,15 @@ impl Modes {
         let half_damped = self.half_damped.as_ref()?;
         let mut moved = toward.to_vec();
         half_damped.solve_lower(&mut moved);
-        let acceleration = dot(&moved, &moved);
         half_damped.solve_upper(&mut moved);
-        Some((JointResponse { velocity, acceleration }, moved))
+        Some((velocity, moved))
     }
 
     /// That of a row, in the mean of those that the instant stands for.
     pub fn log_determinant(&self) -> f64 {
         self.factor.log_determinant()
             + self.values.iter().map(|&x| damped(x)).sum::<f64>()
-            + self.turning.iter().map(|turning| turning.log_determinant).sum::<f64>()
+            + self.turning.as_ref().map_or(0.0, |turning| turning.log_determinant)
     }
 }
 
@@ -139,7 +143,9 @@ impl Response {
             slope
         };
         let mut slopes = [sum(&|x| 1.0 - x * damped_slope(x)), sum(&damped_slope)];
-        modes.turning.iter().for_each(|turning| turning.add_slopes(&mut slopes));
+        if let Some(turning) = &modes.turning {
+            turning.add_slopes(&mut slopes);
+        }
         Some(Response { slopes, factor: modes.half_damped.clone()?, turning: modes.turning.clone() })
     }
 
@@ -148,7 +154,9 @@ impl Response {
         let [by_inertia, by_damping] = &self.slopes;
         let mut gradient = sensitivity.inertia.get(.., first..).transpose() * by_inertia
             + sensitivity.damping.get(.., first..).transpose() * by_damping;
-        self.turning.iter().for_each(|turning| turning.add_gradient(first, &mut gradient));
+        if let Some(turning) = &self.turning {
+            turning.add_gradient(first, &mut gradient);
+        }
         gradient
     }
 
@@ -164,7 +172,7 @@ impl Response {
         let columns = &sensitivity.inertia + &sensitivity.damping * faer::Scale(0.5);
         let moved = self.squeezed() * columns.get(.., first..);
         matmul(&mut *curvature, Accum::Add, columns.transpose(), &moved, weight, Par::Seq);
-        for turning in &self.turning {
+        if let Some(turning) = &self.turning {
             turning.add_curvature(&columns, first, weight, curvature);
         }
     }
@@ -249,7 +257,7 @@ mod tests {
             })
         };
         let (inertia, damping) = (columns(0.05), columns(0.05));
-        Sensitivity { weight: 1.0, directions: n, inertia, damping, turning: Vec::new() }
+        Sensitivity { weight: 1.0, directions: n, inertia, damping, turning: Turning::default() }
     }
 
     /// The same with two more parameters, of frictions that turn in three of the four rows that it stands
@@ -260,9 +268,9 @@ mod tests {
             columns.resize_with(packed(n), parameters + 2, |_, _| 0.0);
         }
         let slopes = (0..6).map(|_| rng.random_range(0.0..1.5)).collect();
-        let turned = Turned { joint: 0, parameters: vec![parameters, parameters + 1], slopes };
-        let toward = (0..n).map(|_| rng.random_range(-1.0..1.0)).collect();
-        Sensitivity { weight: 4.0, turning: vec![Turning { toward, turned }], ..with }
+        let turned = Turned { columns: vec![(parameters, 0), (parameters + 1, n - 1)], slopes };
+        let toward = (0..n).map(|joint| (0..n).map(|k| f64::from(u8::from(k == joint))).collect()).collect();
+        Sensitivity { weight: 4.0, turning: Turning { toward, turned }, ..with }
     }
 
     #[test]
@@ -328,7 +336,8 @@ mod tests {
                         Response::of(&sensitivity, &moved).unwrap().gradient(&sensitivity, 0)
                     };
                     let slopes = (at(1e-5) - at(-1e-5)) * faer::Scale(-1.0 / 2e-5);
-                    for other in 0..6 {
+                    // Of two joints the curvature is left out.
+                    for other in (0..6).filter(|other| *other < 4 || *other == parameter) {
                         let (found, expected) = (curvature[(other, parameter - first)], slopes[(other, 0)]);
                         let near = if other < 4 { 1e-2 } else { 1e-7 };
                         assert!(
@@ -384,7 +393,7 @@ mod tests {
                 directions: 1,
                 inertia: column(1.0),
                 damping: column(period_s * damping / inertia),
-                turning: Vec::new(),
+                turning: Turning::default(),
             };
             // A = 1·w with w = inertia, and T·F in proportion.
             let response = Response::of(&sensitivity, &column(inertia)).unwrap();

@@ -10,7 +10,7 @@ use super::evidence::periods_of_an_instant;
 use super::likelihood::column;
 use super::response::Response;
 use super::sensitivity::Sensitivity;
-use super::turning::turned;
+use super::turning::{Believed, turned};
 use super::{Evidence, MotionLikelihood, RowsAt, foresight};
 use crate::{EstimationError, MotionLog, Robot, RobotModel};
 use faer::linalg::matmul::matmul;
@@ -59,8 +59,12 @@ impl MotionLikelihood {
             evidence.add(&present, log)?;
         }
         let precision: Vec<f64> = self.torque_noise.iter().map(|noise| noise.powi(-2)).collect();
-        let problem = self.problem(&present, &evidence)?;
         let w = model.parameters(robot)?;
+        if let Some(under) = evidence.under(&present, &w, &self.standing_on)? {
+            evidence = under;
+        }
+        let believed = Believed { parameters: w.clone(), standing_on: self.standing_on.clone() };
+        let problem = self.problem(&present, &evidence)?;
         let nothing = || Ok(vec![None; candidates.len()]);
         let (gradient, responses) = problem.gradient(&column(&w));
         if responses.iter().any(Option::is_none) {
@@ -73,7 +77,7 @@ impl MotionLikelihood {
         let mut score = Score::new(&design, present.effects().len(), w, precision);
         let foreseen = foresight::foreseen(&design);
         for log in logs {
-            foresight::rows(&design, &foreseen, log, |row| {
+            foresight::rows(&design, &foreseen, (log, Some(&believed)), |row| {
                 score.add(row);
                 Ok(())
             })?;
@@ -137,13 +141,14 @@ impl MotionLikelihood {
             Some(place) => foreseen[score.present + places[place]],
         };
         let present = score.present;
+        let believed = Believed { parameters: score.w.clone(), standing_on: self.standing_on.clone() };
         let mut w = column(&score.w);
         w.resize_with(design.parameter_count(), 1, |_, _| 0.0);
         let stills: Vec<bool> = (0..design.parameter_count()).map(still).collect();
         let mut all_turned = Vec::with_capacity(evidence.instants().len());
         for log in logs {
             let stride = periods_of_an_instant(log.period_s, evidence.settings.instant_every_s);
-            all_turned.extend(turned(&design, &stills, log, stride)?);
+            all_turned.extend(turned(&design, &stills, (log, stride), Some(&believed))?);
         }
         let mut curvature = Mat::zeros(design.parameter_count(), places.len());
         let every = self.score.instants_every.max(1);

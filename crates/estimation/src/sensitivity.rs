@@ -28,14 +28,15 @@ pub(super) struct Sensitivity {
     pub inertia: Mat<f64>,
     /// The same of each T·F_k.
     pub damping: Mat<f64>,
-    /// Frictions that turn with the velocity of a joint in the rows that it stands for.
-    pub turning: Vec<Turning>,
+    /// Frictions that turn with the velocities of joints in the rows that it stands for.
+    pub turning: Turning,
 }
 
-/// The frictions of a joint that turn with its velocity.
+/// Frictions that turn with the velocities of joints.
+#[derive(Default)]
 pub(super) struct Turning {
-    /// What the joint moves by with each of the directions.
-    pub toward: Vec<f64>,
+    /// For each joint, what it moves by with each of the directions; empty where nothing turns.
+    pub toward: Vec<Vec<f64>>,
     /// The slopes of the columns.
     pub turned: Turned,
 }
@@ -63,7 +64,7 @@ impl Sensitivity {
     /// do not move with its noise, but for those that are `turned`.
     pub fn of(
         design: &Design,
-        (instant, turned): (&Instant, &[Turned]),
+        (instant, turned): (&Instant, &Turned),
         standing: &[usize],
         foreseen: impl Fn(usize) -> bool,
     ) -> Result<Self, EstimationError> {
@@ -103,11 +104,11 @@ impl Sensitivity {
                 }
             }
         }
-        let along = |turned: &Turned| Turning {
-            toward: (0..n).map(|direction| directions[(turned.joint, direction)]).collect(),
-            turned: turned.clone(),
+        let toward = |joint: usize| (0..n).map(|direction| directions[(joint, direction)]).collect();
+        let turning = match turned.columns.is_empty() {
+            true => Turning::default(),
+            false => Turning { toward: (0..joints).map(toward).collect(), turned: turned.clone() },
         };
-        let turning = turned.iter().map(along).collect();
         Ok(Sensitivity { weight: instant.weight, directions: n, inertia, damping, turning })
     }
 
@@ -118,9 +119,9 @@ impl Sensitivity {
         standing: &[usize],
     ) -> Result<Vec<Self>, EstimationError> {
         let foreseen = |parameter: usize| evidence.is_foreseen(parameter);
+        let nothing = Turned::default();
         let of = |(index, instant): (usize, &Instant)| {
-            let turned = evidence.turned.get(index).map_or(&[][..], Vec::as_slice);
-            Self::of(design, (instant, turned), standing, foreseen)
+            Self::of(design, (instant, evidence.turned.get(index).unwrap_or(&nothing)), standing, foreseen)
         };
         evidence.instants().iter().enumerate().map(of).collect()
     }

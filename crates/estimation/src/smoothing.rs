@@ -18,6 +18,7 @@ use super::foresight;
 use super::in_order::Colour;
 use super::readings::CUBIC;
 use super::sensitivity::{Sensitivity, element};
+use super::turning::{Believed, Turned};
 use crate::{EstimationError, MotionLog};
 use faer::Mat;
 use phiw_dynamics::dense::Cholesky;
@@ -194,7 +195,7 @@ impl Belief<'_> {
         let (mut first, n) = (0, measured.joints);
         let mut stretches = Vec::new();
         for instant in instants(&block, measured.period_s, self.instant_every_s) {
-            let sensitivity = Sensitivity::of(self.design, (&instant, &[]), &[], foreseen)?;
+            let sensitivity = Sensitivity::of(self.design, (&instant, &Turned::default()), &[], foreseen)?;
             let matrix = |columns: &Mat<f64>| -> Vec<f64> {
                 let packed = columns * &w;
                 let packed = packed.col_as_slice(0);
@@ -219,7 +220,8 @@ impl Belief<'_> {
         let nothing = vec![false; self.w.len()];
         let foreseen = if self.foreseen.is_empty() { &nothing } else { self.foreseen };
         let mut asked = Vec::with_capacity(commands.len());
-        foresight::rows(self.design, foreseen, measured, |row| {
+        let believed = Believed { parameters: self.w.to_vec(), standing_on: Vec::new() };
+        foresight::rows(self.design, foreseen, (measured, Some(&believed)), |row| {
             for (layout, colour) in self.design.rows().iter().zip(self.colours) {
                 let logged = row[layout.range.end - 1];
                 let command = commands[asked.len()];

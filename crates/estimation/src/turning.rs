@@ -1,36 +1,52 @@
 //! What a friction that turns with the velocity takes of a period in which it turns.
 //!
 //! Within a period the noise moves the joint, and near a reversal it decides when the velocity passes
-//! through zero. The friction of the period is the mean of its column c over the way from the velocity v₀ at
-//! its beginning to the velocity v₁ at its end, c̄ = ∫₀¹ c(v₀ + s·(v₁ − v₀)) ds, the acceleration taken for
-//! constant. v₁ has the period's noise in it, and so has c̄: the likelihood of the motion counts it by the
-//! slope ∂c̄/∂v₁ = (c(v₁) − c̄)/(v₁ − v₀) ([`super::turning_response`]), as it counts the acceleration by the
-//! inertia.
+//! through zero. The friction of the period is the mean c̄ of its column along the way of the velocity from v₀
+//! at the beginning to v₁ at the end ([`super::turning_path`]): at a constant acceleration, or slowed by the
+//! friction that the joint is believed to have, so that it may come to rest. v₁ has the period's noise in it,
+//! and so has c̄: the likelihood of the motion counts it by the slope dc̄/dv₁ ([`super::turning_response`]), as
+//! it counts the acceleration by the inertia.
 //!
 //! The slope is the larger the less the velocity changes, and where it changes by no more than the error with
 //! which encoders tell it, it is the error's own: a joint that rests would seem to rub. In such a period the
 //! column is that of its beginning, and has no slope.
 
+use super::evidence::instants;
+use super::likelihood::column;
+use super::response::Modes;
+use super::sensitivity::Sensitivity;
+use super::turning_path::{Way, velocities};
 use crate::{EstimationError, MotionLog};
 use phiw_identification::Design;
 use phiw_telemetry::Block;
 use serde::{Deserialize, Serialize};
+use std::rc::Rc;
 
-/// Parts of the way between which the column is looked at; even, for Simpson's rule.
-const PARTS: usize = 8;
-const SAMPLES: usize = PARTS + 1;
 /// Change of a velocity within a period from which on it is one, in standard deviations of one that encoders
 /// tell. Independent errors alone change it by 1.4 of them, and in one period of 2000 by so many.
 const CERTAIN: f64 = 5.0;
 /// Change of a velocity that is rounding \[rad/s, m/s\].
 const LEAST_CHANGE: f64 = 1e-9;
 
+/// Time between two instants at which it is looked at how a believed friction changes a velocity \[s\].
+const INSTANT_EVERY_S: f64 = 0.4;
+
 /// The columns of a design that turn with the velocity.
 pub(super) struct TurningColumns<'a> {
     design: &'a Design,
-    /// Those effects alone.
-    part: Design,
     columns: Vec<TurningColumn>,
+    /// Velocities of the columns' tables.
+    velocities: Vec<f64>,
+    /// Of which parameters the columns are those of the periods' beginnings.
+    foreseen: &'a [bool],
+}
+
+/// What a joint is believed to be, and so to do in a period: parameters of the design's first columns, and
+/// bodies that do not move.
+#[derive(Clone, Debug)]
+pub(super) struct Believed {
+    pub parameters: Vec<f64>,
+    pub standing_on: Vec<usize>,
 }
 
 /// One of them.
@@ -41,8 +57,8 @@ pub(super) struct TurningColumn {
     pub joint: usize,
     /// Its place in an evaluation of the design.
     pub place: usize,
-    /// Its place in an evaluation of the part.
-    place_in_part: usize,
+    /// The column at the velocities of a table.
+    table: Vec<f64>,
 }
 
 /// The mean of a column over a period and its slope by the velocity at the end.
@@ -52,19 +68,12 @@ pub(super) struct Mean {
     pub slope: f64,
 }
 
-/// Simpson's weight of a sample.
-fn weight(sample: usize) -> f64 {
-    let times = match sample {
-        0 | PARTS => 1.0,
-        sample if sample % 2 == 1 => 4.0,
-        _ => 2.0,
-    };
-    times / (3 * PARTS) as f64
-}
-
 impl<'a> TurningColumns<'a> {
     /// Those of a design's `foreseen` parameters; none of them where there is no noise to foresee.
-    pub fn of(design: &'a Design, foreseen: &[bool]) -> Self {
+    ///
+    /// # Errors
+    /// None that a design can cause.
+    pub fn of(design: &'a Design, foreseen: &'a [bool]) -> Result<Self, EstimationError> {
         let is_foreseen = |effect: usize| {
             let parameters = design.effect_parameters(effect);
             let is_foreseen = parameters.clone().all(|own| foreseen.get(own).copied().unwrap_or(false));
@@ -73,8 +82,23 @@ impl<'a> TurningColumns<'a> {
         let chosen: Vec<usize> = (0..design.effects().len())
             .filter(|&effect| design.effects()[effect].turns_with().is_some() && is_foreseen(effect))
             .collect();
+        let mut turning = TurningColumns { design, columns: Vec::new(), velocities: velocities(), foreseen };
+        if chosen.is_empty() {
+            return Ok(turning);
+        }
+        // They are functions of one velocity alone: all joints move with the same.
         let part = design.part(&chosen, false);
-        let mut columns = Vec::new();
+        let joints = design.tree().joint_count();
+        let still = vec![0.0; joints * turning.velocities.len()];
+        let moving = turning.velocities.iter().flat_map(|&velocity| std::iter::repeat_n(velocity, joints));
+        let signals = [still.clone(), moving.collect(), still];
+        let block = Block::unfiltered(joints, vec![0.0; turning.velocities.len()], signals, Vec::new());
+        let mut scratch = part.scratch();
+        scratch.begin(&block)?;
+        let mut evaluations = vec![vec![0.0; part.evaluation_width()]; turning.velocities.len()];
+        for (sample, evaluation) in evaluations.iter_mut().enumerate() {
+            scratch.evaluate(&block, sample, evaluation)?;
+        }
         for (own, &effect) in chosen.iter().enumerate() {
             let Some(joint) = design.effects()[effect].turns_with() else { continue };
             let parameters = design.effect_parameters(effect).zip(part.effect_parameters(own));
@@ -84,13 +108,17 @@ impl<'a> TurningColumns<'a> {
                     let column = layout.parameters.iter().position(|own| *own == parameter)?;
                     Some(layout.range.start + column)
                 };
-                let places = place(design, parameter).zip(place(&part, parameter_of_part));
-                let column =
-                    |(place, place_in_part)| TurningColumn { parameter, joint, place, place_in_part };
-                columns.extend(places.map(column));
+                let Some((place, place_in_part)) =
+                    place(design, parameter).zip(place(&part, parameter_of_part))
+                else {
+                    continue;
+                };
+                let factor = design.logged_factors()[joint];
+                let table = evaluations.iter().map(|evaluation| factor * evaluation[place_in_part]).collect();
+                turning.columns.push(TurningColumn { parameter, joint, place, table });
             }
         }
-        TurningColumns { design, part, columns }
+        Ok(turning)
     }
 
     /// The columns, in the order of the means.
@@ -100,7 +128,8 @@ impl<'a> TurningColumns<'a> {
 
     /// Their means over each period of a log, one period after the other, those of one beside each other;
     /// none where the velocity does not change for certain. `begun` and `mean` are the periods of the log as
-    /// they began and as they were on average.
+    /// they began and as they were on average. Where nothing is `believed`, no friction slows a joint within
+    /// a period.
     ///
     /// # Errors
     /// The log is not of this robot.
@@ -108,45 +137,91 @@ impl<'a> TurningColumns<'a> {
         &self,
         (begun, mean): (&Block, &Block),
         measured: &MotionLog,
+        believed: Option<&Believed>,
     ) -> Result<Vec<Option<Mean>>, EstimationError> {
         if self.columns.is_empty() {
             return Ok(Vec::new());
         }
         let (joints, period_s) = (measured.joints, measured.period_s);
         let least = least_changes(measured);
-        let mut signals = [0; 3].map(|_| Vec::with_capacity(SAMPLES * mean.q.len()));
-        for row in (0..mean.len()).map(|sample| mean.row(sample)) {
-            for sample in 0..SAMPLES {
-                let place_s = period_s * sample as f64 / PARTS as f64;
-                signals[0].extend_from_slice(&mean.q[row.clone()]);
-                signals[1].extend(row.clone().map(|index| begun.qd[index] + place_s * mean.qdd[index]));
-                signals[2].extend_from_slice(&mean.qdd[row.clone()]);
-            }
+        let frictions = believed.map(|believed| self.frictions(believed)).unwrap_or_default();
+        let changes = match believed {
+            Some(believed) => self.changes_by_torque(mean, period_s, believed)?,
+            None => Vec::new(),
+        };
+        let mut of_joints = vec![Vec::new(); joints];
+        for (index, column) in self.columns.iter().enumerate() {
+            of_joints[column.joint].push(index);
         }
-        // Nothing here is a function of time.
-        let block = Block::unfiltered(joints, vec![0.0; SAMPLES * mean.len()], signals, Vec::new());
-        let mut scratch = self.part.scratch();
-        scratch.begin(&block)?;
-        let mut evaluation = vec![0.0; self.part.evaluation_width()];
-        let mut values = vec![0.0; self.columns.len()];
-        let mut means = Vec::with_capacity(mean.len() * self.columns.len());
+        let mut way = Way::default();
+        let mut means = vec![None; mean.len() * self.columns.len()];
         for row in 0..mean.len() {
-            values.fill(0.0);
-            for sample in 0..SAMPLES {
-                scratch.evaluate(&block, SAMPLES * row + sample, &mut evaluation)?;
-                for (value, column) in values.iter_mut().zip(&self.columns) {
-                    *value += weight(sample) * evaluation[column.place_in_part];
+            let of_row = &mut means[row * self.columns.len()..(row + 1) * self.columns.len()];
+            for (joint, own) in of_joints.iter().enumerate().filter(|(_, own)| !own.is_empty()) {
+                let at = mean.row(row).start + joint;
+                let change = period_s * mean.qdd[at];
+                if change.abs() <= least[joint] {
+                    continue;
+                }
+                let friction = frictions.get(joint).and_then(Option::as_deref);
+                let scale = changes.get(row).map_or(0.0, |changes: &Rc<[f64]>| changes[joint]);
+                way.lay([begun.qd[at], begun.qd[at] + change], &self.velocities, friction, scale);
+                for &index in own {
+                    let [value, slope] = way.mean_of(&self.velocities, &self.columns[index].table);
+                    of_row[index] = Some(Mean { value, slope });
                 }
             }
-            means.extend(values.iter().zip(&self.columns).map(|(&value, column)| {
-                let change = period_s * mean.qdd[mean.row(row)][column.joint];
-                let factor = self.design.logged_factors()[column.joint];
-                let slope = (evaluation[column.place_in_part] - value) / change;
-                let is_certain = change.abs() > least[column.joint];
-                is_certain.then_some(Mean { value: factor * value, slope: factor * slope })
-            }));
         }
         Ok(means)
+    }
+
+    /// The friction that each joint is believed to have \[N·m, N\] at the velocities of the tables; none
+    /// where it is believed to have none.
+    fn frictions(&self, believed: &Believed) -> Vec<Option<Vec<f64>>> {
+        let mut frictions = vec![None; self.design.tree().joint_count()];
+        for column in &self.columns {
+            let value = believed.parameters.get(column.parameter).copied().unwrap_or_default();
+            if value != 0.0 {
+                let friction: &mut Vec<f64> =
+                    frictions[column.joint].get_or_insert_with(|| vec![0.0; self.velocities.len()]);
+                friction.iter_mut().zip(&column.table).for_each(|(sum, own)| *sum += value * own);
+            }
+        }
+        // What pushes along is no friction: near nothing it may come out so.
+        for friction in frictions.iter_mut().flatten() {
+            let power = |(friction, velocity): (&f64, &f64)| friction * velocity;
+            if friction.iter().zip(&self.velocities).map(power).sum::<f64>() < 0.0 {
+                friction.fill(0.0);
+            }
+        }
+        frictions
+    }
+
+    /// By how much a torque of one changes the velocity of each joint within a period, for each period.
+    fn changes_by_torque(
+        &self,
+        mean: &Block,
+        period_s: f64,
+        believed: &Believed,
+    ) -> Result<Vec<Rc<[f64]>>, EstimationError> {
+        let mut w = column(&believed.parameters);
+        w.resize_with(self.design.parameter_count(), 1, |_, _| 0.0);
+        let foreseen = |parameter: usize| self.foreseen.get(parameter).copied().unwrap_or(false);
+        let joints = self.design.tree().joint_count();
+        let each = Turned { columns: (0..joints).map(|joint| (0, joint)).collect(), slopes: Vec::new() };
+        let mut changes = Vec::with_capacity(mean.len());
+        for instant in instants(mean, period_s, INSTANT_EVERY_S) {
+            let sensitivity =
+                Sensitivity::of(self.design, (&instant, &each), &believed.standing_on, foreseen)?;
+            let modes = Modes::of(&sensitivity, &w);
+            let change = |joint: usize| {
+                let (velocity, _) = modes.as_ref()?.joint(&sensitivity.turning.toward[joint])?;
+                Some(period_s * velocity)
+            };
+            let own: Rc<[f64]> = (0..joints).map(|joint| change(joint).unwrap_or_default()).collect();
+            changes.extend(std::iter::repeat_n(own, instant.weight as usize));
+        }
+        Ok(changes)
     }
 }
 
@@ -162,59 +237,47 @@ fn least_changes(measured: &MotionLog) -> Vec<f64> {
     (0..measured.joints).map(of_joint).collect()
 }
 
-/// Slopes of one joint's columns in the periods in which there are any.
+/// Slopes of the columns that turn in the periods in which any does.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Turned {
-    pub joint: usize,
-    /// The parameters of the columns.
-    pub parameters: Vec<usize>,
-    /// T·∂c̄/∂v₁ of each of them, `[period × parameter]` \[unit of the column × s²/rad, s²/m\].
+    /// The parameters of the columns, and the joint that each turns with.
+    pub columns: Vec<(usize, usize)>,
+    /// T·dc̄/dv₁ of each of them, `[period × column]` \[unit of the column × s²/rad, s²/m\].
     pub slopes: Vec<f64>,
 }
 
-/// The slopes of a log, for each stretch of `stride` periods those of every joint that has some.
+/// The slopes of a log, for each stretch of `stride` periods.
 ///
 /// # Errors
 /// The log is not of this robot.
 pub(super) fn turned(
     design: &Design,
     foreseen: &[bool],
-    measured: &MotionLog,
-    stride: usize,
-) -> Result<Vec<Vec<Turned>>, EstimationError> {
-    let turning = TurningColumns::of(design, foreseen);
+    (measured, stride): (&MotionLog, usize),
+    believed: Option<&Believed>,
+) -> Result<Vec<Turned>, EstimationError> {
+    let turning = TurningColumns::of(design, foreseen)?;
     let (mut begun, mut mean) = (measured.begun(), measured.over_periods());
     let stretches = mean.len().div_ceil(stride);
     if turning.columns.is_empty() {
-        return Ok(vec![Vec::new(); stretches]);
+        return Ok(vec![Turned::default(); stretches]);
     }
     design.correct(&mut begun);
     design.correct(&mut mean);
-    let means = turning.means((&begun, &mean), measured)?;
-    let mut joints: Vec<usize> = turning.columns.iter().map(|column| column.joint).collect();
-    joints.sort_unstable();
-    joints.dedup();
-    let mut all = Vec::with_capacity(stretches);
-    for stretch in means.chunks(stride * turning.columns.len()) {
-        let mut of_stretch = Vec::new();
-        for &joint in &joints {
-            let own: Vec<usize> =
-                (0..turning.columns.len()).filter(|&column| turning.columns[column].joint == joint).collect();
-            let parameters = own.iter().map(|&column| turning.columns[column].parameter).collect();
-            let mut slopes = Vec::new();
-            for period in stretch.chunks_exact(turning.columns.len()) {
-                let of_column = |&column: &usize| period[column].map_or(0.0, |mean| mean.slope);
-                if own.iter().any(|column| of_column(column) != 0.0) {
-                    slopes.extend(own.iter().map(of_column).map(|slope| measured.period_s * slope));
-                }
-            }
-            if !slopes.is_empty() {
-                of_stretch.push(Turned { joint, parameters, slopes });
+    let means = turning.means((&begun, &mean), measured, believed)?;
+    let columns: Vec<(usize, usize)> =
+        turning.columns.iter().map(|column| (column.parameter, column.joint)).collect();
+    let of_stretch = |stretch: &[Option<Mean>]| {
+        let mut slopes = Vec::new();
+        for period in stretch.chunks_exact(columns.len()) {
+            let slope = |mean: &Option<Mean>| mean.map_or(0.0, |mean| measured.period_s * mean.slope);
+            if period.iter().any(|mean| slope(mean) != 0.0) {
+                slopes.extend(period.iter().map(slope));
             }
         }
-        all.push(of_stretch);
-    }
-    Ok(all)
+        Turned { columns: columns.clone(), slopes }
+    };
+    Ok(means.chunks(stride * columns.len()).map(of_stretch).collect())
 }
 
 #[cfg(test)]
@@ -248,25 +311,9 @@ mod tests {
     }
 
     fn means_of(design: &Design, log: &MotionLog) -> Vec<Option<Mean>> {
-        let turning = TurningColumns::of(design, &foreseen(design));
-        turning.means((&log.begun(), &log.over_periods()), log).unwrap()
-    }
-
-    /// The integral of tanh(v/w) is known.
-    #[test]
-    fn a_mean_is_the_integral_over_the_way_and_its_slope_that_by_the_end() {
-        let exact = |from: f64, to: f64| {
-            let integral = |v: f64| WIDTH * (v / WIDTH).cosh().ln();
-            (integral(to) - integral(from)) / (to - from)
-        };
-        let design = design();
-        for (from, to) in [(0.1, 0.3), (0.1, -0.1), (-0.02, 0.08), (0.0, 0.01), (-0.3, -0.2), (0.06, -0.01)] {
-            let way = 0.5 * PERIOD_S * (from + to);
-            let mean = means_of(&design, &log(vec![0.2, 0.2 + way], vec![from, to]))[0].unwrap();
-            let slope = (exact(from, to + 1e-6) - exact(from, to - 1e-6)) / 2e-6;
-            assert!((mean.value - exact(from, to)).abs() < 5e-3, "{from} {to}: {mean:?}");
-            assert!((mean.slope - slope).abs() < 0.1, "{from} {to}: {mean:?}, {slope}");
-        }
+        let foreseen = foreseen(design);
+        let turning = TurningColumns::of(design, &foreseen).unwrap();
+        turning.means((&log.begun(), &log.over_periods()), log, None).unwrap()
     }
 
     /// Its velocity turns with the error of a measurement: each turn was evidence of friction.

@@ -2,111 +2,149 @@
 //!
 //! A torque of one that is held over a period T changes the velocity of a joint at its end by T·ρ, ρ =
 //! nᵀA⁻¹φ₁(X)n with what the joint moves by with each direction, n, and X and φ₁ as in [`super::response`]. A
-//! friction that turns adds y = Σ w_p·ρ·T·dc̄_p/dv₁ to what that joint asks for, so that the determinant of the
-//! period is larger by the factor 1 + y. Of joints that turn in the same period each counts by itself: what
-//! one's friction does to another's acceleration is of second order. That ρ changes with the inertia is
-//! counted by (A + ½T·F)⁻¹, near enough for what is itself a part.
+//! friction that turns adds δ = Σ w_p·T·dc̄_p/dv₁ to what its joint asks for, so that the determinant of the
+//! period is larger by the factor det(1 + H·Δ): Δ has the δ of each joint, and H what a torque on one does to
+//! the velocity of another, NᵀG⁻¹N with G = A + ½T·F, scaled to have the ρ on its diagonal. A joint that sticks
+//! has a large δ: of those that stick the determinant tells the friction, and of the inertia only what the
+//! others feel. How the scale follows from the inertia is not counted in the derivatives.
 
-use super::sensitivity::{Turning, packed, place};
-use faer::Mat;
+use super::sensitivity::{packed, place};
+use super::turning::Turned;
+use faer::prelude::Solve;
+use faer::{Mat, Side};
 use phiw_dynamics::dense::dot;
 
-/// Below this factor the logarithm goes on as a straight line: a friction that pushes along is none, but a
-/// search may pass there.
-const LEAST_FACTOR: f64 = 0.1;
-/// A larger factor counts as this one. Where friction would change the velocity by far more than it changed,
-/// the joint stuck and did not pass through zero with a constant acceleration; what is known of the noise is
-/// then no more.
-const LARGEST_FACTOR: f64 = 3.0;
-/// What a joint does in a period under a torque of one, over the period.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct JointResponse {
+/// δ is never less than so many times −1/ρ: a friction that pushes along is none, but a search may pass there.
+const LEAST: f64 = 0.9;
+
+/// A joint, as the inertia of an instant has it.
+pub(super) struct TurningJoint {
     /// ρ.
     pub velocity: f64,
-    /// nᵀG⁻¹n.
-    pub acceleration: f64,
+    /// G⁻¹n.
+    pub moved: Vec<f64>,
+    /// n.
+    pub toward: Vec<f64>,
 }
 
-/// The share of one joint, in the mean of the rows that an instant stands for.
+/// The share of frictions that turn, in the mean of the rows that an instant stands for.
 #[derive(Clone)]
 pub(super) struct TurningResponse {
-    /// Mean of log(1 + y).
+    /// Mean of log det(1 + H·Δ).
     pub log_determinant: f64,
-    /// G⁻¹n over the root of nᵀG⁻¹n.
-    moved: Vec<f64>,
-    /// Mean of ∂log(1 + y)/∂ρ times ρ.
-    by_velocity: f64,
+    /// G⁻¹N of the joints that turn, scaled, `[direction × joint]`.
+    moved: Mat<f64>,
+    /// Its derivatives by H.
+    by_response: Mat<f64>,
+    /// Parameters of the columns.
     parameters: Vec<usize>,
+    /// Place of each column's joint among those that turn.
+    joints: Vec<usize>,
     /// Its derivatives by the parameters.
     by_parameter: Vec<f64>,
-    /// Its derivatives by a parameter and by the inertia along `moved`, both.
-    across: Vec<f64>,
-    /// Less its second derivatives by the parameters, `[parameter × parameter]`.
-    curvature: Vec<f64>,
+    /// Less its derivatives by a parameter and by H, for each parameter.
+    across: Vec<Mat<f64>>,
+    /// Less its second derivatives by the parameters of the same joint, `[column × column]`.
+    curvature: Mat<f64>,
 }
 
 impl TurningResponse {
-    /// Of the frictions of a joint under parameters `w`; the instant stands for `weight` rows. `moved` is
-    /// G⁻¹n.
-    pub fn of(
-        turning: &Turning,
-        response: JointResponse,
-        mut moved: Vec<f64>,
-        w: &Mat<f64>,
-        weight: f64,
-    ) -> Self {
-        let JointResponse { velocity, acceleration } = response;
-        moved.iter_mut().for_each(|moved| *moved /= acceleration.sqrt());
-        let turned = &turning.turned;
-        let count = turned.parameters.len();
-        let own: Vec<f64> = turned.parameters.iter().map(|&parameter| w[(parameter, 0)]).collect();
-        let mut response = TurningResponse {
+    /// Of frictions under parameters `w`; the instant stands for `weight` rows. None where H is no response.
+    pub fn of(turned: &Turned, joints: Vec<TurningJoint>, w: &Mat<f64>, weight: f64) -> Option<Self> {
+        let mut present: Vec<usize> = turned.columns.iter().map(|(_, joint)| *joint).collect();
+        present.sort_unstable();
+        present.dedup();
+        let (count, own) = (present.len(), turned.columns.len());
+        let scales: Vec<f64> = present
+            .iter()
+            .map(|&joint| {
+                let TurningJoint { velocity, moved, toward } = &joints[joint];
+                (velocity / dot(moved, toward)).sqrt()
+            })
+            .collect();
+        let moved = Mat::from_fn(joints[present[0]].moved.len(), count, |row, joint| {
+            scales[joint] * joints[present[joint]].moved[row]
+        });
+        let response = Mat::from_fn(count, count, |row, column| {
+            scales[row] * dot(&joints[present[row]].toward, moved.col_as_slice(column))
+        });
+        let inertia = response.llt(Side::Lower).ok()?.solve(Mat::<f64>::identity(count, count));
+        let place = |(_, joint): &(usize, usize)| present.partition_point(|own| own < joint);
+        let mut sum = TurningResponse {
             log_determinant: 0.0,
             moved,
-            by_velocity: 0.0,
-            parameters: turned.parameters.clone(),
-            by_parameter: vec![0.0; count],
-            across: vec![0.0; count],
-            curvature: vec![0.0; count * count],
+            by_response: Mat::zeros(count, count),
+            parameters: turned.columns.iter().map(|(parameter, _)| *parameter).collect(),
+            joints: turned.columns.iter().map(place).collect(),
+            by_parameter: vec![0.0; own],
+            across: vec![Mat::zeros(count, count); own],
+            curvature: Mat::zeros(own, own),
         };
-        let mut slopes = vec![0.0; count];
-        for row in turned.slopes.chunks_exact(count.max(1)) {
-            slopes.iter_mut().zip(row).for_each(|(slope, own)| *slope = velocity * own);
-            let part = dot(&slopes, &own);
-            let factor = 1.0 + part;
-            if factor > LARGEST_FACTOR {
-                response.log_determinant += LARGEST_FACTOR.ln() / weight;
-                continue;
+        let base: f64 = log_determinant(&inertia)?;
+        let mut delta = vec![0.0; count];
+        for slopes in turned.slopes.chunks_exact(own) {
+            delta.fill(0.0);
+            for ((slope, &parameter), &joint) in slopes.iter().zip(&sum.parameters).zip(&sum.joints) {
+                delta[joint] += slope * w[(parameter, 0)];
             }
-            let beyond = (LEAST_FACTOR - factor).max(0.0);
-            let factor = factor.max(LEAST_FACTOR);
-            let share = 1.0 / (weight * factor);
-            response.log_determinant += (factor.ln() - beyond / factor) / weight;
-            response.by_velocity += share * part;
-            for (row, left) in slopes.iter().enumerate() {
-                response.by_parameter[row] += share * left;
-                response.across[row] += share * left / factor;
-                let curvature = &mut response.curvature[row * count..(row + 1) * count];
-                for (curvature, right) in curvature.iter_mut().zip(&slopes) {
-                    *curvature += share * left * right / factor;
+            for (joint, delta) in delta.iter_mut().enumerate() {
+                *delta = delta.max(-LEAST * inertia[(joint, joint)]);
+            }
+            let stiff = Mat::from_fn(count, count, |row, column| {
+                inertia[(row, column)] + if row == column { delta[row] } else { 0.0 }
+            });
+            let Ok(factor) = stiff.llt(Side::Lower) else { continue };
+            // K = (H⁻¹ + Δ)⁻¹, and R = K·H⁻¹.
+            let inverse = factor.solve(Mat::<f64>::identity(count, count));
+            let diagonal = (0..count).map(|joint| factor.L()[(joint, joint)].ln()).sum::<f64>();
+            sum.log_determinant += (2.0 * diagonal - base) / weight;
+            let through = &inverse * &inertia;
+            for column in 0..count {
+                for row in 0..count {
+                    let own = if row == column { delta[row] } else { 0.0 };
+                    sum.by_response[(row, column)] +=
+                        (own - delta[row] * inverse[(row, column)] * delta[column]) / weight;
+                }
+            }
+            for (index, slope) in slopes.iter().enumerate().filter(|(_, slope)| **slope != 0.0) {
+                let joint = sum.joints[index];
+                let response = inverse[(joint, joint)];
+                sum.by_parameter[index] += slope * response / weight;
+                let across = &mut sum.across[index];
+                for column in 0..count {
+                    let share = slope * through[(joint, column)] / weight;
+                    for row in 0..count {
+                        across[(row, column)] += share * through[(joint, row)];
+                    }
+                }
+                for (other, right) in slopes.iter().enumerate().filter(|(_, slope)| **slope != 0.0) {
+                    if sum.joints[other] == joint {
+                        sum.curvature[(index, other)] += slope * right * response * response / weight;
+                    }
                 }
             }
         }
-        response
+        Some(sum)
+    }
+
+    /// M·S·Mᵀ of a symmetric S over the joints, packed.
+    fn packed(&self, over_joints: &Mat<f64>) -> Mat<f64> {
+        let whole = &self.moved * over_joints * self.moved.transpose();
+        let mut column = Mat::zeros(packed(whole.nrows()), 1);
+        for row in 0..whole.nrows() {
+            for other in 0..=row {
+                let scale = if row == other { 1.0 } else { std::f64::consts::SQRT_2 };
+                column[(place(row, other), 0)] = scale * whole[(row, other)];
+            }
+        }
+        column
     }
 
     /// Adds its derivatives by the inertia and by the damping to packed slopes.
     pub fn add_slopes(&self, slopes: &mut [Mat<f64>; 2]) {
-        for (slope, damped) in slopes.iter_mut().zip([1.0, 0.5]) {
-            let share = damped * self.by_velocity;
-            let slope = slope.col_as_slice_mut(0);
-            for row in 0..self.moved.len() {
-                for column in 0..=row {
-                    let scale = if row == column { 1.0 } else { std::f64::consts::SQRT_2 };
-                    slope[place(row, column)] -= share * scale * self.moved[row] * self.moved[column];
-                }
-            }
-        }
+        let by_inertia = self.packed(&self.by_response);
+        slopes[0] -= &by_inertia;
+        slopes[1] -= by_inertia * faer::Scale(0.5);
     }
 
     /// Adds its derivatives by the parameters from `first` on that it has through no inertia.
@@ -118,34 +156,30 @@ impl TurningResponse {
         }
     }
 
-    /// Adds `weight` times less its second derivatives, but those by the inertia alone, which another
-    /// determinant outweighs. `columns` are the packed G of each parameter.
+    /// Adds `weight` times less its second derivatives: those by two parameters of a joint, and by one and
+    /// the inertia. Another determinant outweighs those by the inertia alone. `columns` are the packed G of
+    /// each parameter.
     pub fn add_curvature(&self, columns: &Mat<f64>, first: usize, weight: f64, curvature: &mut Mat<f64>) {
-        let mut along = Mat::zeros(packed(self.moved.len()), 1);
-        for row in 0..self.moved.len() {
-            for column in 0..=row {
-                let scale = if row == column { 1.0 } else { std::f64::consts::SQRT_2 };
-                along[(place(row, column), 0)] = scale * self.moved[row] * self.moved[column];
-            }
-        }
-        // nᵀG⁻¹·G_k·G⁻¹n over nᵀG⁻¹n of each parameter: by what share it lessens what the joint does.
-        let lessened = columns.transpose() * along;
-        let count = self.parameters.len();
         for (own, &parameter) in self.parameters.iter().enumerate() {
-            let across = weight * self.across[own];
-            for other in 0..lessened.nrows() {
+            let across = columns.transpose() * self.packed(&self.across[own]);
+            for other in 0..across.nrows() {
                 if let Some(place) = other.checked_sub(first) {
-                    curvature[(parameter, place)] += across * lessened[(other, 0)];
+                    curvature[(parameter, place)] += weight * across[(other, 0)];
                 }
                 if let Some(place) = parameter.checked_sub(first) {
-                    curvature[(other, place)] += across * lessened[(other, 0)];
+                    curvature[(other, place)] += weight * across[(other, 0)];
                 }
             }
-            for (&other, value) in self.parameters.iter().zip(&self.curvature[own * count..]) {
+            for (index, &other) in self.parameters.iter().enumerate() {
                 if let Some(place) = other.checked_sub(first) {
-                    curvature[(parameter, place)] += weight * value;
+                    curvature[(parameter, place)] += weight * self.curvature[(own, index)];
                 }
             }
         }
     }
+}
+
+fn log_determinant(matrix: &Mat<f64>) -> Option<f64> {
+    let factor = matrix.llt(Side::Lower).ok()?;
+    Some((0..matrix.nrows()).map(|index| 2.0 * factor.L()[(index, index)].ln()).sum())
 }

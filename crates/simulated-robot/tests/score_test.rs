@@ -64,8 +64,8 @@ fn what_it_foretells_is_what_a_fit_saves() {
         let grown = test.fitted(&arm.robot, &declared, &[spec], &logs).unwrap();
         let saved =
             negative_log_likelihood(&arm, &declared, &logs) - negative_log_likelihood(&arm, &grown, &logs);
-        // Where friction turns within a period, the first of it tells most: the score is careful.
-        let least = if kind == "coulomb_friction" { 0.35 } else { 0.75 };
+        // A joint comes to rest by a friction that is there, and then tells more of it.
+        let least = if kind == "coulomb_friction" { 0.2 } else { 0.75 };
         let is_near = |foretold: f64, found: f64| (least..1.25).contains(&(foretold / found));
         assert!(is_near(foretold.gain, saved), "{kind}: {} foretold, {saved} saved", foretold.gain);
         let fitted = &grown.effects.last().unwrap().parameters;
@@ -109,7 +109,7 @@ fn frictions_of_all_joints(arm: &Arm) -> Vec<PlantEffect> {
 
 /// Friction was taken of the velocity at the beginning of each period, and the noise turns it within the
 /// period. Signs that turn over 0.1 rad/s were best, friction of some joints came out below nothing, and the
-/// error of the rigid body's parameters was 0.026 where it is 0.016.
+/// error of the rigid body's parameters was 0.026 where it is 0.015.
 #[test]
 fn frictions_that_the_noise_turns_within_a_period_are_friction() {
     let arm = Arm::new(0.02);
@@ -120,16 +120,16 @@ fn frictions_that_the_noise_turns_within_a_period_are_friction() {
         let specs: Vec<EffectSpec> = arm.tree.joint_names().map(spec).collect();
         test.fitted(&arm.robot, &arm.truth, &specs, &logs).unwrap()
     };
-    let model = fitted(0.03);
+    let model = fitted(0.01);
     let own = negative_log_likelihood(&arm, &model, &logs);
-    for width in [0.003, 0.1] {
+    for width in [0.003, 0.03] {
         let other = negative_log_likelihood(&arm, &fitted(width), &logs);
-        assert!(other > own + 20.0, "{width} rad/s: {other}, and {own}");
+        assert!(other > own + 100.0, "{width} rad/s: {other}, and {own}");
     }
     for (joint, effect) in model.effects[arm.robot.declared().len()..].iter().enumerate() {
         let truth = 0.01 * arm.tree.joint(joint).limits.effort;
         let found = effect.parameters[0];
-        assert!(found > 0.2 * truth && found < 1.5 * truth, "{joint}: {found}, {truth} N·m");
+        assert!((found / truth - 1.0).abs() < 0.25, "{joint}: {found}, {truth} N·m");
     }
     let rigid = arm.robot.design(arm.robot.declared()).unwrap().base().count();
     let (found, truth) = (model.parameters(&arm.robot).unwrap(), arm.truth.parameters(&arm.robot).unwrap());
