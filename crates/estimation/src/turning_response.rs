@@ -38,8 +38,6 @@ pub(super) struct TurningResponse {
     by_response: Mat<f64>,
     /// Parameters of the columns.
     parameters: Vec<usize>,
-    /// Place of each column's joint among those that turn.
-    joints: Vec<usize>,
     /// Its derivatives by the parameters.
     by_parameter: Vec<f64>,
     /// Less its derivatives by a parameter and by H, for each parameter.
@@ -70,21 +68,24 @@ impl TurningResponse {
         });
         let inertia = response.llt(Side::Lower).ok()?.solve(Mat::<f64>::identity(count, count));
         let place = |(_, joint): &(usize, usize)| present.partition_point(|own| own < joint);
+        let places: Vec<usize> = turned.columns.iter().map(place).collect();
+        let places = &places;
         let mut sum = TurningResponse {
             log_determinant: 0.0,
             moved,
             by_response: Mat::zeros(count, count),
             parameters: turned.columns.iter().map(|(parameter, _)| *parameter).collect(),
-            joints: turned.columns.iter().map(place).collect(),
             by_parameter: vec![0.0; own],
             across: vec![Mat::zeros(count, count); own],
             curvature: Mat::zeros(own, own),
         };
+        let of_joint = |joint: usize| (0..own).filter(move |index| places[*index] == joint);
+        let of_joints: Vec<Vec<usize>> = (0..count).map(|joint| of_joint(joint).collect()).collect();
         let base: f64 = log_determinant(&inertia)?;
         let mut delta = vec![0.0; count];
         for slopes in turned.slopes.chunks_exact(own) {
             delta.fill(0.0);
-            for ((slope, &parameter), &joint) in slopes.iter().zip(&sum.parameters).zip(&sum.joints) {
+            for ((slope, &parameter), &joint) in slopes.iter().zip(&sum.parameters).zip(places) {
                 delta[joint] += slope * w[(parameter, 0)];
             }
             for (joint, delta) in delta.iter_mut().enumerate() {
@@ -107,7 +108,7 @@ impl TurningResponse {
                 }
             }
             for (index, slope) in slopes.iter().enumerate().filter(|(_, slope)| **slope != 0.0) {
-                let joint = sum.joints[index];
+                let joint = places[index];
                 let response = inverse[(joint, joint)];
                 sum.by_parameter[index] += slope * response / weight;
                 let across = &mut sum.across[index];
@@ -117,10 +118,8 @@ impl TurningResponse {
                         across[(row, column)] += share * through[(joint, row)];
                     }
                 }
-                for (other, right) in slopes.iter().enumerate().filter(|(_, slope)| **slope != 0.0) {
-                    if sum.joints[other] == joint {
-                        sum.curvature[(index, other)] += slope * right * response * response / weight;
-                    }
+                for &other in &of_joints[joint] {
+                    sum.curvature[(index, other)] += slope * slopes[other] * response * response / weight;
                 }
             }
         }
@@ -156,18 +155,25 @@ impl TurningResponse {
         }
     }
 
-    /// Adds `weight` times less its second derivatives: those by two parameters of a joint, and by one and
-    /// the inertia. Another determinant outweighs those by the inertia alone. `columns` are the packed G of
+    /// Adds `weight` times less its second derivatives, for all parameters and those from `first` on: those by
+    /// two parameters of a joint, and by one and the inertia. Another determinant outweighs those by the inertia alone. `columns` are the packed G of
     /// each parameter.
     pub fn add_curvature(&self, columns: &Mat<f64>, first: usize, weight: f64, curvature: &mut Mat<f64>) {
         for (own, &parameter) in self.parameters.iter().enumerate() {
-            let across = columns.transpose() * self.packed(&self.across[own]);
-            for other in 0..across.nrows() {
+            let across = self.packed(&self.across[own]);
+            // What is wanted is a parameter before `first` with one from there on, or all with all.
+            let others = match parameter.checked_sub(first) {
+                Some(_) if first > 0 => 0..first,
+                Some(_) => 0..columns.ncols(),
+                None => first..columns.ncols(),
+            };
+            for other in others {
+                let value = weight * (columns.col(other).transpose() * across.col(0));
                 if let Some(place) = other.checked_sub(first) {
-                    curvature[(parameter, place)] += weight * across[(other, 0)];
+                    curvature[(parameter, place)] += value;
                 }
                 if let Some(place) = parameter.checked_sub(first) {
-                    curvature[(other, place)] += weight * across[(other, 0)];
+                    curvature[(other, place)] += value;
                 }
             }
             for (index, &other) in self.parameters.iter().enumerate() {
