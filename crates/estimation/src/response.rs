@@ -82,7 +82,7 @@ impl Modes {
                 let (velocity, moved) = modes.joint(toward)?;
                 joints.push(TurningJoint { velocity, moved, toward: toward.clone() });
             }
-            modes.turning = TurningResponse::of(&turning.turned, joints, w, sensitivity.weight);
+            modes.turning = Some(TurningResponse::of(&turning.turned, &joints, w, sensitivity.weight));
         }
         Some(modes)
     }

@@ -262,7 +262,10 @@ mod tests {
             let exact = (integral(end) - integral(begin)) / (end - begin);
             let exact_slope = ((end / WIDTH).tanh() - exact) / (end - begin);
             assert!((value - exact).abs() < 5e-3, "{begin} {end}: {value}, {exact}");
-            assert!((slope - exact_slope).abs() < 0.01 * exact_slope + 0.1, "{begin} {end}: {slope}, {exact_slope}");
+            assert!(
+                (slope - exact_slope).abs() < 0.01 * exact_slope + 0.1,
+                "{begin} {end}: {slope}, {exact_slope}"
+            );
         }
     }
 }

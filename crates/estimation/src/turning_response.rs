@@ -10,12 +10,17 @@
 
 use super::sensitivity::{packed, place};
 use super::turning::Turned;
-use faer::prelude::Solve;
-use faer::{Mat, Side};
-use phiw_dynamics::dense::dot;
+use faer::Mat;
+use phiw_dynamics::dense::{Cholesky, dot};
 
 /// δ is never less than so many times −1/ρ: a friction that pushes along is none, but a search may pass there.
 const LEAST: f64 = 0.9;
+
+/// δ·ρ from which on a joint turns together with others that do; below, each turns as if no other did.
+const COUPLED: f64 = 0.02;
+
+/// What is added to H's diagonal, over its largest element.
+const LEAST_RESPONSE: f64 = 1e-6;
 
 /// A joint, as the inertia of an instant has it.
 pub(super) struct TurningJoint {
@@ -47,83 +52,112 @@ pub(super) struct TurningResponse {
 }
 
 impl TurningResponse {
-    /// Of frictions under parameters `w`; the instant stands for `weight` rows. None where H is no response.
-    pub fn of(turned: &Turned, joints: Vec<TurningJoint>, w: &Mat<f64>, weight: f64) -> Option<Self> {
+    /// Of frictions under parameters `w`; the instant stands for `weight` rows.
+    pub fn of(turned: &Turned, joints: &[TurningJoint], w: &Mat<f64>, weight: f64) -> Self {
         let mut present: Vec<usize> = turned.columns.iter().map(|(_, joint)| *joint).collect();
         present.sort_unstable();
         present.dedup();
-        let (count, own) = (present.len(), turned.columns.len());
-        let scales: Vec<f64> = present
-            .iter()
-            .map(|&joint| {
-                let TurningJoint { velocity, moved, toward } = &joints[joint];
-                (velocity / dot(moved, toward)).sqrt()
-            })
-            .collect();
-        let moved = Mat::from_fn(joints[present[0]].moved.len(), count, |row, joint| {
-            scales[joint] * joints[present[joint]].moved[row]
-        });
-        let response = Mat::from_fn(count, count, |row, column| {
-            scales[row] * dot(&joints[present[row]].toward, moved.col_as_slice(column))
-        });
-        let inertia = response.llt(Side::Lower).ok()?.solve(Mat::<f64>::identity(count, count));
-        let place = |(_, joint): &(usize, usize)| present.partition_point(|own| own < joint);
-        let places: Vec<usize> = turned.columns.iter().map(place).collect();
-        let places = &places;
+        let (moved, response) = responses(&present, joints);
+        let parameters: Vec<usize> = turned.columns.iter().map(|(parameter, _)| *parameter).collect();
+        let (count, own) = (present.len(), parameters.len());
         let mut sum = TurningResponse {
             log_determinant: 0.0,
             moved,
             by_response: Mat::zeros(count, count),
-            parameters: turned.columns.iter().map(|(parameter, _)| *parameter).collect(),
             by_parameter: vec![0.0; own],
             across: vec![Mat::zeros(count, count); own],
             curvature: Mat::zeros(own, own),
+            parameters,
         };
-        let of_joint = |joint: usize| (0..own).filter(move |index| places[*index] == joint);
-        let of_joints: Vec<Vec<usize>> = (0..count).map(|joint| of_joint(joint).collect()).collect();
-        let base: f64 = log_determinant(&inertia)?;
-        let mut delta = vec![0.0; count];
+        let of_joint = |joint: &usize| -> Vec<usize> {
+            (0..own).filter(|&index| turned.columns[index].1 == *joint).collect()
+        };
+        let of_joints: Vec<Vec<usize>> = present.iter().map(of_joint).collect();
+        let mut together = Vec::with_capacity(count);
+        let mut deltas = vec![0.0; count];
         for slopes in turned.slopes.chunks_exact(own) {
-            delta.fill(0.0);
-            for ((slope, &parameter), &joint) in slopes.iter().zip(&sum.parameters).zip(places) {
-                delta[joint] += slope * w[(parameter, 0)];
-            }
-            for (joint, delta) in delta.iter_mut().enumerate() {
-                *delta = delta.max(-LEAST * inertia[(joint, joint)]);
-            }
-            let stiff = Mat::from_fn(count, count, |row, column| {
-                inertia[(row, column)] + if row == column { delta[row] } else { 0.0 }
-            });
-            let Ok(factor) = stiff.llt(Side::Lower) else { continue };
-            // K = (H⁻¹ + Δ)⁻¹, and R = K·H⁻¹.
-            let inverse = factor.solve(Mat::<f64>::identity(count, count));
-            let diagonal = (0..count).map(|joint| factor.L()[(joint, joint)].ln()).sum::<f64>();
-            sum.log_determinant += (2.0 * diagonal - base) / weight;
-            let through = &inverse * &inertia;
-            for column in 0..count {
-                for row in 0..count {
-                    let own = if row == column { delta[row] } else { 0.0 };
-                    sum.by_response[(row, column)] +=
-                        (own - delta[row] * inverse[(row, column)] * delta[column]) / weight;
+            together.clear();
+            for (joint, columns) in of_joints.iter().enumerate() {
+                let own = |&index: &usize| slopes[index] * w[(sum.parameters[index], 0)];
+                let delta: f64 = columns.iter().map(own).sum();
+                deltas[joint] = delta.max(-LEAST / response[(joint, joint)]);
+                if deltas[joint].abs() * response[(joint, joint)] > COUPLED {
+                    together.push((joint, deltas[joint]));
                 }
             }
-            for (index, slope) in slopes.iter().enumerate().filter(|(_, slope)| **slope != 0.0) {
-                let joint = places[index];
-                let response = inverse[(joint, joint)];
-                sum.by_parameter[index] += slope * response / weight;
-                let across = &mut sum.across[index];
-                for column in 0..count {
-                    let share = slope * through[(joint, column)] / weight;
-                    for row in 0..count {
-                        across[(row, column)] += share * through[(joint, row)];
+            let row = Row::of(&together, &response);
+            if let Some(row) = &row {
+                sum.log_determinant += row.log_determinant / weight;
+            }
+            for (joint, columns) in of_joints.iter().enumerate() {
+                if columns.iter().all(|&index| slopes[index] == 0.0) {
+                    continue;
+                }
+                let place = together.iter().position(|(own, _)| *own == joint);
+                match row.as_ref().zip(place) {
+                    Some((row, place)) => {
+                        sum.add_together((slopes, columns), (&together, place), row, weight)
                     }
-                }
-                for &other in &of_joints[joint] {
-                    sum.curvature[(index, other)] += slope * slopes[other] * response * response / weight;
+                    None => {
+                        let (alone, delta) = (response[(joint, joint)], deltas[joint]);
+                        sum.add_alone((slopes, columns), (joint, delta), alone, weight);
+                    }
                 }
             }
         }
-        Some(sum)
+        sum
+    }
+
+    /// Adds a joint that turns in a row as if no other did; `alone` is its ρ.
+    fn add_alone(
+        &mut self,
+        (slopes, columns): (&[f64], &[usize]),
+        (joint, delta): (usize, f64),
+        alone: f64,
+        weight: f64,
+    ) {
+        let factor = 1.0 + delta * alone;
+        self.log_determinant += factor.ln() / weight;
+        self.by_response[(joint, joint)] += delta / (factor * weight);
+        for &index in columns {
+            let slope = slopes[index] / weight;
+            self.by_parameter[index] += slope * alone / factor;
+            self.across[index][(joint, joint)] += slope / (factor * factor);
+            for &other in columns {
+                self.curvature[(index, other)] += slope * slopes[other] * (alone / factor).powi(2);
+            }
+        }
+    }
+
+    /// Adds the derivatives of the joint at a `place` of those that turn `together` in a row.
+    fn add_together(
+        &mut self,
+        (slopes, columns): (&[f64], &[usize]),
+        (together, place): (&[(usize, f64)], usize),
+        row: &Row,
+        weight: f64,
+    ) {
+        let (joint, delta) = together[place];
+        for (b, &(other, other_delta)) in together.iter().enumerate() {
+            let own = if place == b { delta } else { 0.0 };
+            self.by_response[(joint, other)] += (own - delta * row.at(place, b) * other_delta) / weight;
+        }
+        // The joint's row of 1 − K·Δ.
+        let through = |b: usize| f64::from(u8::from(place == b)) - row.at(place, b) * together[b].1;
+        let own = row.at(place, place);
+        for &index in columns.iter().filter(|index| slopes[**index] != 0.0) {
+            let slope = slopes[index] / weight;
+            self.by_parameter[index] += slope * own;
+            for (b, (left, _)) in together.iter().enumerate() {
+                let share = slope * through(b);
+                for (c, (right, _)) in together.iter().enumerate() {
+                    self.across[index][(*left, *right)] += share * through(c);
+                }
+            }
+            for &other in columns {
+                self.curvature[(index, other)] += slope * slopes[other] * own * own;
+            }
+        }
     }
 
     /// M·S·Mᵀ of a symmetric S over the joints, packed.
@@ -185,7 +219,52 @@ impl TurningResponse {
     }
 }
 
-fn log_determinant(matrix: &Mat<f64>) -> Option<f64> {
-    let factor = matrix.llt(Side::Lower).ok()?;
-    Some((0..matrix.nrows()).map(|index| 2.0 * factor.L()[(index, index)].ln()).sum())
+/// G⁻¹N of these joints, scaled, and H.
+fn responses(present: &[usize], joints: &[TurningJoint]) -> (Mat<f64>, Mat<f64>) {
+    let scale = |&joint: &usize| {
+        let TurningJoint { velocity, moved, toward } = &joints[joint];
+        let acceleration = dot(moved, toward);
+        if acceleration > 0.0 { (velocity / acceleration).sqrt() } else { 0.0 }
+    };
+    let scales: Vec<f64> = present.iter().map(scale).collect();
+    let directions = present.first().map_or(0, |&first| joints[first].moved.len());
+    let moved = Mat::from_fn(directions, present.len(), |row, joint| {
+        scales[joint] * joints[present[joint]].moved[row]
+    });
+    let mut response = Mat::from_fn(present.len(), present.len(), |row, column| {
+        scales[row] * dot(&joints[present[row]].toward, moved.col_as_slice(column))
+    });
+    // Legs on the floor move together: there are more joints than directions.
+    let largest = (0..present.len()).map(|joint| response[(joint, joint)]).fold(0.0, f64::max);
+    (0..present.len()).for_each(|joint| response[(joint, joint)] += LEAST_RESPONSE * largest);
+    (moved, response)
+}
+
+/// The joints that turn in one row.
+struct Row {
+    log_determinant: f64,
+    size: usize,
+    /// K = (H⁻¹ + Δ)⁻¹.
+    inverse: Vec<f64>,
+}
+
+impl Row {
+    /// Of joints, each with its δ. None where none turns, or H is no response.
+    fn of(turning: &[(usize, f64)], response: &Mat<f64>) -> Option<Self> {
+        let size = turning.len();
+        if size == 0 {
+            return None;
+        }
+        let own = Cholesky::of(size, |row, column| response[(turning[row].0, turning[column].0)])?;
+        let inertia = own.inverse();
+        let stiff = Cholesky::of(size, |row, column| {
+            inertia[row * size + column] + if row == column { turning[row].1 } else { 0.0 }
+        })?;
+        let log_determinant = own.log_determinant() + stiff.log_determinant();
+        Some(Row { log_determinant, size, inverse: stiff.inverse() })
+    }
+
+    fn at(&self, row: usize, column: usize) -> f64 {
+        self.inverse[row * self.size + column]
+    }
 }
