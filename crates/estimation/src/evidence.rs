@@ -65,8 +65,9 @@ pub struct Instant {
     pub state: [Vec<f64>; 3],
 }
 
-/// What was measured, reduced to what estimators and selections need; it depends on the length of the logs by
-/// some instants only.
+/// What was measured, reduced to what estimators and selections need. It depends on the length of the logs by
+/// some instants only, but for logs of encoders and of frictions that turn, which are looked at again under a
+/// better belief: it keeps these.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(into = "StoredEvidence", try_from = "StoredEvidence")]
 pub struct Evidence {
@@ -84,7 +85,7 @@ pub struct Evidence {
     /// Logs of encoders, where rows are asked for in order: their motion is found again under a better
     /// belief.
     pub(super) encoder_logs: Vec<MotionLog>,
-    /// Other logs of a robot with frictions that turn: how is found again under a better belief.
+    /// Other logs of a robot with frictions that turn: how they do is found again under a better belief.
     turning_logs: Vec<MotionLog>,
     /// Under which belief it was found.
     believed: Option<Believed>,
