@@ -136,8 +136,10 @@ impl Estimator for MotionLikelihood {
     }
 }
 
-/// Times that an estimate is made anew with frictions that turn as the last one says.
+/// Times at most that an estimate is made anew with frictions that turn as the last one says.
 const FRICTION_ROUNDS: usize = 3;
+/// Standard deviations by which no parameter moves any more where both agree.
+const AGREES: f64 = 0.1;
 
 /// An estimate whose frictions turn within a period as it says itself: `estimate` from evidence and
 /// parameters to begin with, made again until it does.
@@ -151,7 +153,14 @@ pub(super) fn under_own_friction(
     let mut found = estimate(evidence, present_parameters)?;
     for _ in 0..FRICTION_ROUNDS {
         let Some(under) = evidence.under(design, &found.parameters, standing_on)? else { break };
-        found = estimate(&under, &found.parameters)?;
+        let next = estimate(&under, &found.parameters)?;
+        let before = std::mem::replace(&mut found, next);
+        let moved =
+            |k: usize| (found.parameters[k] - before.parameters[k]).abs() / found.standard_deviations[k];
+        // What has no standard deviation has not moved.
+        if (0..found.parameters.len()).map(moved).fold(0.0, f64::max) < AGREES {
+            break;
+        }
     }
     Ok(found)
 }
