@@ -1,11 +1,11 @@
 //! What a friction that turns with the velocity takes of a period in which it turns.
 //!
 //! Within a period the noise moves the joint, and near a reversal it decides when the velocity passes
-//! through zero. The friction of the period is the mean c̄ of its column along the way of the velocity from v₀
-//! at the beginning to v₁ at the end ([`super::turning_path`]): at a constant acceleration, or slowed by the
-//! friction that the joint is believed to have, so that it may come to rest. v₁ has the period's noise in it,
-//! and so has c̄: the likelihood of the motion counts it by the slope dc̄/dv₁ ([`super::turning_response`]), as
-//! it counts the acceleration by the inertia.
+//! through zero. The friction of the period is the mean c̄ of its column along the way of the velocity from
+//! v₀ at the beginning to v₁ at the end ([`super::turning_path`]): at a constant acceleration, or slowed by
+//! the friction that the joint is believed to have, so that it may come to rest. v₁ has the period's noise
+//! in it, and so has c̄: the likelihood of the motion counts it by the slope dc̄/dv₁
+//! ([`super::turning_response`]), as it counts the acceleration by the inertia.
 //!
 //! The slope is the larger the less the velocity changes, and where it changes by no more than the error with
 //! which encoders tell it, it is the error's own: a joint that rests would seem to rub. In such a period the
@@ -228,8 +228,8 @@ impl<'a> TurningColumns<'a> {
     }
 }
 
-/// For each joint, the change of its velocity within a period from which on it is certain \[rad/s, m/s\]: what
-/// the steps of its encoder leave of it.
+/// For each joint, the change of its velocity within a period from which on it is certain \[rad/s, m/s\]:
+/// what the steps of its encoder leave of it.
 fn least_changes(measured: &MotionLog) -> Vec<f64> {
     let noise = measured.readings.as_ref().map_or(&[][..], |readings| &readings.noise);
     let of_joint = |joint: usize| {

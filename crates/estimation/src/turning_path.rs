@@ -1,9 +1,9 @@
 //! The way of a velocity through a period in which friction slows it.
 //!
-//! Of a joint that is driven by what does not change within the period, dv/ds = α − φ(v) from s = 0 to 1, φ the
-//! change of velocity that its friction makes in a period. A way that is known at both ends tells α: the
-//! time that it takes is ∫dv/(α − φ(v)) = 1. The velocity only ever goes one way, also where the joint comes to
-//! rest, so that means over the period are integrals over velocities; φ and columns are straight lines
+//! Of a joint that is driven by what does not change within the period, dv/ds = α − φ(v) from s = 0 to 1, φ
+//! the change of velocity that its friction makes in a period. A way that is known at both ends tells α: the
+//! time that it takes is ∫dv/(α − φ(v)) = 1. The velocity only ever goes one way, also where the joint comes
+//! to rest, so that means over the period are integrals over velocities; φ and columns are straight lines
 //! between the places of a table, and each integral is known in closed form.
 
 /// Places of the table for each power of ten of the velocity.

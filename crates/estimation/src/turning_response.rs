@@ -1,19 +1,20 @@
 //! What frictions that turn within a period add to the log-determinant of its motion.
 //!
 //! A torque of one that is held over a period T changes the velocity of a joint at its end by T·ρ, ρ =
-//! nᵀA⁻¹φ₁(X)n with what the joint moves by with each direction, n, and X and φ₁ as in [`super::response`]. A
-//! friction that turns adds δ = Σ w_p·T·dc̄_p/dv₁ to what its joint asks for, so that the determinant of the
-//! period is larger by the factor det(1 + H·Δ): Δ has the δ of each joint, and H what a torque on one does to
-//! the velocity of another, NᵀG⁻¹N with G = A + ½T·F, scaled to have the ρ on its diagonal. A joint that sticks
-//! has a large δ: of those that stick the determinant tells the friction, and of the inertia only what the
-//! others feel. How the scale follows from the inertia is not counted in the derivatives.
+//! nᵀA⁻¹φ₁(X)n with what the joint moves by with each direction, n, and X and φ₁ as in [`super::response`].
+//! A friction that turns adds δ = Σ w_p·T·dc̄_p/dv₁ to what its joint asks for, so that the determinant of
+//! the period is larger by the factor det(1 + H·Δ): Δ has the δ of each joint, and H what a torque on one
+//! does to the velocity of another, NᵀG⁻¹N with G = A + ½T·F, scaled to have the ρ on its diagonal. A joint
+//! that sticks has a large δ: of those that stick the determinant tells the friction, and of the inertia
+//! only what the others feel. How the scale follows from the inertia is not counted in the derivatives.
 
 use super::sensitivity::{packed, place};
 use super::turning::Turned;
 use faer::Mat;
 use phiw_dynamics::dense::{Cholesky, dot};
 
-/// δ is never less than so many times −1/ρ: a friction that pushes along is none, but a search may pass there.
+/// δ is never less than so many times −1/ρ: a friction that pushes along is none, but a search may pass
+/// there.
 const LEAST: f64 = 0.9;
 
 /// δ·ρ from which on a joint turns together with others that do; below, each turns as if no other did.
@@ -189,9 +190,9 @@ impl TurningResponse {
         }
     }
 
-    /// Adds `weight` times less its second derivatives, for all parameters and those from `first` on: those by
-    /// two parameters of a joint, and by one and the inertia. Another determinant outweighs those by the inertia alone. `columns` are the packed G of
-    /// each parameter.
+    /// Adds `weight` times less its second derivatives, for all parameters and those from `first` on: those
+    /// by two parameters of a joint, and by one and the inertia. Another determinant outweighs those by the
+    /// inertia alone. `columns` are the packed G of each parameter.
     pub fn add_curvature(&self, columns: &Mat<f64>, first: usize, weight: f64, curvature: &mut Mat<f64>) {
         for (own, &parameter) in self.parameters.iter().enumerate() {
             let across = self.packed(&self.across[own]);
