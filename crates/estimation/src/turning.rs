@@ -51,7 +51,7 @@ pub(super) struct Believed {
     pub standing_on: Vec<usize>,
 }
 
-/// One of them.
+/// A column that turns with a velocity.
 pub(super) struct TurningColumn {
     /// The parameter that it is of.
     pub parameter: usize,
