@@ -116,14 +116,8 @@ impl Estimator for BayesianLeastSquares {
 }
 
 impl Evidence {
-    /// What somebody else has reduced: rows of \[Φ f\] of logs that were conditioned, as `phiw identify` has
-    /// them, `rate_hz` of each torque a second \[Hz\].
-    pub fn of_factor(factor: GroupedFactor, rate_hz: Option<f64>) -> Self {
-        Evidence::of_rows(factor, rate_hz)
-    }
-
-    /// The same of rows that have been weighted and taken together, over these `parameters` of `count`: what
-    /// a `model.json` keeps.
+    /// Rows that somebody else has weighted and taken together, over these `parameters` of `count`: what a
+    /// `model.json` keeps.
     ///
     /// # Errors
     /// The factor has not one column for each of the parameters.

@@ -332,7 +332,8 @@ impl Estimator for ConcentratedLikelihood {
         present: &RobotModel,
         present_parameters: &[f64],
     ) -> Result<Estimate, EstimationError> {
-        under_own_friction(design, evidence, &self.standing_on, present_parameters, |evidence, start| {
+        let (standing, newton) = ((evidence, self.standing_on.as_slice()), &self.settings.newton);
+        under_own_friction(design, standing, newton, present_parameters, |evidence, start| {
             self.minimum(design, evidence, present, start)
         })
     }

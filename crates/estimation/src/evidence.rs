@@ -158,19 +158,8 @@ impl TryFrom<StoredEvidence> for Evidence {
         } = stored;
         let in_order: Option<GroupedFactor> = rows_in_order.map(TryInto::try_into).transpose()?;
         let in_order = in_order.map(InOrder::of_factor);
-        let factor = factor.try_into()?;
-        Ok(Evidence {
-            settings,
-            factor,
-            instants,
-            turned,
-            foreseen,
-            rate_hz,
-            in_order,
-            encoder_logs,
-            turning_logs,
-            believed: None,
-        })
+        let of_rows = Evidence::of_factor(factor.try_into()?, rate_hz);
+        Ok(Evidence { settings, instants, turned, foreseen, in_order, encoder_logs, turning_logs, ..of_rows })
     }
 }
 
@@ -196,22 +185,12 @@ impl Evidence {
         }
         let asked = settings.in_order && settings.rows_at == RowsAt::Periods;
         let in_order = asked.then(|| InOrder::none(design)).transpose()?;
-        Ok(Evidence {
-            settings,
-            factor,
-            instants: Vec::new(),
-            turned: Vec::new(),
-            foreseen,
-            rate_hz: None,
-            in_order,
-            encoder_logs: Vec::new(),
-            turning_logs: Vec::new(),
-            believed: None,
-        })
+        Ok(Evidence { settings, foreseen, in_order, ..Evidence::of_factor(factor, None) })
     }
 
-    /// Rows that somebody else has reduced.
-    pub(super) fn of_rows(factor: GroupedFactor, rate_hz: Option<f64>) -> Self {
+    /// What somebody else has reduced: rows of \[Φ f\] of logs that were conditioned, as `phiw identify` has
+    /// them, `rate_hz` of each torque a second \[Hz\].
+    pub fn of_factor(factor: GroupedFactor, rate_hz: Option<f64>) -> Self {
         Evidence {
             settings: RowsAt::Stamps.into(),
             factor,

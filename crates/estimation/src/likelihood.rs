@@ -115,7 +115,8 @@ impl Estimator for MotionLikelihood {
         present: &RobotModel,
         present_parameters: &[f64],
     ) -> Result<Estimate, EstimationError> {
-        under_own_friction(design, evidence, &self.standing_on, present_parameters, |evidence, start| {
+        let standing = (evidence, self.standing_on.as_slice());
+        under_own_friction(design, standing, &self.newton, present_parameters, |evidence, start| {
             self.minimum(design, evidence, present, start)
         })
     }
@@ -136,29 +137,24 @@ impl Estimator for MotionLikelihood {
     }
 }
 
-/// Times at most that an estimate is made anew with frictions that turn as the last one says.
-const FRICTION_ROUNDS: usize = 3;
-/// Standard deviations by which no parameter moves any more where both agree.
-const AGREES: f64 = 0.1;
-
 /// An estimate whose frictions turn within a period as it says itself: `estimate` from evidence and
 /// parameters to begin with, made again until it does.
 pub(super) fn under_own_friction(
     design: &Design,
-    evidence: &Evidence,
-    standing_on: &[usize],
+    (evidence, standing_on): (&Evidence, &[usize]),
+    settings: &NewtonSettings,
     present_parameters: &[f64],
     mut estimate: impl FnMut(&Evidence, &[f64]) -> Result<Estimate, EstimationError>,
 ) -> Result<Estimate, EstimationError> {
     let mut found = estimate(evidence, present_parameters)?;
-    for _ in 0..FRICTION_ROUNDS {
+    for _ in 0..settings.friction_rounds {
         let Some(under) = evidence.under(design, &found.parameters, standing_on)? else { break };
         let next = estimate(&under, &found.parameters)?;
         let before = std::mem::replace(&mut found, next);
         let moved =
             |k: usize| (found.parameters[k] - before.parameters[k]).abs() / found.standard_deviations[k];
         // What has no standard deviation has not moved.
-        if (0..found.parameters.len()).map(moved).fold(0.0, f64::max) < AGREES {
+        if (0..found.parameters.len()).map(moved).fold(0.0, f64::max) < settings.friction_settled {
             break;
         }
     }

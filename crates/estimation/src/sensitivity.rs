@@ -28,16 +28,9 @@ pub(super) struct Sensitivity {
     pub inertia: Mat<f64>,
     /// The same of each T·F_k.
     pub damping: Mat<f64>,
-    /// Frictions that turn with the velocities of joints in the rows that it stands for.
-    pub turning: Turning,
-}
-
-/// Frictions that turn with the velocities of joints.
-#[derive(Default)]
-pub(super) struct Turning {
-    /// For each joint, what it moves by with each of the directions; empty where nothing turns.
+    /// For each joint, what it moves by with each of the directions.
     pub toward: Vec<Vec<f64>>,
-    /// The slopes of the columns.
+    /// Slopes of frictions that turn in the rows that it stands for.
     pub turned: Turned,
 }
 
@@ -105,11 +98,15 @@ impl Sensitivity {
             }
         }
         let toward = |joint: usize| (0..n).map(|direction| directions[(joint, direction)]).collect();
-        let turning = match turned.columns.is_empty() {
-            true => Turning::default(),
-            false => Turning { toward: (0..joints).map(toward).collect(), turned: turned.clone() },
-        };
-        Ok(Sensitivity { weight: instant.weight, directions: n, inertia, damping, turning })
+        let toward = (0..joints).map(toward).collect();
+        Ok(Sensitivity {
+            weight: instant.weight,
+            directions: n,
+            inertia,
+            damping,
+            toward,
+            turned: turned.clone(),
+        })
     }
 
     /// Those of all instants.

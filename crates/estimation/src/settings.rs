@@ -25,6 +25,12 @@ pub struct NewtonSettings {
     /// What is added to the diagonal of the curvature, as a share of it and in all, so that directions that
     /// nothing determines stay where they are. Default: 10⁻¹⁰ and 10⁻¹².
     pub damping: [f64; 2],
+    /// Times at most that an estimate is made anew with frictions that turn within a period as the last one
+    /// says. Default: 3.
+    pub friction_rounds: usize,
+    /// The largest step of a parameter, in its standard deviations, at which both agree. Default: 0.1; no
+    /// command calibrates it.
+    pub friction_settled: f64,
     /// Radius of gyration of the spheres that bodies start as where the first belief is of bodies that cannot
     /// exist \[m\]. Default: 0.1, a forearm's.
     pub sphere_radius: f64,
@@ -43,6 +49,8 @@ impl Default for NewtonSettings {
             instants_every: 4,
             sufficient_decrease: 0.1,
             shortest_step: 1e-6,
+            friction_rounds: 3,
+            friction_settled: 0.1,
             damping: [1e-10, 1e-12],
             sphere_radius: 0.1,
             least_mass: 0.05,

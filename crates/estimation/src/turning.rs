@@ -211,14 +211,14 @@ impl<'a> TurningColumns<'a> {
         w.resize_with(self.design.parameter_count(), 1, |_, _| 0.0);
         let foreseen = |parameter: usize| self.foreseen.get(parameter).copied().unwrap_or(false);
         let joints = self.design.tree().joint_count();
-        let each = Turned { columns: (0..joints).map(|joint| (0, joint)).collect(), slopes: Vec::new() };
+        let nothing = Turned::default();
         let mut changes = Vec::with_capacity(mean.len());
         for instant in instants(mean, period_s, INSTANT_EVERY_S) {
             let sensitivity =
-                Sensitivity::of(self.design, (&instant, &each), &believed.standing_on, foreseen)?;
+                Sensitivity::of(self.design, (&instant, &nothing), &believed.standing_on, foreseen)?;
             let modes = Modes::of(&sensitivity, &w);
             let change = |joint: usize| {
-                let (velocity, _) = modes.as_ref()?.joint(&sensitivity.turning.toward[joint])?;
+                let (velocity, _) = modes.as_ref()?.joint(&sensitivity.toward[joint])?;
                 Some(period_s * velocity)
             };
             let own: Rc<[f64]> = (0..joints).map(|joint| change(joint).unwrap_or_default()).collect();
