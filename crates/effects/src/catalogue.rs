@@ -64,6 +64,20 @@ impl Catalogue {
         self.kinds.iter().map(Box::as_ref)
     }
 
+    /// Constants to try first for an effect on the joints of `spec` ([`EffectKind::scan`]).
+    ///
+    /// # Errors
+    /// Its kind or a joint is unknown.
+    pub fn scanned(
+        &self,
+        spec: &EffectSpec,
+        tree: &Tree,
+        ranges: &SignalRanges,
+    ) -> Result<Vec<Constants>, EffectError> {
+        let site = joint_indices(&spec.kind, &spec.joints, tree)?;
+        Ok(self.kind(&spec.kind)?.scan(&site, ranges))
+    }
+
     /// Constants near those of an effect ([`EffectKind::refine`]).
     ///
     /// # Errors

@@ -146,7 +146,8 @@ pub(super) fn under_own_friction(
     present_parameters: &[f64],
     mut estimate: impl FnMut(&Evidence, &[f64]) -> Result<Estimate, EstimationError>,
 ) -> Result<Estimate, EstimationError> {
-    let mut found = estimate(evidence, present_parameters)?;
+    let under = evidence.under(design, present_parameters, standing_on)?;
+    let mut found = estimate(under.as_ref().unwrap_or(evidence), present_parameters)?;
     for _ in 0..settings.friction_rounds {
         let Some(under) = evidence.under(design, &found.parameters, standing_on)? else { break };
         let next = estimate(&under, &found.parameters)?;

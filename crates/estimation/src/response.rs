@@ -78,17 +78,15 @@ impl Modes {
         if !sensitivity.turned.slopes.is_empty() {
             let mut joints = Vec::with_capacity(sensitivity.toward.len());
             for toward in &sensitivity.toward {
-                let (velocity, moved) = modes.joint(toward)?;
-                joints.push(TurningJoint { velocity, moved, toward: toward.clone() });
+                joints.push(modes.joint(toward)?);
             }
             modes.turning = Some(TurningResponse::of(&sensitivity.turned, &joints, w, sensitivity.weight));
         }
         Some(modes)
     }
 
-    /// By how much a torque of one on a joint that moves by `toward` with each direction changes its velocity
-    /// in a period, over the period, and G⁻¹ of that; none where G is no inertia.
-    pub fn joint(&self, toward: &[f64]) -> Option<(f64, Vec<f64>)> {
+    /// What a torque on a joint that moves by `toward` with each direction does; none where G is no inertia.
+    pub fn joint(&self, toward: &[f64]) -> Option<TurningJoint> {
         let mut reduced = toward.to_vec();
         self.factor.solve_lower(&mut reduced);
         let along = |mode: usize| dot(self.vectors.col_as_slice(mode), &reduced).powi(2);
@@ -98,7 +96,7 @@ impl Modes {
         let mut moved = toward.to_vec();
         half_damped.solve_lower(&mut moved);
         half_damped.solve_upper(&mut moved);
-        Some((velocity, moved))
+        Some(TurningJoint { velocity, moved, toward: toward.to_vec() })
     }
 
     /// That of a row, in the mean of those that the instant stands for.

@@ -11,11 +11,12 @@
 //! which encoders tell it, it is the error's own: a joint that rests would seem to rub. In such a period the
 //! column is that of its beginning, and has no slope.
 
-use super::evidence::instants;
+use super::evidence::{Instant, instants};
 use super::likelihood::column;
 use super::response::Modes;
 use super::sensitivity::Sensitivity;
-use super::turning_path::{Way, velocities};
+use super::turning_path::{Way, interpolated, velocities};
+use super::turning_response::TurningJoint;
 use crate::{EstimationError, MotionLog};
 use phiw_identification::Design;
 use phiw_telemetry::Block;
@@ -128,6 +129,16 @@ impl<'a> TurningColumns<'a> {
         &self.columns
     }
 
+    /// The parameter and the joint of each.
+    pub fn places(&self) -> Vec<(usize, usize)> {
+        self.columns.iter().map(|column| (column.parameter, column.joint)).collect()
+    }
+
+    /// A column where a joint moves at a velocity \[rad/s, m/s\].
+    pub fn at(&self, column: usize, velocity: f64) -> f64 {
+        interpolated(&self.velocities, &self.columns[column].table, velocity)
+    }
+
     /// Their means over each period of a log, one period after the other, those of one beside each other;
     /// none where the velocity does not change for certain. `begun` and `mean` are the periods of the log as
     /// they began and as they were on average. Where nothing is `believed`, no friction slows a joint within
@@ -141,16 +152,34 @@ impl<'a> TurningColumns<'a> {
         measured: &MotionLog,
         believed: Option<&Believed>,
     ) -> Result<Vec<Option<Mean>>, EstimationError> {
+        let felt = match believed.filter(|_| !self.columns.is_empty()) {
+            Some(believed) => self.felt(mean, measured.period_s, believed)?,
+            None => Vec::new(),
+        };
+        let parameters = believed.map_or(&[][..], |believed| &believed.parameters);
+        Ok(self.means_under((begun, mean), measured, (parameters, &felt)))
+    }
+
+    /// The same under parameters that are believed, where it is known what inertia the joints feel
+    /// ([`Self::felt`]).
+    pub fn means_under(
+        &self,
+        (begun, mean): (&Block, &Block),
+        measured: &MotionLog,
+        (parameters, felt): (&[f64], &[Felt]),
+    ) -> Vec<Option<Mean>> {
         if self.columns.is_empty() {
-            return Ok(Vec::new());
+            return Vec::new();
         }
         let (joints, period_s) = (measured.joints, measured.period_s);
         let least = least_changes(measured);
-        let frictions = believed.map(|believed| self.frictions(believed)).unwrap_or_default();
-        let changes = match believed {
-            Some(believed) => self.changes_by_torque(mean, period_s, believed)?,
-            None => Vec::new(),
-        };
+        let frictions = self.frictions(parameters);
+        let velocities_by_torque = felt.iter().flat_map(|felt| {
+            let of_joint = |joint: &Option<TurningJoint>| joint.as_ref().map_or(0.0, |joint| joint.velocity);
+            let own: Rc<[f64]> = felt.joints.iter().map(of_joint).collect();
+            std::iter::repeat_n(own, felt.periods)
+        });
+        let velocities_by_torque: Vec<Rc<[f64]>> = velocities_by_torque.collect();
         let mut of_joints = vec![Vec::new(); joints];
         for (index, column) in self.columns.iter().enumerate() {
             of_joints[column.joint].push(index);
@@ -166,7 +195,7 @@ impl<'a> TurningColumns<'a> {
                     continue;
                 }
                 let friction = frictions.get(joint).and_then(Option::as_deref);
-                let scale = changes.get(row).map_or(0.0, |changes: &Rc<[f64]>| changes[joint]);
+                let scale = velocities_by_torque.get(row).map_or(0.0, |own| period_s * own[joint]);
                 way.lay([begun.qd[at], begun.qd[at] + change], &self.velocities, friction, scale);
                 for &index in own {
                     let [value, slope] = way.mean_of(&self.velocities, &self.columns[index].table);
@@ -175,15 +204,15 @@ impl<'a> TurningColumns<'a> {
                 }
             }
         }
-        Ok(means)
+        means
     }
 
     /// The friction that each joint is believed to have \[N·m, N\] at the velocities of the tables; none
     /// where it is believed to have none.
-    fn frictions(&self, believed: &Believed) -> Vec<Option<Vec<f64>>> {
+    fn frictions(&self, parameters: &[f64]) -> Vec<Option<Vec<f64>>> {
         let mut frictions = vec![None; self.design.tree().joint_count()];
         for column in &self.columns {
-            let value = believed.parameters.get(column.parameter).copied().unwrap_or_default();
+            let value = parameters.get(column.parameter).copied().unwrap_or_default();
             if value != 0.0 {
                 let friction: &mut Vec<f64> =
                     frictions[column.joint].get_or_insert_with(|| vec![0.0; self.velocities.len()]);
@@ -200,32 +229,39 @@ impl<'a> TurningColumns<'a> {
         frictions
     }
 
-    /// By how much a torque of one changes the velocity of each joint within a period, for each period.
-    fn changes_by_torque(
+    /// What inertia the joints feel under a belief, at instants that stand for a log's periods. Frictions
+    /// that turn are no part of it.
+    ///
+    /// # Errors
+    /// The log is not of this robot.
+    pub fn felt(
         &self,
         mean: &Block,
         period_s: f64,
         believed: &Believed,
-    ) -> Result<Vec<Rc<[f64]>>, EstimationError> {
+    ) -> Result<Vec<Felt>, EstimationError> {
         let mut w = column(&believed.parameters);
         w.resize_with(self.design.parameter_count(), 1, |_, _| 0.0);
         let foreseen = |parameter: usize| self.foreseen.get(parameter).copied().unwrap_or(false);
-        let joints = self.design.tree().joint_count();
         let nothing = Turned::default();
-        let mut changes = Vec::with_capacity(mean.len());
-        for instant in instants(mean, period_s, INSTANT_EVERY_S) {
+        let felt = |instant: Instant| {
             let sensitivity =
                 Sensitivity::of(self.design, (&instant, &nothing), &believed.standing_on, foreseen)?;
             let modes = Modes::of(&sensitivity, &w);
-            let change = |joint: usize| {
-                let (velocity, _) = modes.as_ref()?.joint(&sensitivity.toward[joint])?;
-                Some(period_s * velocity)
-            };
-            let own: Rc<[f64]> = (0..joints).map(|joint| change(joint).unwrap_or_default()).collect();
-            changes.extend(std::iter::repeat_n(own, instant.weight as usize));
-        }
-        Ok(changes)
+            let joint = |toward: &Vec<f64>| modes.as_ref().and_then(|modes| modes.joint(toward));
+            Ok(Felt {
+                periods: instant.weight as usize,
+                joints: sensitivity.toward.iter().map(joint).collect(),
+            })
+        };
+        instants(mean, period_s, INSTANT_EVERY_S).into_iter().map(felt).collect()
     }
+}
+
+/// What inertia each joint feels at an instant that stands for some periods; none where it is no inertia.
+pub(super) struct Felt {
+    pub periods: usize,
+    pub joints: Vec<Option<TurningJoint>>,
 }
 
 /// For each joint, the change of its velocity within a period from which on it is certain \[rad/s, m/s\]:
@@ -268,8 +304,7 @@ pub(super) fn turned(
     design.correct(&mut begun);
     design.correct(&mut mean);
     let means = turning.means((&begun, &mean), measured, believed)?;
-    let columns: Vec<(usize, usize)> =
-        turning.columns.iter().map(|column| (column.parameter, column.joint)).collect();
+    let columns = turning.places();
     let of_stretch = |stretch: &[Option<Mean>]| {
         let mut slopes = Vec::new();
         for period in stretch.chunks_exact(columns.len()) {

@@ -12,6 +12,7 @@ use super::sensitivity::{packed, place};
 use super::turning::Turned;
 use faer::Mat;
 use phiw_dynamics::dense::{Cholesky, dot};
+use std::borrow::Borrow;
 
 /// δ is never less than so many times −1/ρ: a friction that pushes along is none, but a search may pass
 /// there.
@@ -25,7 +26,7 @@ const LEAST_RESPONSE: f64 = 1e-6;
 
 /// A joint, as the inertia of an instant has it.
 pub(super) struct TurningJoint {
-    /// ρ.
+    /// ρ: by how much a torque of one changes its velocity in a period, over the period.
     pub velocity: f64,
     /// G⁻¹n.
     pub moved: Vec<f64>,
@@ -77,15 +78,11 @@ impl TurningResponse {
         let mut together = Vec::with_capacity(count);
         let mut deltas = vec![0.0; count];
         for slopes in turned.slopes.chunks_exact(own) {
-            together.clear();
             for (joint, columns) in of_joints.iter().enumerate() {
                 let own = |&index: &usize| slopes[index] * w[(sum.parameters[index], 0)];
-                let delta: f64 = columns.iter().map(own).sum();
-                deltas[joint] = delta.max(-LEAST / response[(joint, joint)]);
-                if deltas[joint].abs() * response[(joint, joint)] > COUPLED {
-                    together.push((joint, deltas[joint]));
-                }
+                deltas[joint] = columns.iter().map(own).sum();
             }
+            turning_together(&mut deltas, &response, &mut together);
             let row = Row::of(&together, &response);
             if let Some(row) = &row {
                 sum.log_determinant += row.log_determinant / weight;
@@ -220,20 +217,59 @@ impl TurningResponse {
     }
 }
 
+/// Joints with frictions that turn, as the inertia of an instant has them.
+pub(super) struct TurningJoints {
+    response: Mat<f64>,
+}
+
+impl TurningJoints {
+    /// Of those `present` among the joints of an instant.
+    pub fn of(present: &[usize], joints: &[&TurningJoint]) -> Self {
+        TurningJoints { response: responses(present, joints).1 }
+    }
+
+    /// What a torque on each joint does to its own velocity in a row in which the others have these δ, ρ
+    /// where none of them turns: the determinant of the row is larger by 1 + δ times this than it were
+    /// without the friction of the joint. None where H is no response.
+    pub fn felt_alone(&self, deltas: &[f64]) -> Option<Vec<f64>> {
+        let least = |joint: usize| -LEAST / self.response[(joint, joint)];
+        let all: Vec<(usize, f64)> =
+            deltas.iter().enumerate().map(|(joint, delta)| (joint, delta.max(least(joint)))).collect();
+        let row = Row::of(&all, &self.response)?;
+        let alone = |&(joint, delta): &(usize, f64)| {
+            let felt = row.at(joint, joint);
+            felt / (1.0 - delta * felt)
+        };
+        Some(all.iter().map(alone).collect())
+    }
+}
+
+/// Of joints with these δ, those that turn together in a row; a δ that pushes along is kept where some
+/// inertia is left.
+fn turning_together(deltas: &mut [f64], response: &Mat<f64>, together: &mut Vec<(usize, f64)>) {
+    together.clear();
+    for (joint, delta) in deltas.iter_mut().enumerate() {
+        *delta = delta.max(-LEAST / response[(joint, joint)]);
+        if delta.abs() * response[(joint, joint)] > COUPLED {
+            together.push((joint, *delta));
+        }
+    }
+}
+
 /// G⁻¹N of these joints, scaled, and H.
-fn responses(present: &[usize], joints: &[TurningJoint]) -> (Mat<f64>, Mat<f64>) {
+fn responses<J: Borrow<TurningJoint>>(present: &[usize], joints: &[J]) -> (Mat<f64>, Mat<f64>) {
     let scale = |&joint: &usize| {
-        let TurningJoint { velocity, moved, toward } = &joints[joint];
+        let TurningJoint { velocity, moved, toward } = joints[joint].borrow();
         let acceleration = dot(moved, toward);
         if acceleration > 0.0 { (velocity / acceleration).sqrt() } else { 0.0 }
     };
     let scales: Vec<f64> = present.iter().map(scale).collect();
-    let directions = present.first().map_or(0, |&first| joints[first].moved.len());
+    let directions = present.first().map_or(0, |&first| joints[first].borrow().moved.len());
     let moved = Mat::from_fn(directions, present.len(), |row, joint| {
-        scales[joint] * joints[present[joint]].moved[row]
+        scales[joint] * joints[present[joint]].borrow().moved[row]
     });
     let mut response = Mat::from_fn(present.len(), present.len(), |row, column| {
-        scales[row] * dot(&joints[present[row]].toward, moved.col_as_slice(column))
+        scales[row] * dot(&joints[present[row]].borrow().toward, moved.col_as_slice(column))
     });
     // Legs on the floor move together: there are more joints than directions.
     let largest = (0..present.len()).map(|joint| response[(joint, joint)]).fold(0.0, f64::max);

@@ -22,6 +22,12 @@ pub struct ScoreTestSettings {
     pub least_rival: f64,
     /// How often the constants of an effect are refined. Default: 2; not calibrated.
     pub refinements: usize,
+    /// How often constants of frictions that turn are exchanged and all is fitted again. Default: 3, a limit
+    /// on the time.
+    pub most_exchanges: usize,
+    /// What other constants must save to be worth another fit \[−log L\]. Default: 1, which changes no
+    /// parameter by much more than its standard deviation.
+    pub least_exchange: f64,
     /// Effects at most. Default: 3, a limit on the time.
     pub most_effects: usize,
     /// Measured time below which nothing is looked for \[s\]. Default: 12.
@@ -37,6 +43,8 @@ impl Default for ScoreTestSettings {
             alike: 3.0,
             least_rival: 0.1,
             refinements: 2,
+            most_exchanges: 3,
+            least_exchange: 1.0,
             most_effects: 3,
             least_s: 12.0,
         }

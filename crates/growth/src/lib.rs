@@ -1,6 +1,8 @@
 #![doc = include_str!("../README.md")]
 #![warn(missing_docs)]
 
+mod candidates;
+mod constants;
 mod contest;
 mod hypothesis;
 mod score_test;

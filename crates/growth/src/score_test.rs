@@ -1,15 +1,17 @@
 //! The loop closed by the estimator's own likelihood.
 
+use crate::candidates::{candidates, is_alike, ranges};
+use crate::constants::with_foretold;
 use crate::contest::{Contender, ScoreTestSettings, Winner};
 use crate::hypothesis::Hypothesis;
 use phiw_curriculum::CurriculumError;
 use phiw_curriculum::growth::{Found, Growth};
-use phiw_effects::{Catalogue, Constants, EffectKind, JointRange, SignalRanges};
+use phiw_effects::Catalogue;
 use phiw_estimation::{
     ConcentratedLikelihood, Estimator, Evidence, EvidenceSettings, Gain, MotionLikelihood, MotionLog, Robot,
     RobotModel, RowsAt,
 };
-use phiw_identification::EffectSpec;
+use phiw_identification::{Design, EffectSpec};
 use std::sync::Arc;
 
 /// Asks of every effect of the catalogue what it would save of −log L ([`MotionLikelihood::gains`]), fits the
@@ -63,15 +65,33 @@ impl ScoreTest {
     ) -> Result<Self, CurriculumError> {
         let Some(concentrated) = &self.noise else { return Ok(self.clone()) };
         let design = robot.design_of(model)?;
-        let settings = EvidenceSettings { in_order: true, ..RowsAt::Periods.into() };
-        let mut evidence = Evidence::none(&design, settings)?;
-        for log in logs {
-            evidence.add(&design, log)?;
-        }
+        let evidence = in_order(&design, logs)?;
         let noise = concentrated.noise(&design, &evidence, &model.parameters(robot)?)?;
         let torque_noise = noise.iter().map(|noise| noise.std).collect();
         let estimator = MotionLikelihood { torque_noise, ..self.estimator.clone() };
         Ok(ScoreTest { estimator, noise: None, ..self.clone() })
+    }
+
+    /// The same with the noise that is left once these effects are in the model, and the model fitted with
+    /// it; `known` counts on the noise from before.
+    fn known_with(
+        &self,
+        robot: &Robot,
+        known: &Self,
+        model: &RobotModel,
+        effects: &[EffectSpec],
+        logs: &[MotionLog],
+    ) -> Result<(Self, RobotModel), CurriculumError> {
+        let fitted = known.fitted(robot, model, effects, logs)?;
+        let Some(concentrated) = &self.noise else { return Ok((known.clone(), fitted)) };
+        let specs = fitted.specs();
+        let design = robot.design_of(&fitted)?;
+        let evidence = in_order(&design, logs)?;
+        let estimate = concentrated.estimate(&design, &evidence, &fitted, &fitted.parameters(robot)?)?;
+        let fitted = fitted.with_parameters(robot, &specs, &estimate.parameters)?;
+        let test = self.knowing(robot, &fitted, logs)?;
+        let fitted = test.fitted(robot, &fitted, effects, logs)?;
+        Ok((test, fitted))
     }
 
     /// Every effect of the catalogue on every joint that a fit leaves something of, each with the constants
@@ -214,9 +234,7 @@ impl ScoreTest {
         let (_, without) = self.fit(robot, model, known, logs)?;
         let (mut answers, mut contenders) = (Vec::new(), Vec::new());
         for hypothesis in near {
-            let refined = self.refined(robot, model, logs, hypothesis.effects.clone())?;
-            let effects: Vec<EffectSpec> = refined.into_iter().map(|gain| gain.effect).collect();
-            let (_, with) = self.fit(robot, model, &[known, &effects].concat(), logs)?;
+            let (effects, with) = self.fitted_best((robot, model), known, hypothesis, (logs, without))?;
             let size = effects.iter().map(|effect| size(robot, effect)).fold(0, usize::saturating_add);
             let rank = effects.first().and_then(|effect| self.catalogue.rank(&effect.kind));
             let rank = rank.unwrap_or(usize::MAX);
@@ -226,34 +244,37 @@ impl ScoreTest {
         Ok((answers, contenders))
     }
 
-    /// The same effects with constants between those that were tried, each by itself.
-    fn refined(
+    /// The effects of a hypothesis with their best constants, and −log L of a fit with them and with what is
+    /// `known`; it is `without` the hypothesis.
+    fn fitted_best(
         &self,
-        robot: &Robot,
-        model: &RobotModel,
-        logs: &[MotionLog],
-        mut best: Vec<Gain>,
-    ) -> Result<Vec<Gain>, CurriculumError> {
-        let ranges = ranges(robot, logs);
-        for step in 0..self.settings.refinements {
-            let mut near: Vec<EffectSpec> = Vec::new();
-            for gain in &best {
-                let refined = self.catalogue.refined(&gain.effect, robot.tree(), &ranges, step)?;
-                near.extend(
-                    refined.into_iter().map(|constants| EffectSpec { constants, ..gain.effect.clone() }),
-                );
-            }
-            if near.is_empty() {
+        (robot, model): (&Robot, &RobotModel),
+        known: &[EffectSpec],
+        hypothesis: &Hypothesis,
+        (logs, without): (&[MotionLog], f64),
+    ) -> Result<(Vec<EffectSpec>, f64), CurriculumError> {
+        let specs = |gains: &[Gain]| gains.iter().map(|gain| gain.effect.clone()).collect::<Vec<_>>();
+        let fit = |from: &RobotModel, foretold: &[Gain]| {
+            let effects = [known, &specs(foretold)].concat();
+            self.fit(robot, &with_foretold(from, foretold), &effects, logs)
+        };
+        let mut effects = self.refined(robot, model, logs, hypothesis.effects.clone())?;
+        let (mut fitted, mut with) = fit(model, &effects)?;
+        for round in 0..self.settings.most_exchanges {
+            let exchanged = self.exchanged(robot, &fitted, logs, &specs(&effects), round)?;
+            let saved: f64 = exchanged.iter().map(|gain| gain.gain).sum();
+            let is_worth = hypothesis.merit_of(without - with + saved) >= self.settings.least_merit;
+            if saved < self.settings.least_exchange || !is_worth {
                 break;
             }
-            for gain in self.estimator.gains(robot, model, logs, &near)?.into_iter().flatten() {
-                let own = best.iter_mut().find(|best| is_alike(&best.effect, &gain.effect));
-                if let Some(own) = own.filter(|own| gain.gain > own.gain) {
-                    *own = gain;
-                }
+            let (other, better) = fit(&fitted, &exchanged)?;
+            if better >= with {
+                break;
             }
+            (effects, fitted, with) = (exchanged, other, better);
         }
-        Ok(best)
+        let effects = specs(&effects);
+        Ok((effects, with))
     }
 }
 
@@ -273,7 +294,7 @@ impl Growth for ScoreTest {
         _doubted: bool,
         refuted: &[EffectSpec],
     ) -> Result<Found, CurriculumError> {
-        self.knowing(robot, model, logs)?.found(robot, model, logs, refuted)
+        self.found(robot, model, logs, refuted)
     }
 
     fn least_gain(&self) -> f64 {
@@ -282,7 +303,6 @@ impl Growth for ScoreTest {
 }
 
 impl ScoreTest {
-    /// What a test whose noise is known finds.
     fn found(
         &self,
         robot: &Robot,
@@ -294,93 +314,39 @@ impl ScoreTest {
         if logs.iter().map(MotionLog::duration_s).sum::<f64>() < self.settings.least_s {
             return Ok(found);
         }
+        let mut test = self.knowing(robot, model, logs)?;
         // From the declared model on: what was found before may have been the wrong half of the truth.
         let mut model = match model.effects.len() == robot.declared().len() {
             true => model.clone(),
-            false => self.fitted(robot, model, &[], logs)?,
+            false => test.fitted(robot, model, &[], logs)?,
         };
         while found.answers.len() < self.settings.most_effects {
-            let all = self.hypotheses(robot, &model, logs, refuted)?;
+            let all = test.hypotheses(robot, &model, logs, refuted)?;
             let known = found.effects();
-            let Some((answer, rivals)) = self.best(robot, &model, &known, &all, logs)? else { break };
+            let Some((answer, rivals)) = test.best(robot, &model, &known, &all, logs)? else { break };
             found.rivals.extend(rivals);
             found.answers.push(answer);
             if found.answers.len() < self.settings.most_effects {
-                model = self.fitted(robot, &model, &found.effects(), logs)?;
+                // What was missing was in the noise.
+                (test, model) = self.known_with(robot, &test, &model, &found.effects(), logs)?;
             }
         }
         Ok(found)
     }
 }
 
+/// Logs with rows that are taken in order.
+fn in_order(design: &Design, logs: &[MotionLog]) -> Result<Evidence, CurriculumError> {
+    let settings = EvidenceSettings { in_order: true, ..RowsAt::Periods.into() };
+    let mut evidence = Evidence::none(design, settings)?;
+    for log in logs {
+        evidence.add(design, log)?;
+    }
+    Ok(evidence)
+}
+
 /// Parameters and constants of an effect.
 fn size(robot: &Robot, effect: &EffectSpec) -> usize {
     let built = robot.catalogue().build(effect, robot.tree());
     built.map_or(usize::MAX, |built| built.parameters().len() + effect.constants.len())
-}
-
-/// Kind and joints are the same.
-fn is_alike(one: &EffectSpec, other: &EffectSpec) -> bool {
-    one.kind == other.kind && one.joints == other.joints
-}
-
-/// Every effect that may be beside `present`, with all constants to try. Every log of a curriculum has a
-/// clock of its own: of what changes with the time since a motor was switched on, nothing is known.
-fn candidates(
-    robot: &Robot,
-    catalogue: &Catalogue,
-    ranges: &SignalRanges,
-    present: &[EffectSpec],
-) -> Vec<EffectSpec> {
-    let tree = robot.tree();
-    let mut specs = Vec::new();
-    let can_be_identified = |kind: &&dyn EffectKind| !kind.needs_held_model() && !kind.needs_session_time();
-    for kind in catalogue.kinds().filter(can_be_identified) {
-        for site in kind.sites(tree) {
-            let joints: Vec<String> = site.iter().map(|&joint| tree.joint(joint).joint.clone()).collect();
-            let spec = |constants: Constants| EffectSpec {
-                kind: kind.name().to_owned(),
-                joints: joints.clone(),
-                constants,
-            };
-            let needs = kind.build(tree, &site, &Constants::new()).needs();
-            let is_present = present.iter().any(|other| is_alike(other, &spec(Constants::new())));
-            if !is_present && !needs.derivatives {
-                specs.extend(kind.scan(&site, ranges).into_iter().map(spec));
-            }
-        }
-    }
-    specs
-}
-
-/// What the logs cover. No period of a ripple is known from a residual that is mostly noise, so there is none
-/// to try.
-fn ranges(robot: &Robot, logs: &[MotionLog]) -> SignalRanges {
-    let joints = robot.tree().joint_count();
-    let joint = |joint: usize| {
-        let each = |pick: fn(&MotionLog) -> &Vec<f64>| {
-            logs.iter().flat_map(move |log| pick(log).iter().skip(joint).step_by(joints.max(1)).copied())
-        };
-        let rms = |pick: fn(&MotionLog) -> &Vec<f64>| {
-            let (sum, count) = each(pick).fold((0.0, 0_usize), |(sum, count), x| (sum + x * x, count + 1));
-            (sum / count.max(1) as f64).sqrt()
-        };
-        JointRange {
-            position: each(|log| &log.q)
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q))),
-            velocity_rms: rms(|log| &log.qd),
-            torque_rms: rms(|log| &log.tau),
-            torque_peak: each(|log| &log.tau).fold(0.0, |peak, torque| peak.max(torque.abs())),
-            residual_rms: 0.0,
-        }
-    };
-    SignalRanges {
-        joints: (0..joints).map(joint).collect(),
-        session: (0.0, logs.iter().map(MotionLog::duration_s).fold(0.0, f64::max)),
-        period: logs.first().map_or(0.0, |log| log.period_s),
-        ripple_frequencies: vec![Vec::new(); joints],
-        temperature: false,
-        // A simulated or real loop zeroes no torque between motions.
-        logs: 1,
-    }
 }

@@ -6,7 +6,7 @@ use arm::Arm;
 use phiw_curriculum::end::FixedCount;
 use phiw_curriculum::growth::Growth;
 use phiw_curriculum::{Curriculum, CurriculumError, CurriculumRun, Experiment, unreliable_model};
-use phiw_estimation::{Estimator, Evidence, MotionLog, RobotModel, RowsAt};
+use phiw_estimation::{Estimator, Evidence, Gain, MotionLog, RobotModel, RowsAt};
 use phiw_growth::{ScoreTest, ScoreTestSettings};
 use phiw_identification::EffectSpec;
 use phiw_plant::{Friction, Mechanism, PlantEffect};
@@ -204,4 +204,50 @@ fn an_effect_that_was_found_does_not_change_what_cond_is_of() {
     let declared = arm.candidates.measured(&evidence).unwrap().condition_number();
     let kept = run.history.last().unwrap().condition_number.unwrap();
     assert!((kept / declared - 1.0).abs() < 1e-6, "{kept}, not {declared}");
+}
+
+/// Widths were chosen by the score, which begins with no friction, where nothing sticks: 0.1 rad/s for 0.01.
+#[test]
+fn a_width_is_found_beside_the_friction_that_it_is_of() {
+    let arm = Arm::new(0.02);
+    let test = test_of(&arm);
+    let logs = logs(&arm, &frictions_of_all_joints(&arm), 7);
+    let spec = |joint: &str, width| EffectSpec::new("coulomb_friction", &[joint]).with("sign_width", width);
+    let wide: Vec<EffectSpec> = arm.tree.joint_names().map(|joint| spec(joint, 0.1)).collect();
+    let model = test.fitted(&arm.robot, &arm.truth, &wide, &logs).unwrap();
+    let widths = [0.0025, 0.005, 0.01, 0.02, 0.04, 0.1];
+    let tried: Vec<EffectSpec> =
+        arm.tree.joint_names().flat_map(|joint| widths.map(|width| spec(joint, width))).collect();
+    let gains = arm.estimator().exchanges(&arm.robot, &model, &logs, &tried).unwrap();
+    let gains: Vec<Gain> = gains.into_iter().flatten().collect();
+    assert_eq!(gains.len(), tried.len());
+    let best = |own: &[Gain]| own.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)).unwrap().clone();
+    let best: Vec<Gain> = gains.chunks_exact(widths.len()).map(best).collect();
+    for gain in &best {
+        let width = gain.effect.constants["sign_width"];
+        assert!((0.01..=0.02).contains(&width), "{:?}: {width} rad/s", gain.effect.joints);
+    }
+    // The width that the friction has saves nothing, and what is foretold is what a fit saves.
+    for own in gains.chunks_exact(widths.len()) {
+        assert!(own[widths.len() - 1].gain.abs() < 2.0, "{:?}", own[widths.len() - 1]);
+    }
+    let specs: Vec<EffectSpec> = best.iter().map(|gain| gain.effect.clone()).collect();
+    let grown = test.fitted(&arm.robot, &model, &specs, &logs).unwrap();
+    let saved = negative_log_likelihood(&arm, &model, &logs) - negative_log_likelihood(&arm, &grown, &logs);
+    let foretold: f64 = best.iter().map(|gain| gain.gain).sum();
+    assert!((0.8..=1.25).contains(&(foretold / saved)), "{foretold} foretold, {saved} saved");
+}
+
+/// An effect that is another kind's, has no velocity to turn with or is not in the model takes no place.
+#[test]
+fn what_takes_no_effects_place_is_no_exchange() {
+    let arm = Arm::new(0.02);
+    let logs = logs(&arm, &[], 7);
+    let name = arm.tree.joint(2).joint.clone();
+    let tried = [
+        EffectSpec::new("coulomb_friction", &[&name]).with("sign_width", 0.01),
+        EffectSpec::new("viscous_friction", &[&name]),
+    ];
+    let gains = arm.estimator().exchanges(&arm.robot, &arm.truth, &logs, &tried).unwrap();
+    assert_eq!(gains, [None, None]);
 }
