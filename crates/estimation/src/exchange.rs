@@ -7,7 +7,8 @@
 //! torque change, and the determinants of the periods in which its friction turns.
 
 use super::joint_rows::JointRows;
-use super::turning::{Believed, Felt, Mean, TurningColumns};
+use super::turning::{Believed, Felt, TurningColumns};
+use super::turning_path::Mean;
 use super::turning_response::TurningJoints;
 use super::{Gain, MotionLikelihood, foresight};
 use crate::{EstimationError, KnownEffect, MotionLog, Robot, RobotModel};
@@ -20,9 +21,9 @@ const ROUNDS: usize = 2;
 impl MotionLikelihood {
     /// What each of the `candidates` would save in the place of the model's effect of the same kind on the
     /// same joint: its gain is that of the exchange, and its parameters are those that are then best. The
-    /// model has been fitted to these logs with this estimator. None for one that takes nothing's place, whose
-    /// columns do not turn with the joint's velocity ([`phiw_identification::Effect::turns_with`]), or that
-    /// has other parameters.
+    /// model has been fitted to these logs with this estimator. None for one that takes nothing's place,
+    /// whose columns do not turn with the joint's velocity ([`phiw_identification::Effect::turns_with`]), or
+    /// that has other parameters.
     ///
     /// # Errors
     /// A log or a candidate is not of this robot.
@@ -150,6 +151,7 @@ impl Exchange {
         let mut before = JointRows::new(0, precision);
         let mut after = JointRows::new(self.values.len(), precision);
         let mut columns = vec![[0.0; 2]; self.values.len()];
+        let believed = self.values.clone();
         for (log, means) in logs.iter().zip(means) {
             for row in 0..log.mean.len() {
                 let at = log.mean.row(row).start + self.joint;
@@ -161,12 +163,18 @@ impl Exchange {
                     let value = w[parameter];
                     let had = log.column(own, &log.means, (row, index));
                     let has = log.column(other, means, (row, index));
-                    rest[0] -= value * had[0];
-                    model[1] += value * had[1];
-                    match self.parameters.contains(&parameter) {
-                        true => columns[parameter - self.parameters.start] = has,
-                        false => rest = [rest[0] + value * has[0], rest[1] + value * has[1]],
+                    rest[0] -= value * had.value;
+                    model[1] += value * had.slope + had.beside;
+                    let mut value = value;
+                    if self.parameters.contains(&parameter) {
+                        let place = parameter - self.parameters.start;
+                        columns[place] = [has.marginal, has.marginal_slope];
+                        value = believed[place];
+                        rest[0] -= value * has.marginal;
+                        rest[1] -= value * has.marginal_slope;
                     }
+                    rest[0] += value * has.value;
+                    rest[1] += value * has.slope + has.beside;
                 }
                 before.push(model, &[], log.felt_alone[at]);
                 after.push(rest, &columns, log.felt_alone[at]);
@@ -202,12 +210,12 @@ impl<'a> Periods<'a> {
         design.correct(&mut begun);
         design.correct(&mut mean);
         let mut left = Vec::with_capacity(mean.len() * measured.joints);
-        foresight::rows(design, foreseen, (measured, Some(believed)), |row| {
-            for layout in design.rows() {
+        foresight::rows(design, foreseen, (measured, Some(believed)), |row, excess| {
+            for (layout, excess) in design.rows().iter().zip(excess) {
                 let values = &row[layout.range.clone()];
                 let product = |(value, &parameter): (&f64, &usize)| value * believed.parameters[parameter];
                 let modelled: f64 = values.iter().zip(&layout.parameters).map(product).sum();
-                left.push(modelled - values[layout.parameters.len()]);
+                left.push(modelled - excess - values[layout.parameters.len()]);
             }
             Ok(())
         })?;
@@ -237,9 +245,9 @@ impl<'a> Periods<'a> {
             for row in rows {
                 let mut deltas = vec![0.0; present.len()];
                 for (index, (parameter, joint)) in columns.iter().enumerate() {
-                    let [_, slope] = self.column(turning, &self.means, (row, index));
+                    let mean = self.column(turning, &self.means, (row, index));
                     if let Ok(place) = present.binary_search(joint) {
-                        deltas[place] += w[*parameter] * slope;
+                        deltas[place] += w[*parameter] * mean.slope + mean.beside;
                     }
                 }
                 let Some(alone) = together.felt_alone(&deltas) else { continue };
@@ -256,18 +264,26 @@ impl<'a> Periods<'a> {
         turning.means_under((&self.begun, &self.mean), self.measured, (w, &self.felt))
     }
 
-    /// A column in a period, and T times its slope.
+    /// A column in a period, its slopes times T.
     fn column(
         &self,
         turning: &TurningColumns<'_>,
         means: &[Option<Mean>],
         (row, index): (usize, usize),
-    ) -> [f64; 2] {
-        let of_beginning = || {
-            let joint = turning.columns()[index].joint;
-            [turning.at(index, self.begun.qd[self.begun.row(row).start + joint]), 0.0]
-        };
-        let mean = means[row * turning.columns().len() + index];
-        mean.map_or_else(of_beginning, |mean| [mean.value, self.measured.period_s * mean.slope])
+    ) -> Mean {
+        let period_s = self.measured.period_s;
+        match means[row * turning.columns().len() + index] {
+            Some(mean) => Mean {
+                slope: period_s * mean.slope,
+                marginal_slope: period_s * mean.marginal_slope,
+                beside: period_s * mean.beside,
+                ..mean
+            },
+            None => {
+                let joint = turning.columns()[index].joint;
+                let value = turning.at(index, self.begun.qd[self.begun.row(row).start + joint]);
+                Mean { value, slope: 0.0, marginal: value, marginal_slope: 0.0, beside: 0.0 }
+            }
+        }
     }
 }

@@ -39,7 +39,9 @@ fn of_parameters(design: &Design, asked: impl Fn(&dyn Effect, usize) -> bool) ->
 }
 
 /// Rows of a log over its periods, columns of foreseen parameters taken of the periods' beginnings or, where
-/// they turn with the velocity, of their means, `[row × evaluation width]`, one after the other to `take`.
+/// they turn with the velocity, as their mean grows with the parameter, `[row × evaluation width]`, one after
+/// the other to `take`. With them, for each torque, what the columns' product with the parameters that are
+/// believed has too much.
 ///
 /// # Errors
 /// The log is not of this robot; what `take` returns.
@@ -47,7 +49,7 @@ pub(super) fn rows(
     design: &Design,
     foreseen: &[bool],
     (measured, believed): (&MotionLog, Option<&Believed>),
-    mut take: impl FnMut(&[f64]) -> Result<(), EstimationError>,
+    mut take: impl FnMut(&[f64], &[f64]) -> Result<(), EstimationError>,
 ) -> Result<(), EstimationError> {
     let (mut block, mut begun) = (measured.over_periods(), measured.begun());
     design.correct(&mut block);
@@ -57,6 +59,7 @@ pub(super) fn rows(
     begun_scratch.begin(&begun)?;
     let mut row = vec![0.0; design.evaluation_width()];
     let mut begun_row = row.clone();
+    let mut excess = vec![0.0; design.rows().len()];
     let turning = TurningColumns::of(design, foreseen)?;
     let means = turning.means((&begun, &block), measured, believed)?;
     for sample in 0..block.len() {
@@ -68,10 +71,14 @@ pub(super) fn rows(
             columns.for_each(|(column, _)| row[start + column] = begun_row[start + column]);
         }
         let means = means.iter().skip(sample * turning.columns().len());
+        excess.fill(0.0);
         for (column, mean) in turning.columns().iter().zip(means) {
-            row[column.place] = mean.map_or(row[column.place], |mean| mean.value);
+            let Some(mean) = mean else { continue };
+            row[column.place] = mean.marginal;
+            let value = believed.map_or(0.0, |believed| believed.value(column.parameter));
+            excess[column.joint] += value * (mean.marginal - mean.value);
         }
-        take(&row)?;
+        take(&row, &excess)?;
     }
     Ok(())
 }
@@ -87,9 +94,13 @@ pub(super) fn factor(
 ) -> Result<GroupedFactor, EstimationError> {
     let mut builders: Vec<FactorBuilder> =
         design.rows().iter().map(|layout| FactorBuilder::new(layout.range.len())).collect();
-    rows(design, foreseen, measured, |row| {
-        for (builder, layout) in builders.iter_mut().zip(design.rows()) {
-            builder.push_row(&row[layout.range.clone()])?;
+    let mut own = Vec::new();
+    rows(design, foreseen, measured, |row, excess| {
+        for ((builder, layout), excess) in builders.iter_mut().zip(design.rows()).zip(excess) {
+            own.clear();
+            own.extend_from_slice(&row[layout.range.clone()]);
+            own.last_mut().into_iter().for_each(|torque| *torque += excess);
+            builder.push_row(&own)?;
         }
         Ok(())
     })?;

@@ -23,11 +23,11 @@ use phiw_regressor::least_squares::GroupedFactor;
 /// −log L(w) = Σ_t ½‖Φ_t w − f_t‖²_σ − Σ_t log det J_t(w).
 ///
 /// Least squares is the first sum alone. It makes every inertia too small, since that explains the
-/// accelerations that the noise itself has caused; the second sum counters this. J is linear in w but for the
-/// square of how much friction slows a joint within one period, and log det is concave, so the problem is
-/// convex: damped Newton steps find its only minimum from anywhere inside. Bodies that make some J indefinite
-/// can not exist, and lie outside. A closed loop does no harm: a command may depend on the past as it likes.
-/// (Compare the prediction-error view of closed-loop identification, Forssell & Ljung 1999.)
+/// accelerations that the noise itself has caused; the second sum counters this. J is linear in w, that of
+/// dry friction near the one that is believed, and log det is concave, so the problem is convex: damped
+/// Newton steps find its only minimum from anywhere inside. Bodies that make some J indefinite can not exist,
+/// and lie outside. A closed loop does no harm: a command may depend on the past as it likes. (Compare the
+/// prediction-error view of closed-loop identification, Forssell & Ljung 1999.)
 ///
 /// σ must be known: the noise of the actuators, as a data sheet gives it. With σ free, a robot with more
 /// inertia and more noise is nearly as likely, and little is gained over least squares.

@@ -1,11 +1,15 @@
 //! What a friction that turns with the velocity takes of a period in which it turns.
 //!
-//! Within a period the noise moves the joint, and near a reversal it decides when the velocity passes
-//! through zero. The friction of the period is the mean c̄ of its column along the way of the velocity from
-//! v₀ at the beginning to v₁ at the end ([`super::turning_path`]): at a constant acceleration, or slowed by
-//! the friction that the joint is believed to have, so that it may come to rest. v₁ has the period's noise
-//! in it, and so has c̄: the likelihood of the motion counts it by the slope dc̄/dv₁
-//! ([`super::turning_response`]), as it counts the acceleration by the inertia.
+//! Within a period the noise moves the joint, and near a reversal it decides when the velocity passes through
+//! zero. The friction of the period is the mean c̄ of its column along the way of the velocity from v₀ at the
+//! beginning to v₁ at the end ([`super::turning_path`]): slowed by the damping and the friction that the
+//! joint is believed to have, so that it may come to rest. v₁ has the period's noise in it, and so has c̄:
+//! the likelihood of the motion counts it by the slope dc̄/dv₁ ([`super::turning_response`]), as it counts
+//! the acceleration by the inertia.
+//!
+//! The way depends on how large the friction is. So friction and slope are taken as they are under the
+//! friction that is believed, with what they grow by with each parameter, and an estimate of that is made
+//! again.
 //!
 //! The slope is the larger the less the velocity changes, and where it changes by no more than the error with
 //! which encoders tell it, it is the error's own: a joint that rests would seem to rub. In such a period the
@@ -15,7 +19,7 @@ use super::evidence::{Instant, instants};
 use super::likelihood::column;
 use super::response::Modes;
 use super::sensitivity::Sensitivity;
-use super::turning_path::{Way, interpolated, velocities};
+use super::turning_path::{Mean, Slowed, Way, interpolated, velocities};
 use super::turning_response::TurningJoint;
 use crate::{EstimationError, MotionLog};
 use phiw_identification::Design;
@@ -52,6 +56,13 @@ pub(super) struct Believed {
     pub standing_on: Vec<usize>,
 }
 
+impl Believed {
+    /// The value of a parameter; 0 of one that is not believed.
+    pub fn value(&self, parameter: usize) -> f64 {
+        self.parameters.get(parameter).copied().unwrap_or_default()
+    }
+}
+
 /// A column that turns with a velocity.
 pub(super) struct TurningColumn {
     /// The parameter that it is of.
@@ -62,13 +73,6 @@ pub(super) struct TurningColumn {
     pub place: usize,
     /// The column at the velocities of a table.
     table: Vec<f64>,
-}
-
-/// The mean of a column over a period and its slope by the velocity at the end.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Mean {
-    pub value: f64,
-    pub slope: f64,
 }
 
 impl<'a> TurningColumns<'a> {
@@ -174,12 +178,17 @@ impl<'a> TurningColumns<'a> {
         let (joints, period_s) = (measured.joints, measured.period_s);
         let least = least_changes(measured);
         let frictions = self.frictions(parameters);
-        let velocities_by_torque = felt.iter().flat_map(|felt| {
-            let of_joint = |joint: &Option<TurningJoint>| joint.as_ref().map_or(0.0, |joint| joint.velocity);
-            let own: Rc<[f64]> = felt.joints.iter().map(of_joint).collect();
+        let slowed = felt.iter().flat_map(|felt| {
+            let of_joint = |joint: &Option<TurningJoint>| {
+                let own = joint.as_ref().map(|joint| [joint.acceleration, joint.velocity]);
+                own.map_or_else(Slowed::default, |[free, damped]| {
+                    Slowed::of(period_s * free, period_s * damped)
+                })
+            };
+            let own: Rc<[Slowed]> = felt.joints.iter().map(of_joint).collect();
             std::iter::repeat_n(own, felt.periods)
         });
-        let velocities_by_torque: Vec<Rc<[f64]>> = velocities_by_torque.collect();
+        let slowed: Vec<Rc<[Slowed]>> = slowed.collect();
         let mut of_joints = vec![Vec::new(); joints];
         for (index, column) in self.columns.iter().enumerate() {
             of_joints[column.joint].push(index);
@@ -195,12 +204,16 @@ impl<'a> TurningColumns<'a> {
                     continue;
                 }
                 let friction = frictions.get(joint).and_then(Option::as_deref);
-                let scale = velocities_by_torque.get(row).map_or(0.0, |own| period_s * own[joint]);
-                way.lay([begun.qd[at], begun.qd[at] + change], &self.velocities, friction, scale);
+                let slowed = slowed.get(row).map_or_else(Slowed::default, |own| own[joint]);
+                way.lay([begun.qd[at], begun.qd[at] + change], (&self.velocities, friction), slowed);
+                let mut beside = if slowed.scale > 0.0 { way.beside() / slowed.scale } else { 0.0 };
                 for &index in own {
-                    let [value, slope] = way.mean_of(&self.velocities, &self.columns[index].table);
-                    let slope = if (slope * change).abs() < ROUNDING { 0.0 } else { slope };
-                    of_row[index] = Some(Mean { value, slope });
+                    let mut mean = way.mean_of(&self.velocities, &self.columns[index].table);
+                    for slope in [&mut mean.slope, &mut mean.marginal_slope] {
+                        *slope = if (*slope * change).abs() < ROUNDING { 0.0 } else { *slope };
+                    }
+                    mean.beside = std::mem::take(&mut beside);
+                    of_row[index] = Some(mean);
                 }
             }
         }
@@ -281,8 +294,11 @@ fn least_changes(measured: &MotionLog) -> Vec<f64> {
 pub(super) struct Turned {
     /// The parameters of the columns, and the joint that each turns with.
     pub columns: Vec<(usize, usize)>,
-    /// T·dc̄/dv₁ of each of them, `[period × column]` \[unit of the column × s²/rad, s²/m\].
+    /// What T·dc̄/dv₁ of the whole friction grows by with the parameter of each of them, `[period × column]`
+    /// \[unit of the column × s²/rad, s²/m\].
     pub slopes: Vec<f64>,
+    /// What T·dc̄/dv₁ of the friction that is believed has beside, `[period × column]`.
+    pub offsets: Vec<f64>,
 }
 
 /// The slopes of a log, for each stretch of `stride` periods.
@@ -306,14 +322,22 @@ pub(super) fn turned(
     let means = turning.means((&begun, &mean), measured, believed)?;
     let columns = turning.places();
     let of_stretch = |stretch: &[Option<Mean>]| {
-        let mut slopes = Vec::new();
+        let mut turned = Turned { columns: columns.clone(), ..Turned::default() };
         for period in stretch.chunks_exact(columns.len()) {
-            let slope = |mean: &Option<Mean>| mean.map_or(0.0, |mean| measured.period_s * mean.slope);
-            if period.iter().any(|mean| slope(mean) != 0.0) {
-                slopes.extend(period.iter().map(slope));
+            let turns = |mean: &Mean| mean.slope != 0.0 || mean.marginal_slope != 0.0;
+            if period.iter().flatten().any(turns) {
+                let of_mean = |(mean, (parameter, _)): (&Option<Mean>, &(usize, usize))| {
+                    let Some(mean) = mean else { return [0.0; 2] };
+                    let value = believed.map_or(0.0, |believed| believed.value(*parameter));
+                    let offset = mean.beside + value * (mean.slope - mean.marginal_slope);
+                    [mean.marginal_slope, offset].map(|slope| measured.period_s * slope)
+                };
+                let of_period: Vec<[f64; 2]> = period.iter().zip(&columns).map(of_mean).collect();
+                turned.slopes.extend(of_period.iter().map(|[slope, _]| slope));
+                turned.offsets.extend(of_period.iter().map(|[_, offset]| offset));
             }
         }
-        Turned { columns: columns.clone(), slopes }
+        turned
     };
     Ok(means.chunks(stride * columns.len()).map(of_stretch).collect())
 }

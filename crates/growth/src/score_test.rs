@@ -259,7 +259,8 @@ impl ScoreTest {
             self.fit(robot, &with_foretold(from, foretold), &effects, logs)
         };
         let mut effects = self.refined(robot, model, logs, hypothesis.effects.clone())?;
-        let (mut fitted, mut with) = fit(model, &effects)?;
+        // What a score foretells may be far off; the fit begins with nothing.
+        let (mut fitted, mut with) = self.fit(robot, model, &[known, &specs(&effects)].concat(), logs)?;
         for round in 0..self.settings.most_exchanges {
             let exchanged = self.exchanged(robot, &fitted, logs, &specs(&effects), round)?;
             let saved: f64 = exchanged.iter().map(|gain| gain.gain).sum();
