@@ -7,7 +7,7 @@
 //! torque change, and the determinants of the periods in which its friction turns.
 
 use super::joint_rows::JointRows;
-use super::turning::{Believed, Felt, TurningColumns};
+use super::turning::{Believed, Felt, Means, TurningColumns};
 use super::turning_path::Mean;
 use super::turning_response::TurningJoints;
 use super::{Gain, MotionLikelihood, foresight};
@@ -142,7 +142,7 @@ impl Exchange {
     fn decide(
         &mut self,
         (own, other): (&TurningColumns<'_>, &TurningColumns<'_>),
-        (logs, means): (&[Periods<'_>], &[Vec<Option<Mean>>]),
+        (logs, means): (&[Periods<'_>], &[Means]),
         w: &[f64],
         precision: f64,
     ) {
@@ -151,7 +151,6 @@ impl Exchange {
         let mut before = JointRows::new(0, precision);
         let mut after = JointRows::new(self.values.len(), precision);
         let mut columns = vec![[0.0; 2]; self.values.len()];
-        let believed = self.values.clone();
         for (log, means) in logs.iter().zip(means) {
             for row in 0..log.mean.len() {
                 let at = log.mean.row(row).start + self.joint;
@@ -160,21 +159,18 @@ impl Exchange {
                 let mut rest = model;
                 for &index in &of_joint {
                     let parameter = own.columns()[index].parameter;
-                    let value = w[parameter];
                     let had = log.column(own, &log.means, (row, index));
                     let has = log.column(other, means, (row, index));
-                    rest[0] -= value * had.value;
-                    model[1] += value * had.slope + had.beside;
-                    let mut value = value;
+                    let own_share = had.friction(log.means.believed[index], w[parameter]);
+                    rest[0] -= own_share[0];
+                    model[1] += own_share[1];
+                    let mut value = w[parameter];
                     if self.parameters.contains(&parameter) {
-                        let place = parameter - self.parameters.start;
-                        columns[place] = [has.marginal, has.marginal_slope];
-                        value = believed[place];
-                        rest[0] -= value * has.marginal;
-                        rest[1] -= value * has.marginal_slope;
+                        columns[parameter - self.parameters.start] = [has.marginal, has.marginal_slope];
+                        value = 0.0;
                     }
-                    rest[0] += value * has.value;
-                    rest[1] += value * has.slope + has.beside;
+                    let share = has.friction(means.believed[index], value);
+                    rest = [rest[0] + share[0], rest[1] + share[1]];
                 }
                 before.push(model, &[], log.felt_alone[at]);
                 after.push(rest, &columns, log.felt_alone[at]);
@@ -196,7 +192,7 @@ struct Periods<'a> {
     /// What a torque on a joint does to its velocity, were it the joint's only friction that is missing.
     felt_alone: Vec<f64>,
     /// Means of the model's columns.
-    means: Vec<Option<Mean>>,
+    means: Means,
 }
 
 impl<'a> Periods<'a> {
@@ -221,7 +217,7 @@ impl<'a> Periods<'a> {
         })?;
         let felt = turning.felt(&mean, measured.period_s, believed)?;
         let mut periods =
-            Periods { measured, begun, mean, left, felt, felt_alone: Vec::new(), means: Vec::new() };
+            Periods { measured, begun, mean, left, felt, felt_alone: Vec::new(), means: Means::default() };
         periods.means = periods.means(turning, &believed.parameters);
         periods.felt_alone = periods.felt_alone(turning, &believed.parameters);
         Ok(periods)
@@ -247,7 +243,7 @@ impl<'a> Periods<'a> {
                 for (index, (parameter, joint)) in columns.iter().enumerate() {
                     let mean = self.column(turning, &self.means, (row, index));
                     if let Ok(place) = present.binary_search(joint) {
-                        deltas[place] += w[*parameter] * mean.slope + mean.beside;
+                        deltas[place] += mean.friction(self.means.believed[index], w[*parameter])[1];
                     }
                 }
                 let Some(alone) = together.felt_alone(&deltas) else { continue };
@@ -260,19 +256,14 @@ impl<'a> Periods<'a> {
     }
 
     /// Means of columns under these parameters.
-    fn means(&self, turning: &TurningColumns<'_>, w: &[f64]) -> Vec<Option<Mean>> {
+    fn means(&self, turning: &TurningColumns<'_>, w: &[f64]) -> Means {
         turning.means_under((&self.begun, &self.mean), self.measured, (w, &self.felt))
     }
 
     /// A column in a period, its slopes times T.
-    fn column(
-        &self,
-        turning: &TurningColumns<'_>,
-        means: &[Option<Mean>],
-        (row, index): (usize, usize),
-    ) -> Mean {
+    fn column(&self, turning: &TurningColumns<'_>, means: &Means, (row, index): (usize, usize)) -> Mean {
         let period_s = self.measured.period_s;
-        match means[row * turning.columns().len() + index] {
+        match means.of_period(row)[index] {
             Some(mean) => Mean {
                 slope: period_s * mean.slope,
                 marginal_slope: period_s * mean.marginal_slope,

@@ -70,12 +70,11 @@ pub(super) fn rows(
             let columns = layout.parameters.iter().enumerate().filter(|(_, parameter)| foreseen[**parameter]);
             columns.for_each(|(column, _)| row[start + column] = begun_row[start + column]);
         }
-        let means = means.iter().skip(sample * turning.columns().len());
         excess.fill(0.0);
-        for (column, mean) in turning.columns().iter().zip(means) {
+        let own = means.of_period(sample).iter().zip(&means.believed);
+        for (column, (mean, value)) in turning.columns().iter().zip(own) {
             let Some(mean) = mean else { continue };
             row[column.place] = mean.marginal;
-            let value = believed.map_or(0.0, |believed| believed.value(column.parameter));
             excess[column.joint] += value * (mean.marginal - mean.value);
         }
         take(&row, &excess)?;

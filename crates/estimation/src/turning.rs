@@ -56,10 +56,20 @@ pub(super) struct Believed {
     pub standing_on: Vec<usize>,
 }
 
-impl Believed {
-    /// The value of a parameter; 0 of one that is not believed.
-    pub fn value(&self, parameter: usize) -> f64 {
-        self.parameters.get(parameter).copied().unwrap_or_default()
+/// What frictions take of the periods of a log under parameters that are believed.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Means {
+    /// The parameters of the columns, in their order.
+    pub believed: Vec<f64>,
+    /// The columns of the periods, `[period × column]`; none where the velocity does not change for certain.
+    pub of_periods: Vec<Option<Mean>>,
+}
+
+impl Means {
+    /// Those of a period.
+    pub fn of_period(&self, period: usize) -> &[Option<Mean>] {
+        let width = self.believed.len();
+        self.of_periods.get(period * width..(period + 1) * width).unwrap_or_default()
     }
 }
 
@@ -155,7 +165,7 @@ impl<'a> TurningColumns<'a> {
         (begun, mean): (&Block, &Block),
         measured: &MotionLog,
         believed: Option<&Believed>,
-    ) -> Result<Vec<Option<Mean>>, EstimationError> {
+    ) -> Result<Means, EstimationError> {
         let felt = match believed.filter(|_| !self.columns.is_empty()) {
             Some(believed) => self.felt(mean, measured.period_s, believed)?,
             None => Vec::new(),
@@ -171,13 +181,14 @@ impl<'a> TurningColumns<'a> {
         (begun, mean): (&Block, &Block),
         measured: &MotionLog,
         (parameters, felt): (&[f64], &[Felt]),
-    ) -> Vec<Option<Mean>> {
+    ) -> Means {
         if self.columns.is_empty() {
-            return Vec::new();
+            return Means::default();
         }
         let (joints, period_s) = (measured.joints, measured.period_s);
         let least = least_changes(measured);
-        let frictions = self.frictions(parameters);
+        let believed = self.rubbing(parameters);
+        let frictions = self.frictions(&believed);
         let slowed = felt.iter().flat_map(|felt| {
             let of_joint = |joint: &Option<TurningJoint>| {
                 let own = joint.as_ref().map(|joint| [joint.acceleration, joint.velocity]);
@@ -217,27 +228,33 @@ impl<'a> TurningColumns<'a> {
                 }
             }
         }
-        means
+        Means { believed, of_periods: means }
     }
 
-    /// The friction that each joint is believed to have \[N·m, N\] at the velocities of the tables; none
-    /// where it is believed to have none.
-    fn frictions(&self, parameters: &[f64]) -> Vec<Option<Vec<f64>>> {
-        let mut frictions = vec![None; self.design.tree().joint_count()];
-        for column in &self.columns {
-            let value = parameters.get(column.parameter).copied().unwrap_or_default();
-            if value != 0.0 {
-                let friction: &mut Vec<f64> =
-                    frictions[column.joint].get_or_insert_with(|| vec![0.0; self.velocities.len()]);
-                friction.iter_mut().zip(&column.table).for_each(|(sum, own)| *sum += value * own);
-            }
+    /// The parameters of the columns, in their order. What pushes along is no friction: where that of a joint
+    /// comes out so, as it may where nothing was believed to slow the joint, it is taken to rub as much.
+    fn rubbing(&self, parameters: &[f64]) -> Vec<f64> {
+        let value = |column: &TurningColumn| parameters.get(column.parameter).copied().unwrap_or_default();
+        let mut values: Vec<f64> = self.columns.iter().map(value).collect();
+        let mut power = vec![0.0; self.design.tree().joint_count()];
+        for (column, value) in self.columns.iter().zip(&values) {
+            let products = column.table.iter().zip(&self.velocities).map(|(own, velocity)| own * velocity);
+            power[column.joint] += value * products.sum::<f64>();
         }
-        // What pushes along is no friction: near nothing it may come out so.
-        for friction in frictions.iter_mut().flatten() {
-            let power = |(friction, velocity): (&f64, &f64)| friction * velocity;
-            if friction.iter().zip(&self.velocities).map(power).sum::<f64>() < 0.0 {
-                friction.fill(0.0);
-            }
+        for (column, value) in self.columns.iter().zip(&mut values) {
+            *value = if power[column.joint] < 0.0 { -*value } else { *value };
+        }
+        values
+    }
+
+    /// The friction of each joint \[N·m, N\] at the velocities of the tables under these parameters of the
+    /// columns; none where it has none.
+    fn frictions(&self, values: &[f64]) -> Vec<Option<Vec<f64>>> {
+        let mut frictions = vec![None; self.design.tree().joint_count()];
+        for (column, value) in self.columns.iter().zip(values).filter(|(_, value)| **value != 0.0) {
+            let friction: &mut Vec<f64> =
+                frictions[column.joint].get_or_insert_with(|| vec![0.0; self.velocities.len()]);
+            friction.iter_mut().zip(&column.table).for_each(|(sum, own)| *sum += value * own);
         }
         frictions
     }
@@ -321,25 +338,25 @@ pub(super) fn turned(
     design.correct(&mut mean);
     let means = turning.means((&begun, &mean), measured, believed)?;
     let columns = turning.places();
+    let believed = &means.believed;
     let of_stretch = |stretch: &[Option<Mean>]| {
         let mut turned = Turned { columns: columns.clone(), ..Turned::default() };
         for period in stretch.chunks_exact(columns.len()) {
             let turns = |mean: &Mean| mean.slope != 0.0 || mean.marginal_slope != 0.0;
             if period.iter().flatten().any(turns) {
-                let of_mean = |(mean, (parameter, _)): (&Option<Mean>, &(usize, usize))| {
+                let of_mean = |(mean, value): (&Option<Mean>, &f64)| {
                     let Some(mean) = mean else { return [0.0; 2] };
-                    let value = believed.map_or(0.0, |believed| believed.value(*parameter));
                     let offset = mean.beside + value * (mean.slope - mean.marginal_slope);
                     [mean.marginal_slope, offset].map(|slope| measured.period_s * slope)
                 };
-                let of_period: Vec<[f64; 2]> = period.iter().zip(&columns).map(of_mean).collect();
+                let of_period: Vec<[f64; 2]> = period.iter().zip(believed).map(of_mean).collect();
                 turned.slopes.extend(of_period.iter().map(|[slope, _]| slope));
                 turned.offsets.extend(of_period.iter().map(|[_, offset]| offset));
             }
         }
         turned
     };
-    Ok(means.chunks(stride * columns.len()).map(of_stretch).collect())
+    Ok(means.of_periods.chunks(stride * columns.len()).map(of_stretch).collect())
 }
 
 #[cfg(test)]
@@ -375,7 +392,7 @@ mod tests {
     fn means_of(design: &Design, log: &MotionLog) -> Vec<Option<Mean>> {
         let foreseen = foreseen(design);
         let turning = TurningColumns::of(design, &foreseen).unwrap();
-        turning.means((&log.begun(), &log.over_periods()), log, None).unwrap()
+        turning.means((&log.begun(), &log.over_periods()), log, None).unwrap().of_periods
     }
 
     /// Its velocity turns with the error of a measurement: each turn was evidence of friction.
@@ -387,5 +404,19 @@ mod tests {
         let log = MotionLog { readings: Some(readings), ..log(vec![0.2; 400], qd) };
         let found = means_of(&design(), &log).iter().flatten().count();
         assert!(found < 4, "{found}");
+    }
+
+    /// A wrist's friction came out below nothing under a way that nothing slowed, was taken for none, and
+    /// stayed there.
+    #[test]
+    fn a_friction_that_comes_out_below_nothing_is_taken_to_rub() {
+        let design = design();
+        let foreseen = foreseen(&design);
+        let turning = TurningColumns::of(&design, &foreseen).unwrap();
+        let mut parameters = vec![0.0; design.parameter_count()];
+        for friction in [-0.3, 0.3] {
+            parameters[turning.columns()[0].parameter] = friction;
+            assert_eq!(turning.rubbing(&parameters), [0.3]);
+        }
     }
 }

@@ -273,6 +273,18 @@ pub(super) struct Mean {
     pub beside: f64,
 }
 
+impl Mean {
+    /// What the drive has of a friction, and the slope of that, under a value of the parameter near the one
+    /// that was believed.
+    pub fn friction(&self, believed: f64, value: f64) -> [f64; 2] {
+        let more = value - believed;
+        [
+            believed * self.value + more * self.marginal,
+            believed * self.slope + more * self.marginal_slope + self.beside,
+        ]
+    }
+}
+
 /// Integrals over a straight line d from `from` to `to`, u from 0 to 1.
 struct Straight {
     /// ∫(1 − u)·du/d and ∫u·du/d.
