@@ -1,5 +1,6 @@
 //! Maximum likelihood where the noise moves the robot.
 
+use super::own_friction::OwnFriction;
 use super::prior::{ParameterPrior, with_prior};
 use super::response::{Response, log_determinant};
 use super::sensitivity::Sensitivity;
@@ -115,10 +116,13 @@ impl Estimator for MotionLikelihood {
         present: &RobotModel,
         present_parameters: &[f64],
     ) -> Result<Estimate, EstimationError> {
-        let standing = (evidence, self.standing_on.as_slice());
-        under_own_friction(design, standing, &self.newton, present_parameters, |evidence, start| {
-            self.minimum(design, evidence, present, start)
-        })
+        let own = OwnFriction { design, standing_on: &self.standing_on, settings: &self.newton };
+        own.estimate(
+            evidence,
+            present_parameters,
+            |evidence, start| self.minimum(design, evidence, present, start),
+            |evidence, w| Ok(self.problem(design, evidence)?.cost(&column(w))),
+        )
     }
 
     fn torque_noise(&self) -> Option<&[f64]> {
@@ -135,31 +139,6 @@ impl Estimator for MotionLikelihood {
         let problem = self.problem(design, under.as_ref().unwrap_or(evidence))?;
         Ok(Some(problem.cost(&column(parameters))))
     }
-}
-
-/// An estimate whose frictions turn within a period as it says itself: `estimate` from evidence and
-/// parameters to begin with, made again until it does.
-pub(super) fn under_own_friction(
-    design: &Design,
-    (evidence, standing_on): (&Evidence, &[usize]),
-    settings: &NewtonSettings,
-    present_parameters: &[f64],
-    mut estimate: impl FnMut(&Evidence, &[f64]) -> Result<Estimate, EstimationError>,
-) -> Result<Estimate, EstimationError> {
-    let under = evidence.under(design, present_parameters, standing_on)?;
-    let mut found = estimate(under.as_ref().unwrap_or(evidence), present_parameters)?;
-    for _ in 0..settings.friction_rounds {
-        let Some(under) = evidence.under(design, &found.parameters, standing_on)? else { break };
-        let next = estimate(&under, &found.parameters)?;
-        let before = std::mem::replace(&mut found, next);
-        let moved =
-            |k: usize| (found.parameters[k] - before.parameters[k]).abs() / found.standard_deviations[k];
-        // What has no standard deviation has not moved.
-        if (0..found.parameters.len()).map(moved).fold(0.0, f64::max) < settings.friction_settled {
-            break;
-        }
-    }
-    Ok(found)
 }
 
 impl MotionLikelihood {
