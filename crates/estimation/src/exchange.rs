@@ -7,8 +7,7 @@
 //! torque change, and the determinants of the periods in which its friction turns.
 
 use super::joint_rows::JointRows;
-use super::turning::{Believed, Felt, Means, TurningColumns};
-use super::turning_path::Mean;
+use super::turning::{Believed, Felt, Mean, TurningColumns};
 use super::turning_response::TurningJoints;
 use super::{Gain, MotionLikelihood, foresight};
 use crate::{EstimationError, KnownEffect, MotionLog, Robot, RobotModel};
@@ -21,9 +20,9 @@ const ROUNDS: usize = 2;
 impl MotionLikelihood {
     /// What each of the `candidates` would save in the place of the model's effect of the same kind on the
     /// same joint: its gain is that of the exchange, and its parameters are those that are then best. The
-    /// model has been fitted to these logs with this estimator. None for one that takes nothing's place,
-    /// whose columns do not turn with the joint's velocity ([`phiw_identification::Effect::turns_with`]), or
-    /// that has other parameters.
+    /// model has been fitted to these logs with this estimator. None for one that takes nothing's place, whose
+    /// columns do not turn with the joint's velocity ([`phiw_identification::Effect::turns_with`]), or that
+    /// has other parameters.
     ///
     /// # Errors
     /// A log or a candidate is not of this robot.
@@ -142,7 +141,7 @@ impl Exchange {
     fn decide(
         &mut self,
         (own, other): (&TurningColumns<'_>, &TurningColumns<'_>),
-        (logs, means): (&[Periods<'_>], &[Means]),
+        (logs, means): (&[Periods<'_>], &[Vec<Option<Mean>>]),
         w: &[f64],
         precision: f64,
     ) {
@@ -159,18 +158,15 @@ impl Exchange {
                 let mut rest = model;
                 for &index in &of_joint {
                     let parameter = own.columns()[index].parameter;
+                    let value = w[parameter];
                     let had = log.column(own, &log.means, (row, index));
                     let has = log.column(other, means, (row, index));
-                    let own_share = had.friction(log.means.believed[index], w[parameter]);
-                    rest[0] -= own_share[0];
-                    model[1] += own_share[1];
-                    let mut value = w[parameter];
-                    if self.parameters.contains(&parameter) {
-                        columns[parameter - self.parameters.start] = [has.marginal, has.marginal_slope];
-                        value = 0.0;
+                    rest[0] -= value * had[0];
+                    model[1] += value * had[1];
+                    match self.parameters.contains(&parameter) {
+                        true => columns[parameter - self.parameters.start] = has,
+                        false => rest = [rest[0] + value * has[0], rest[1] + value * has[1]],
                     }
-                    let share = has.friction(means.believed[index], value);
-                    rest = [rest[0] + share[0], rest[1] + share[1]];
                 }
                 before.push(model, &[], log.felt_alone[at]);
                 after.push(rest, &columns, log.felt_alone[at]);
@@ -192,7 +188,7 @@ struct Periods<'a> {
     /// What a torque on a joint does to its velocity, were it the joint's only friction that is missing.
     felt_alone: Vec<f64>,
     /// Means of the model's columns.
-    means: Means,
+    means: Vec<Option<Mean>>,
 }
 
 impl<'a> Periods<'a> {
@@ -206,18 +202,18 @@ impl<'a> Periods<'a> {
         design.correct(&mut begun);
         design.correct(&mut mean);
         let mut left = Vec::with_capacity(mean.len() * measured.joints);
-        foresight::rows(design, foreseen, (measured, Some(believed)), |row, excess| {
-            for (layout, excess) in design.rows().iter().zip(excess) {
+        foresight::rows(design, foreseen, (measured, Some(believed)), |row| {
+            for layout in design.rows() {
                 let values = &row[layout.range.clone()];
                 let product = |(value, &parameter): (&f64, &usize)| value * believed.parameters[parameter];
                 let modelled: f64 = values.iter().zip(&layout.parameters).map(product).sum();
-                left.push(modelled - excess - values[layout.parameters.len()]);
+                left.push(modelled - values[layout.parameters.len()]);
             }
             Ok(())
         })?;
         let felt = turning.felt(&mean, measured.period_s, believed)?;
         let mut periods =
-            Periods { measured, begun, mean, left, felt, felt_alone: Vec::new(), means: Means::default() };
+            Periods { measured, begun, mean, left, felt, felt_alone: Vec::new(), means: Vec::new() };
         periods.means = periods.means(turning, &believed.parameters);
         periods.felt_alone = periods.felt_alone(turning, &believed.parameters);
         Ok(periods)
@@ -241,9 +237,9 @@ impl<'a> Periods<'a> {
             for row in rows {
                 let mut deltas = vec![0.0; present.len()];
                 for (index, (parameter, joint)) in columns.iter().enumerate() {
-                    let mean = self.column(turning, &self.means, (row, index));
+                    let [_, slope] = self.column(turning, &self.means, (row, index));
                     if let Ok(place) = present.binary_search(joint) {
-                        deltas[place] += mean.friction(self.means.believed[index], w[*parameter])[1];
+                        deltas[place] += w[*parameter] * slope;
                     }
                 }
                 let Some(alone) = together.felt_alone(&deltas) else { continue };
@@ -256,25 +252,22 @@ impl<'a> Periods<'a> {
     }
 
     /// Means of columns under these parameters.
-    fn means(&self, turning: &TurningColumns<'_>, w: &[f64]) -> Means {
+    fn means(&self, turning: &TurningColumns<'_>, w: &[f64]) -> Vec<Option<Mean>> {
         turning.means_under((&self.begun, &self.mean), self.measured, (w, &self.felt))
     }
 
-    /// A column in a period, its slopes times T.
-    fn column(&self, turning: &TurningColumns<'_>, means: &Means, (row, index): (usize, usize)) -> Mean {
-        let period_s = self.measured.period_s;
-        match means.of_period(row)[index] {
-            Some(mean) => Mean {
-                slope: period_s * mean.slope,
-                marginal_slope: period_s * mean.marginal_slope,
-                beside: period_s * mean.beside,
-                ..mean
-            },
-            None => {
-                let joint = turning.columns()[index].joint;
-                let value = turning.at(index, self.begun.qd[self.begun.row(row).start + joint]);
-                Mean { value, slope: 0.0, marginal: value, marginal_slope: 0.0, beside: 0.0 }
-            }
-        }
+    /// A column in a period, and T times its slope.
+    fn column(
+        &self,
+        turning: &TurningColumns<'_>,
+        means: &[Option<Mean>],
+        (row, index): (usize, usize),
+    ) -> [f64; 2] {
+        let of_beginning = || {
+            let joint = turning.columns()[index].joint;
+            [turning.at(index, self.begun.qd[self.begun.row(row).start + joint]), 0.0]
+        };
+        let mean = means[row * turning.columns().len() + index];
+        mean.map_or_else(of_beginning, |mean| [mean.value, self.measured.period_s * mean.slope])
     }
 }

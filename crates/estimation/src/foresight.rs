@@ -39,9 +39,7 @@ fn of_parameters(design: &Design, asked: impl Fn(&dyn Effect, usize) -> bool) ->
 }
 
 /// Rows of a log over its periods, columns of foreseen parameters taken of the periods' beginnings or, where
-/// they turn with the velocity, as their mean grows with the parameter, `[row × evaluation width]`, one after
-/// the other to `take`. With them, for each torque, what the columns' product with the parameters that are
-/// believed has too much.
+/// they turn with the velocity, of their means, `[row × evaluation width]`, one after the other to `take`.
 ///
 /// # Errors
 /// The log is not of this robot; what `take` returns.
@@ -49,7 +47,7 @@ pub(super) fn rows(
     design: &Design,
     foreseen: &[bool],
     (measured, believed): (&MotionLog, Option<&Believed>),
-    mut take: impl FnMut(&[f64], &[f64]) -> Result<(), EstimationError>,
+    mut take: impl FnMut(&[f64]) -> Result<(), EstimationError>,
 ) -> Result<(), EstimationError> {
     let (mut block, mut begun) = (measured.over_periods(), measured.begun());
     design.correct(&mut block);
@@ -59,7 +57,6 @@ pub(super) fn rows(
     begun_scratch.begin(&begun)?;
     let mut row = vec![0.0; design.evaluation_width()];
     let mut begun_row = row.clone();
-    let mut excess = vec![0.0; design.rows().len()];
     let turning = TurningColumns::of(design, foreseen)?;
     let means = turning.means((&begun, &block), measured, believed)?;
     for sample in 0..block.len() {
@@ -70,14 +67,11 @@ pub(super) fn rows(
             let columns = layout.parameters.iter().enumerate().filter(|(_, parameter)| foreseen[**parameter]);
             columns.for_each(|(column, _)| row[start + column] = begun_row[start + column]);
         }
-        excess.fill(0.0);
-        let own = means.of_period(sample).iter().zip(&means.believed);
-        for (column, (mean, value)) in turning.columns().iter().zip(own) {
-            let Some(mean) = mean else { continue };
-            row[column.place] = mean.marginal;
-            excess[column.joint] += value * (mean.marginal - mean.value);
+        let means = means.iter().skip(sample * turning.columns().len());
+        for (column, mean) in turning.columns().iter().zip(means) {
+            row[column.place] = mean.map_or(row[column.place], |mean| mean.value);
         }
-        take(&row, &excess)?;
+        take(&row)?;
     }
     Ok(())
 }
@@ -93,13 +87,9 @@ pub(super) fn factor(
 ) -> Result<GroupedFactor, EstimationError> {
     let mut builders: Vec<FactorBuilder> =
         design.rows().iter().map(|layout| FactorBuilder::new(layout.range.len())).collect();
-    let mut own = Vec::new();
-    rows(design, foreseen, measured, |row, excess| {
-        for ((builder, layout), excess) in builders.iter_mut().zip(design.rows()).zip(excess) {
-            own.clear();
-            own.extend_from_slice(&row[layout.range.clone()]);
-            own.last_mut().into_iter().for_each(|torque| *torque += excess);
-            builder.push_row(&own)?;
+    rows(design, foreseen, measured, |row| {
+        for (builder, layout) in builders.iter_mut().zip(design.rows()) {
+            builder.push_row(&row[layout.range.clone()])?;
         }
         Ok(())
     })?;

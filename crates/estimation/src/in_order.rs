@@ -110,15 +110,14 @@ impl InOrder {
         let mut before: Vec<Vec<f64>> =
             self.factor.groups().iter().map(|group| vec![0.0; group.factor.columns() / 2]).collect();
         let (mut index, mut joined) = (0, Vec::new());
-        foresight::rows(design, foreseen, (measured, believed), |row, excess| {
+        foresight::rows(design, foreseen, (measured, believed), |row| {
             let here = counted[index];
             let follows = index > 0 && counted[index - 1] + 1 == here;
             index += 1;
             for (torque, layout) in design.rows().iter().enumerate() {
                 let values = &row[layout.range.clone()];
                 let (logged, columns) = (values[values.len() - 1], &values[..values.len() - 1]);
-                let command = commands[here * measured.joints + torque] + excess[torque];
-                let logged = logged + excess[torque];
+                let command = commands[here * measured.joints + torque];
                 joined.clear();
                 joined.extend_from_slice(&before[torque]);
                 joined.extend_from_slice(columns);
@@ -268,7 +267,7 @@ mod tests {
         let colour = Colour { correlation: 0.6, felt: 0.3 };
         let whitened = in_order.whitened(&vec![colour; design.rows().len()])?;
         let mut all = Vec::new();
-        foresight::rows(&design, &vec![false; design.parameter_count()], (&log, None), |row, _| {
+        foresight::rows(&design, &vec![false; design.parameter_count()], (&log, None), |row| {
             all.push(row.to_vec());
             Ok(())
         })?;

@@ -21,7 +21,6 @@ mod likelihood;
 mod logged;
 mod misfit;
 mod motion_log;
-mod own_friction;
 mod prior;
 mod profile;
 mod readings;

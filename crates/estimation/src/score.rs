@@ -77,8 +77,8 @@ impl MotionLikelihood {
         let mut score = Score::new(&design, present.effects().len(), w, precision);
         let foreseen = foresight::foreseen(&design);
         for log in logs {
-            foresight::rows(&design, &foreseen, (log, Some(&believed)), |row, excess| {
-                score.add(row, excess);
+            foresight::rows(&design, &foreseen, (log, Some(&believed)), |row| {
+                score.add(row);
                 Ok(())
             })?;
             score.flush();
@@ -252,12 +252,12 @@ impl<'a> Score<'a> {
         range.start - self.present..range.end - self.present
     }
 
-    fn add(&mut self, row: &[f64], excess: &[f64]) {
+    fn add(&mut self, row: &[f64]) {
         let at = self.rows;
-        for ((chunk, layout), excess) in self.torques.iter_mut().zip(self.design.rows()).zip(excess) {
+        for (chunk, layout) in self.torques.iter_mut().zip(self.design.rows()) {
             let values = &row[layout.range.clone()];
             let known = chunk.known.ncols() - 1;
-            let mut left = -values[layout.parameters.len()] - excess;
+            let mut left = -values[layout.parameters.len()];
             for (column, &parameter) in layout.parameters[..known].iter().enumerate() {
                 chunk.known[(at, column)] = values[column];
                 left += values[column] * self.w[parameter];

@@ -221,12 +221,12 @@ impl Belief<'_> {
         let foreseen = if self.foreseen.is_empty() { &nothing } else { self.foreseen };
         let mut asked = Vec::with_capacity(commands.len());
         let believed = Believed { parameters: self.w.to_vec(), standing_on: Vec::new() };
-        foresight::rows(self.design, foreseen, (measured, Some(&believed)), |row, excess| {
-            for ((layout, colour), excess) in self.design.rows().iter().zip(self.colours).zip(excess) {
+        foresight::rows(self.design, foreseen, (measured, Some(&believed)), |row| {
+            for (layout, colour) in self.design.rows().iter().zip(self.colours) {
                 let logged = row[layout.range.end - 1];
                 let command = commands[asked.len()];
                 let felt = command + colour.felt * (logged - command);
-                asked.push(layout.torque(row, self.w) - excess - felt);
+                asked.push(layout.torque(row, self.w) - felt);
             }
             Ok(())
         })?;

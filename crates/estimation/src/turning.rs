@@ -1,15 +1,11 @@
 //! What a friction that turns with the velocity takes of a period in which it turns.
 //!
-//! Within a period the noise moves the joint, and near a reversal it decides when the velocity passes through
-//! zero. The friction of the period is the mean c̄ of its column along the way of the velocity from v₀ at the
-//! beginning to v₁ at the end ([`super::turning_path`]): slowed by the damping and the friction that the
-//! joint is believed to have, so that it may come to rest. v₁ has the period's noise in it, and so has c̄:
-//! the likelihood of the motion counts it by the slope dc̄/dv₁ ([`super::turning_response`]), as it counts
-//! the acceleration by the inertia.
-//!
-//! The way depends on how large the friction is. So friction and slope are taken as they are under the
-//! friction that is believed, with what they grow by with each parameter, and an estimate of that is made
-//! again.
+//! Within a period the noise moves the joint, and near a reversal it decides when the velocity passes
+//! through zero. The friction of the period is the mean c̄ of its column along the way of the velocity from
+//! v₀ at the beginning to v₁ at the end ([`super::turning_path`]): at a constant acceleration, or slowed by
+//! the friction that the joint is believed to have, so that it may come to rest. v₁ has the period's noise
+//! in it, and so has c̄: the likelihood of the motion counts it by the slope dc̄/dv₁
+//! ([`super::turning_response`]), as it counts the acceleration by the inertia.
 //!
 //! The slope is the larger the less the velocity changes, and where it changes by no more than the error with
 //! which encoders tell it, it is the error's own: a joint that rests would seem to rub. In such a period the
@@ -19,7 +15,7 @@ use super::evidence::{Instant, instants};
 use super::likelihood::column;
 use super::response::Modes;
 use super::sensitivity::Sensitivity;
-use super::turning_path::{Mean, Slowed, Way, interpolated, velocities};
+use super::turning_path::{Way, interpolated, velocities};
 use super::turning_response::TurningJoint;
 use crate::{EstimationError, MotionLog};
 use phiw_identification::Design;
@@ -56,23 +52,6 @@ pub(super) struct Believed {
     pub standing_on: Vec<usize>,
 }
 
-/// What frictions take of the periods of a log under parameters that are believed.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Means {
-    /// The parameters of the columns, in their order.
-    pub believed: Vec<f64>,
-    /// The columns of the periods, `[period × column]`; none where the velocity does not change for certain.
-    pub of_periods: Vec<Option<Mean>>,
-}
-
-impl Means {
-    /// Those of a period.
-    pub fn of_period(&self, period: usize) -> &[Option<Mean>] {
-        let width = self.believed.len();
-        self.of_periods.get(period * width..(period + 1) * width).unwrap_or_default()
-    }
-}
-
 /// A column that turns with a velocity.
 pub(super) struct TurningColumn {
     /// The parameter that it is of.
@@ -83,6 +62,13 @@ pub(super) struct TurningColumn {
     pub place: usize,
     /// The column at the velocities of a table.
     table: Vec<f64>,
+}
+
+/// The mean of a column over a period and its slope by the velocity at the end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Mean {
+    pub value: f64,
+    pub slope: f64,
 }
 
 impl<'a> TurningColumns<'a> {
@@ -165,7 +151,7 @@ impl<'a> TurningColumns<'a> {
         (begun, mean): (&Block, &Block),
         measured: &MotionLog,
         believed: Option<&Believed>,
-    ) -> Result<Means, EstimationError> {
+    ) -> Result<Vec<Option<Mean>>, EstimationError> {
         let felt = match believed.filter(|_| !self.columns.is_empty()) {
             Some(believed) => self.felt(mean, measured.period_s, believed)?,
             None => Vec::new(),
@@ -181,25 +167,19 @@ impl<'a> TurningColumns<'a> {
         (begun, mean): (&Block, &Block),
         measured: &MotionLog,
         (parameters, felt): (&[f64], &[Felt]),
-    ) -> Means {
+    ) -> Vec<Option<Mean>> {
         if self.columns.is_empty() {
-            return Means::default();
+            return Vec::new();
         }
         let (joints, period_s) = (measured.joints, measured.period_s);
         let least = least_changes(measured);
-        let believed = self.rubbing(parameters);
-        let frictions = self.frictions(&believed);
-        let slowed = felt.iter().flat_map(|felt| {
-            let of_joint = |joint: &Option<TurningJoint>| {
-                let own = joint.as_ref().map(|joint| [joint.acceleration, joint.velocity]);
-                own.map_or_else(Slowed::default, |[free, damped]| {
-                    Slowed::of(period_s * free, period_s * damped)
-                })
-            };
-            let own: Rc<[Slowed]> = felt.joints.iter().map(of_joint).collect();
+        let frictions = self.frictions(parameters);
+        let velocities_by_torque = felt.iter().flat_map(|felt| {
+            let of_joint = |joint: &Option<TurningJoint>| joint.as_ref().map_or(0.0, |joint| joint.velocity);
+            let own: Rc<[f64]> = felt.joints.iter().map(of_joint).collect();
             std::iter::repeat_n(own, felt.periods)
         });
-        let slowed: Vec<Rc<[Slowed]>> = slowed.collect();
+        let velocities_by_torque: Vec<Rc<[f64]>> = velocities_by_torque.collect();
         let mut of_joints = vec![Vec::new(); joints];
         for (index, column) in self.columns.iter().enumerate() {
             of_joints[column.joint].push(index);
@@ -215,46 +195,36 @@ impl<'a> TurningColumns<'a> {
                     continue;
                 }
                 let friction = frictions.get(joint).and_then(Option::as_deref);
-                let slowed = slowed.get(row).map_or_else(Slowed::default, |own| own[joint]);
-                way.lay([begun.qd[at], begun.qd[at] + change], (&self.velocities, friction), slowed);
-                let mut beside = if slowed.scale > 0.0 { way.beside() / slowed.scale } else { 0.0 };
+                let scale = velocities_by_torque.get(row).map_or(0.0, |own| period_s * own[joint]);
+                way.lay([begun.qd[at], begun.qd[at] + change], &self.velocities, friction, scale);
                 for &index in own {
-                    let mut mean = way.mean_of(&self.velocities, &self.columns[index].table);
-                    for slope in [&mut mean.slope, &mut mean.marginal_slope] {
-                        *slope = if (*slope * change).abs() < ROUNDING { 0.0 } else { *slope };
-                    }
-                    mean.beside = std::mem::take(&mut beside);
-                    of_row[index] = Some(mean);
+                    let [value, slope] = way.mean_of(&self.velocities, &self.columns[index].table);
+                    let slope = if (slope * change).abs() < ROUNDING { 0.0 } else { slope };
+                    of_row[index] = Some(Mean { value, slope });
                 }
             }
         }
-        Means { believed, of_periods: means }
+        means
     }
 
-    /// The parameters of the columns, in their order. What pushes along is no friction: where that of a joint
-    /// comes out so, as it may where nothing was believed to slow the joint, it is taken to rub as much.
-    fn rubbing(&self, parameters: &[f64]) -> Vec<f64> {
-        let value = |column: &TurningColumn| parameters.get(column.parameter).copied().unwrap_or_default();
-        let mut values: Vec<f64> = self.columns.iter().map(value).collect();
-        let mut power = vec![0.0; self.design.tree().joint_count()];
-        for (column, value) in self.columns.iter().zip(&values) {
-            let products = column.table.iter().zip(&self.velocities).map(|(own, velocity)| own * velocity);
-            power[column.joint] += value * products.sum::<f64>();
-        }
-        for (column, value) in self.columns.iter().zip(&mut values) {
-            *value = if power[column.joint] < 0.0 { -*value } else { *value };
-        }
-        values
-    }
-
-    /// The friction of each joint \[N·m, N\] at the velocities of the tables under these parameters of the
-    /// columns; none where it has none.
-    fn frictions(&self, values: &[f64]) -> Vec<Option<Vec<f64>>> {
+    /// The friction that each joint is believed to have \[N·m, N\] at the velocities of the tables; none
+    /// where it is believed to have none.
+    fn frictions(&self, parameters: &[f64]) -> Vec<Option<Vec<f64>>> {
         let mut frictions = vec![None; self.design.tree().joint_count()];
-        for (column, value) in self.columns.iter().zip(values).filter(|(_, value)| **value != 0.0) {
-            let friction: &mut Vec<f64> =
-                frictions[column.joint].get_or_insert_with(|| vec![0.0; self.velocities.len()]);
-            friction.iter_mut().zip(&column.table).for_each(|(sum, own)| *sum += value * own);
+        for column in &self.columns {
+            let value = parameters.get(column.parameter).copied().unwrap_or_default();
+            if value != 0.0 {
+                let friction: &mut Vec<f64> =
+                    frictions[column.joint].get_or_insert_with(|| vec![0.0; self.velocities.len()]);
+                friction.iter_mut().zip(&column.table).for_each(|(sum, own)| *sum += value * own);
+            }
+        }
+        // What pushes along is no friction: near nothing it may come out so.
+        for friction in frictions.iter_mut().flatten() {
+            let power = |(friction, velocity): (&f64, &f64)| friction * velocity;
+            if friction.iter().zip(&self.velocities).map(power).sum::<f64>() < 0.0 {
+                friction.fill(0.0);
+            }
         }
         frictions
     }
@@ -311,11 +281,8 @@ fn least_changes(measured: &MotionLog) -> Vec<f64> {
 pub(super) struct Turned {
     /// The parameters of the columns, and the joint that each turns with.
     pub columns: Vec<(usize, usize)>,
-    /// What T·dc̄/dv₁ of the whole friction grows by with the parameter of each of them, `[period × column]`
-    /// \[unit of the column × s²/rad, s²/m\].
+    /// T·dc̄/dv₁ of each of them, `[period × column]` \[unit of the column × s²/rad, s²/m\].
     pub slopes: Vec<f64>,
-    /// What T·dc̄/dv₁ of the friction that is believed has beside, `[period × column]`.
-    pub offsets: Vec<f64>,
 }
 
 /// The slopes of a log, for each stretch of `stride` periods.
@@ -338,25 +305,17 @@ pub(super) fn turned(
     design.correct(&mut mean);
     let means = turning.means((&begun, &mean), measured, believed)?;
     let columns = turning.places();
-    let believed = &means.believed;
     let of_stretch = |stretch: &[Option<Mean>]| {
-        let mut turned = Turned { columns: columns.clone(), ..Turned::default() };
+        let mut slopes = Vec::new();
         for period in stretch.chunks_exact(columns.len()) {
-            let turns = |mean: &Mean| mean.slope != 0.0 || mean.marginal_slope != 0.0;
-            if period.iter().flatten().any(turns) {
-                let of_mean = |(mean, value): (&Option<Mean>, &f64)| {
-                    let Some(mean) = mean else { return [0.0; 2] };
-                    let offset = mean.beside + value * (mean.slope - mean.marginal_slope);
-                    [mean.marginal_slope, offset].map(|slope| measured.period_s * slope)
-                };
-                let of_period: Vec<[f64; 2]> = period.iter().zip(believed).map(of_mean).collect();
-                turned.slopes.extend(of_period.iter().map(|[slope, _]| slope));
-                turned.offsets.extend(of_period.iter().map(|[_, offset]| offset));
+            let slope = |mean: &Option<Mean>| mean.map_or(0.0, |mean| measured.period_s * mean.slope);
+            if period.iter().any(|mean| slope(mean) != 0.0) {
+                slopes.extend(period.iter().map(slope));
             }
         }
-        turned
+        Turned { columns: columns.clone(), slopes }
     };
-    Ok(means.of_periods.chunks(stride * columns.len()).map(of_stretch).collect())
+    Ok(means.chunks(stride * columns.len()).map(of_stretch).collect())
 }
 
 #[cfg(test)]
@@ -392,7 +351,7 @@ mod tests {
     fn means_of(design: &Design, log: &MotionLog) -> Vec<Option<Mean>> {
         let foreseen = foreseen(design);
         let turning = TurningColumns::of(design, &foreseen).unwrap();
-        turning.means((&log.begun(), &log.over_periods()), log, None).unwrap().of_periods
+        turning.means((&log.begun(), &log.over_periods()), log, None).unwrap()
     }
 
     /// Its velocity turns with the error of a measurement: each turn was evidence of friction.
@@ -404,19 +363,5 @@ mod tests {
         let log = MotionLog { readings: Some(readings), ..log(vec![0.2; 400], qd) };
         let found = means_of(&design(), &log).iter().flatten().count();
         assert!(found < 4, "{found}");
-    }
-
-    /// A wrist's friction came out below nothing under a way that nothing slowed, was taken for none, and
-    /// stayed there.
-    #[test]
-    fn a_friction_that_comes_out_below_nothing_is_taken_to_rub() {
-        let design = design();
-        let foreseen = foreseen(&design);
-        let turning = TurningColumns::of(&design, &foreseen).unwrap();
-        let mut parameters = vec![0.0; design.parameter_count()];
-        for friction in [-0.3, 0.3] {
-            parameters[turning.columns()[0].parameter] = friction;
-            assert_eq!(turning.rubbing(&parameters), [0.3]);
-        }
     }
 }

@@ -73,15 +73,16 @@ impl ScoreTest {
     }
 
     /// The same with the noise that is left once these effects are in the model, and the model fitted with
-    /// it; `known` counts on the noise from before, with which the model was `fitted`.
+    /// it; `known` counts on the noise from before.
     fn known_with(
         &self,
         robot: &Robot,
         known: &Self,
-        fitted: RobotModel,
+        model: &RobotModel,
         effects: &[EffectSpec],
         logs: &[MotionLog],
     ) -> Result<(Self, RobotModel), CurriculumError> {
+        let fitted = known.fitted(robot, model, effects, logs)?;
         let Some(concentrated) = &self.noise else { return Ok((known.clone(), fitted)) };
         let specs = fitted.specs();
         let design = robot.design_of(&fitted)?;
@@ -210,15 +211,12 @@ impl ScoreTest {
                 continue;
             };
             // A family has no rival that one motion could tell it from.
-            let pair = |rival: usize| match (
-                answers[winner].effects.as_slice(),
-                answers[rival].effects.as_slice(),
-            ) {
+            let pair = |rival: usize| match (answers[winner].as_slice(), answers[rival].as_slice()) {
                 ([own], [other]) => Some([own.clone(), other.clone()]),
                 _ => None,
             };
             let rivals = rivals.into_iter().filter_map(pair).collect();
-            return Ok(Some(Answer { rivals, ..answers.swap_remove(winner) }));
+            return Ok(Some((answers.swap_remove(winner), rivals)));
         }
     }
 
@@ -232,38 +230,36 @@ impl ScoreTest {
         known: &[EffectSpec],
         near: &[Hypothesis],
         logs: &[MotionLog],
-    ) -> Result<(Vec<Answer>, Vec<Contender>), CurriculumError> {
+    ) -> Result<(Vec<Vec<EffectSpec>>, Vec<Contender>), CurriculumError> {
         let (_, without) = self.fit(robot, model, known, logs)?;
         let (mut answers, mut contenders) = (Vec::new(), Vec::new());
         for hypothesis in near {
-            let (effects, fitted, with) =
-                self.fitted_best((robot, model), known, hypothesis, (logs, without))?;
+            let (effects, with) = self.fitted_best((robot, model), known, hypothesis, (logs, without))?;
             let size = effects.iter().map(|effect| size(robot, effect)).fold(0, usize::saturating_add);
             let rank = effects.first().and_then(|effect| self.catalogue.rank(&effect.kind));
             let rank = rank.unwrap_or(usize::MAX);
             contenders.push(Contender { merit: hypothesis.merit_of(without - with), size, rank });
-            answers.push(Answer { effects, fitted, rivals: Vec::new() });
+            answers.push(effects);
         }
         Ok((answers, contenders))
     }
 
-    /// The effects of a hypothesis with their best constants, the model fitted with them and with what is
-    /// `known`, and −log L of it; it is `without` the hypothesis.
+    /// The effects of a hypothesis with their best constants, and −log L of a fit with them and with what is
+    /// `known`; it is `without` the hypothesis.
     fn fitted_best(
         &self,
         (robot, model): (&Robot, &RobotModel),
         known: &[EffectSpec],
         hypothesis: &Hypothesis,
         (logs, without): (&[MotionLog], f64),
-    ) -> Result<(Vec<EffectSpec>, RobotModel, f64), CurriculumError> {
+    ) -> Result<(Vec<EffectSpec>, f64), CurriculumError> {
         let specs = |gains: &[Gain]| gains.iter().map(|gain| gain.effect.clone()).collect::<Vec<_>>();
         let fit = |from: &RobotModel, foretold: &[Gain]| {
             let effects = [known, &specs(foretold)].concat();
             self.fit(robot, &with_foretold(from, foretold), &effects, logs)
         };
         let mut effects = self.refined(robot, model, logs, hypothesis.effects.clone())?;
-        // What a score foretells may be far off; the fit begins with nothing.
-        let (mut fitted, mut with) = self.fit(robot, model, &[known, &specs(&effects)].concat(), logs)?;
+        let (mut fitted, mut with) = fit(model, &effects)?;
         for round in 0..self.settings.most_exchanges {
             let exchanged = self.exchanged(robot, &fitted, logs, &specs(&effects), round)?;
             let saved: f64 = exchanged.iter().map(|gain| gain.gain).sum();
@@ -278,18 +274,12 @@ impl ScoreTest {
             (effects, fitted, with) = (exchanged, other, better);
         }
         let effects = specs(&effects);
-        Ok((effects, fitted, with))
+        Ok((effects, with))
     }
 }
 
-/// What is believed to be missing.
-struct Answer {
-    effects: Vec<EffectSpec>,
-    /// The model fitted with them and with what was known before.
-    fitted: RobotModel,
-    /// Pairs of them and their rivals.
-    rivals: Vec<[EffectSpec; 2]>,
-}
+/// Effects, and pairs of them and their rivals.
+type Answer = (Vec<EffectSpec>, Vec<[EffectSpec; 2]>);
 
 impl Growth for ScoreTest {
     fn name(&self) -> &'static str {
@@ -333,12 +323,13 @@ impl ScoreTest {
         while found.answers.len() < self.settings.most_effects {
             let all = test.hypotheses(robot, &model, logs, refuted)?;
             let known = found.effects();
-            let Some(answer) = test.best(robot, &model, &known, &all, logs)? else { break };
-            found.rivals.extend(answer.rivals);
-            found.answers.push(answer.effects);
-            // What was missing was in the noise.
-            (test, model) = self.known_with(robot, &test, answer.fitted, &found.effects(), logs)?;
-            found.fitted = Some(model.clone());
+            let Some((answer, rivals)) = test.best(robot, &model, &known, &all, logs)? else { break };
+            found.rivals.extend(rivals);
+            found.answers.push(answer);
+            if found.answers.len() < self.settings.most_effects {
+                // What was missing was in the noise.
+                (test, model) = self.known_with(robot, &test, &model, &found.effects(), logs)?;
+            }
         }
         Ok(found)
     }
