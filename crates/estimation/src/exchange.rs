@@ -20,9 +20,9 @@ const ROUNDS: usize = 2;
 impl MotionLikelihood {
     /// What each of the `candidates` would save in the place of the model's effect of the same kind on the
     /// same joint: its gain is that of the exchange, and its parameters are those that are then best. The
-    /// model has been fitted to these logs with this estimator. None for one that takes nothing's place, whose
-    /// columns do not turn with the joint's velocity ([`phiw_identification::Effect::turns_with`]), or that
-    /// has other parameters.
+    /// model has been fitted to these logs with this estimator. None for one that takes nothing's place,
+    /// whose columns do not turn with the joint's velocity ([`phiw_identification::Effect::turns_with`]), or
+    /// that has other parameters.
     ///
     /// # Errors
     /// A log or a candidate is not of this robot.
