@@ -17,6 +17,7 @@ use std::ops::Range;
 
 /// How often parameters are sought under the ways that they are believed to make.
 const ROUNDS: usize = 2;
+
 impl MotionLikelihood {
     /// What each of the `candidates` would save in the place of the model's effect of the same kind on the
     /// same joint: its gain is that of the exchange, and its parameters are those that are then best. The
