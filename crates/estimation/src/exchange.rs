@@ -61,6 +61,7 @@ impl MotionLikelihood {
             }
             let other = robot.design_of(&other)?;
             let other = TurningColumns::of(&other, &foreseen)?;
+            // A kind of the user's own may have its columns elsewhere with other constants.
             if other.places() != turning.places() {
                 continue;
             }

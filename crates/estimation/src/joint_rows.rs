@@ -1,5 +1,6 @@
 //! −log L of the periods of one joint, as a function of its frictions' parameters.
 
+use super::turning_response::LEAST;
 use phiw_dynamics::dense::{Cholesky, dot};
 use std::ops::Range;
 
@@ -9,8 +10,6 @@ const MOST_STEPS: usize = 12;
 const SETTLED: f64 = 1e-3;
 /// Times at most that a step is halved.
 const MOST_HALVINGS: usize = 20;
-/// δ·ρ at the least: a friction that pushes along is none, but a search may pass there.
-const LEAST: f64 = -0.9;
 
 /// −log L of a joint's periods as a function of some of its parameters θ: ½p·Σ(r + c·θ)² − Σ log(1 + (δ +
 /// s·θ)·ρ), convex.
@@ -51,7 +50,7 @@ impl JointRows {
     /// −log L under these values.
     pub fn cost(&self, values: &[f64]) -> f64 {
         let squares: f64 = self.left(values).map(|(left, _)| left * left).sum();
-        let factor = |(delta, _): (f64, _)| (delta.max(LEAST)).ln_1p();
+        let factor = |(delta, _): (f64, _)| (delta.max(-LEAST)).ln_1p();
         0.5 * self.precision * squares - of_rows(&self.deltas, &self.slopes, values).map(factor).sum::<f64>()
     }
 
@@ -102,7 +101,7 @@ impl JointRows {
             add(&self.columns[place], self.precision * left, self.precision);
         }
         for (delta, place) in of_rows(&self.deltas, &self.slopes, values) {
-            let share = 1.0 / (1.0 + delta.max(LEAST));
+            let share = 1.0 / (1.0 + delta.max(-LEAST));
             add(&self.slopes[place], -share, share * share);
         }
         (gradient, hessian)

@@ -91,7 +91,7 @@ impl Way {
         }
         // With this much the way takes no longer than a period, and the time falls as it grows.
         let (mut low, mut high) = (f64::NEG_INFINITY, change.ln());
-        let at_rest = most.abs().max(change).ln() - LONGEST;
+        let at_rest = most.abs().max(least.abs()).max(change).ln() - LONGEST;
         let mut log = high;
         for _ in 0..MOST_STEPS {
             let (time, slope) = self.time(sign, most + log.exp());
@@ -266,6 +266,20 @@ mod tests {
                 (slope - exact_slope).abs() < 0.01 * exact_slope + 0.1,
                 "{begin} {end}: {slope}, {exact_slope}"
             );
+        }
+    }
+
+    /// What an estimate passes may push in one direction: two numbers of infinite size cancelled.
+    #[test]
+    fn a_friction_that_pushes_in_one_direction_leaves_a_way() {
+        let velocities = velocities();
+        let pushes = |velocity: &f64| if *velocity == 0.0 { 0.0 } else { -120.0 - velocity.signum() };
+        let table: Vec<f64> = velocities.iter().map(pushes).collect();
+        let mut way = Way::default();
+        for (begin, end) in [(-0.02, 0.01), (0.02, -0.01), (0.0, 0.03)] {
+            way.lay([begin, end], &velocities, Some(&table), 520.0);
+            let [value, slope] = way.mean_of(&velocities, &table);
+            assert!(value.is_finite() && slope.is_finite(), "{begin} {end}: {value}, {slope}");
         }
     }
 }

@@ -16,7 +16,7 @@ use std::borrow::Borrow;
 
 /// δ is never less than so many times −1/ρ: a friction that pushes along is none, but a search may pass
 /// there.
-const LEAST: f64 = 0.9;
+pub(super) const LEAST: f64 = 0.9;
 
 /// δ·ρ from which on a joint turns together with others that do; below, each turns as if no other did.
 const COUPLED: f64 = 0.02;

@@ -31,12 +31,7 @@ impl ScoreTest {
             if near.is_empty() {
                 break;
             }
-            for gain in self.estimator.gains(robot, model, logs, &near)?.into_iter().flatten() {
-                let own = best.iter_mut().find(|best| is_alike(&best.effect, &gain.effect));
-                if let Some(own) = own.filter(|own| gain.gain > own.gain) {
-                    *own = gain;
-                }
-            }
+            keep_better(&mut best, self.estimator.gains(robot, model, logs, &near)?);
         }
         Ok(best)
     }
@@ -76,15 +71,20 @@ impl ScoreTest {
                 near.extend(constants.into_iter().map(with));
             }
             near.retain(|effect| !tried.contains(effect));
-            for gain in self.estimator.exchanges(robot, fitted, logs, &near)?.into_iter().flatten() {
-                let own = best.iter_mut().find(|best| is_alike(&best.effect, &gain.effect));
-                if let Some(own) = own.filter(|own| gain.gain > own.gain) {
-                    *own = gain;
-                }
-            }
+            keep_better(&mut best, self.estimator.exchanges(robot, fitted, logs, &near)?);
             tried.append(&mut near);
         }
         Ok(best)
+    }
+}
+
+/// Puts what gains more in the place of the same effect with other constants.
+fn keep_better(best: &mut [Gain], gains: Vec<Option<Gain>>) {
+    for gain in gains.into_iter().flatten() {
+        let own = best.iter_mut().find(|best| is_alike(&best.effect, &gain.effect));
+        if let Some(own) = own.filter(|own| gain.gain > own.gain) {
+            *own = gain;
+        }
     }
 }
 
