@@ -207,8 +207,7 @@ impl<'a> Curriculum<'a> {
         // Effects that the likelihood refutes are excluded, and the search is repeated without them.
         for _ in 0..self.settings.most_answers {
             found = growth.look(self.robot, &learning.model, &run.logs, doubted, &refuted)?;
-            (learning, believed) =
-                self.confirmed(learning, found.answers.clone(), &run.logs, growth.least_gain())?;
+            (learning, believed) = self.confirmed(learning, &found, &run.logs, growth.least_gain())?;
             let wrong: Vec<EffectSpec> =
                 found.effects().into_iter().filter(|effect| !believed.contains(effect)).collect();
             if wrong.is_empty() {
@@ -222,7 +221,7 @@ impl<'a> Curriculum<'a> {
             let instead =
                 |spec: &EffectSpec| if *spec == effects[0] { effects[1].clone() } else { spec.clone() };
             let other: Vec<EffectSpec> = believed.iter().map(instead).collect();
-            let other = self.fitted(&learning, &other, &run.logs)?;
+            let other = self.fitted(&learning, &learning.model, &other, &run.logs)?;
             run.rivals.push(Rivalry { beliefs: [learning.model.clone(), other.model], effects });
         }
         Ok(learning)
@@ -233,16 +232,18 @@ impl<'a> Curriculum<'a> {
     fn confirmed(
         &self,
         learning: Learning,
-        mut answers: Vec<Vec<EffectSpec>>,
+        found: &Found,
         logs: &[MotionLog],
         least_gain: f64,
     ) -> Result<(Learning, Vec<EffectSpec>), CurriculumError> {
-        let mut with = self.fitted(&learning, &answers.concat(), logs)?;
+        let mut answers = found.answers.clone();
+        let from = found.fitted.as_ref().unwrap_or(&learning.model);
+        let mut with = self.fitted(&learning, from, &answers.concat(), logs)?;
         while let Some(negative_log_likelihood) = self.negative_log_likelihood(&with)? {
             let (mut gains, mut without) = (Vec::new(), Vec::new());
             for place in 0..answers.len() {
                 let others = [&answers[..place], &answers[place + 1..]].concat().concat();
-                let learning = self.fitted(&learning, &others, logs)?;
+                let learning = self.fitted(&learning, &with.model, &others, logs)?;
                 let grown = self.negative_log_likelihood(&learning)?.unwrap_or(f64::INFINITY)
                     - negative_log_likelihood;
                 gains.push(saved_by_family(grown, answers[place].len()));
@@ -272,10 +273,11 @@ impl<'a> Curriculum<'a> {
         Ok(self.estimator.misfit(&design, evidence, &estimate.parameters)?.unwrap_or_default())
     }
 
-    /// The same with other `effects` beside the declared ones, fitted to all logs again.
+    /// The same with other `effects` beside the declared ones, fitted to all logs again from a model on.
     fn fitted(
         &self,
         learning: &Learning,
+        from: &RobotModel,
         effects: &[EffectSpec],
         logs: &[MotionLog],
     ) -> Result<Learning, CurriculumError> {
@@ -283,7 +285,7 @@ impl<'a> Curriculum<'a> {
         if learning.model.specs() == *specs {
             return Ok(learning.clone());
         }
-        let model = learning.model.with_effects(self.robot, specs)?;
+        let model = from.with_effects(self.robot, specs)?;
         let evidence = Evidence::none(&self.robot.design_of(&model)?, self.evidence_settings())?;
         self.believe(evidence, &model, logs)
     }

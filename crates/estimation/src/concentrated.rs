@@ -3,8 +3,9 @@
 use super::body_prior::BodyPrior;
 use super::concentrated_settings::ConcentratedSettings;
 use super::in_order::{Colour, InOrder};
-use super::likelihood::{column, under_own_friction};
+use super::likelihood::column;
 use super::misfit::{TorqueMisfit, misfits};
+use super::own_friction::OwnFriction;
 use super::profile::{Curvature, Minimum, Profile};
 use super::sensitivity::Sensitivity;
 use super::smoothing::{Belief, Smoothed};
@@ -332,10 +333,14 @@ impl Estimator for ConcentratedLikelihood {
         present: &RobotModel,
         present_parameters: &[f64],
     ) -> Result<Estimate, EstimationError> {
-        let (standing, newton) = ((evidence, self.standing_on.as_slice()), &self.settings.newton);
-        under_own_friction(design, standing, newton, present_parameters, |evidence, start| {
-            self.minimum(design, evidence, present, start)
-        })
+        let newton = &self.settings.newton;
+        let own = OwnFriction { design, standing_on: &self.standing_on, settings: newton };
+        own.estimate(
+            evidence,
+            present_parameters,
+            |evidence, start| self.minimum(design, evidence, present, start),
+            |evidence, w| self.likelihood(design, evidence, w),
+        )
     }
 
     fn misfit(
@@ -357,13 +362,23 @@ impl Estimator for ConcentratedLikelihood {
         parameters: &[f64],
     ) -> Result<Option<f64>, EstimationError> {
         let under = evidence.under(design, parameters, &self.standing_on)?;
-        let parts = self.parts(design, under.as_ref().unwrap_or(evidence))?;
-        let colours = parts.colours(self, parameters);
-        Ok(Some(parts.profile(self, &colours)?.likelihood(&column(parameters))))
+        self.likelihood(design, under.as_ref().unwrap_or(evidence), parameters).map(Some)
     }
 }
 
 impl ConcentratedLikelihood {
+    /// −log L under `parameters`, at the colours that they leave.
+    fn likelihood(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        parameters: &[f64],
+    ) -> Result<f64, EstimationError> {
+        let parts = self.parts(design, evidence)?;
+        let colours = parts.colours(self, parameters);
+        Ok(parts.profile(self, &colours)?.likelihood(&column(parameters)))
+    }
+
     fn minimum(
         &self,
         design: &Design,

@@ -7,7 +7,8 @@
 //! torque change, and the determinants of the periods in which its friction turns.
 
 use super::joint_rows::JointRows;
-use super::turning::{Believed, Felt, Mean, TurningColumns};
+use super::turning::{Believed, Felt, TurningColumns};
+use super::turning_path::Mean;
 use super::turning_response::TurningJoints;
 use super::{Gain, MotionLikelihood, foresight};
 use crate::{EstimationError, KnownEffect, MotionLog, Robot, RobotModel};
@@ -161,10 +162,11 @@ impl Exchange {
                 for &index in &of_joint {
                     let parameter = own.columns()[index].parameter;
                     let value = w[parameter];
-                    let had = log.column(own, &log.means, (row, index));
-                    let has = log.column(other, means, (row, index));
+                    let (had, beside) = log.column(own, &log.means, (row, index));
                     rest[0] -= value * had[0];
-                    model[1] += value * had[1];
+                    model[1] += value * had[1] + beside;
+                    let (has, beside) = log.column(other, means, (row, index));
+                    rest[1] += beside;
                     match self.parameters.contains(&parameter) {
                         true => columns[parameter - self.parameters.start] = has,
                         false => rest = [rest[0] + value * has[0], rest[1] + value * has[1]],
@@ -239,9 +241,9 @@ impl<'a> Periods<'a> {
             for row in rows {
                 let mut deltas = vec![0.0; present.len()];
                 for (index, (parameter, joint)) in columns.iter().enumerate() {
-                    let [_, slope] = self.column(turning, &self.means, (row, index));
+                    let ([_, slope], beside) = self.column(turning, &self.means, (row, index));
                     if let Ok(place) = present.binary_search(joint) {
-                        deltas[place] += w[*parameter] * slope;
+                        deltas[place] += w[*parameter] * slope + beside;
                     }
                 }
                 let Some(alone) = together.felt_alone(&deltas) else { continue };
@@ -258,18 +260,19 @@ impl<'a> Periods<'a> {
         turning.means_under((&self.begun, &self.mean), self.measured, (w, &self.felt))
     }
 
-    /// A column in a period, and T times its slope.
+    /// A column in a period and T times its slope, and T times what the slope of its joint has beside.
     fn column(
         &self,
         turning: &TurningColumns<'_>,
         means: &[Option<Mean>],
         (row, index): (usize, usize),
-    ) -> [f64; 2] {
+    ) -> ([f64; 2], f64) {
         let of_beginning = || {
             let joint = turning.columns()[index].joint;
-            [turning.at(index, self.begun.qd[self.begun.row(row).start + joint]), 0.0]
+            ([turning.at(index, self.begun.qd[self.begun.row(row).start + joint]), 0.0], 0.0)
         };
-        let mean = means[row * turning.columns().len() + index];
-        mean.map_or_else(of_beginning, |mean| [mean.value, self.measured.period_s * mean.slope])
+        let period_s = self.measured.period_s;
+        let of_mean = |mean: Mean| ([mean.value, period_s * mean.slope], period_s * mean.beside);
+        means[row * turning.columns().len() + index].map_or_else(of_beginning, of_mean)
     }
 }

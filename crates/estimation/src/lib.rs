@@ -21,6 +21,7 @@ mod likelihood;
 mod logged;
 mod misfit;
 mod motion_log;
+mod own_friction;
 mod prior;
 mod profile;
 mod readings;

@@ -1,5 +1,6 @@
 //! Maximum likelihood where the noise moves the robot.
 
+use super::own_friction::OwnFriction;
 use super::prior::{ParameterPrior, with_prior};
 use super::response::{Response, log_determinant};
 use super::sensitivity::Sensitivity;
@@ -23,11 +24,11 @@ use phiw_regressor::least_squares::GroupedFactor;
 /// −log L(w) = Σ_t ½‖Φ_t w − f_t‖²_σ − Σ_t log det J_t(w).
 ///
 /// Least squares is the first sum alone. It makes every inertia too small, since that explains the
-/// accelerations that the noise itself has caused; the second sum counters this. J is linear in w but for the
-/// square of how much friction slows a joint within one period, and log det is concave, so the problem is
-/// convex: damped Newton steps find its only minimum from anywhere inside. Bodies that make some J indefinite
-/// can not exist, and lie outside. A closed loop does no harm: a command may depend on the past as it likes.
-/// (Compare the prediction-error view of closed-loop identification, Forssell & Ljung 1999.)
+/// accelerations that the noise itself has caused; the second sum counters this. J is linear in w, that of
+/// dry friction near the one that is believed, and log det is concave, so the problem is convex: damped
+/// Newton steps find its only minimum from anywhere inside. Bodies that make some J indefinite can not exist,
+/// and lie outside. A closed loop does no harm: a command may depend on the past as it likes. (Compare the
+/// prediction-error view of closed-loop identification, Forssell & Ljung 1999.)
 ///
 /// σ must be known: the noise of the actuators, as a data sheet gives it. With σ free, a robot with more
 /// inertia and more noise is nearly as likely, and little is gained over least squares.
@@ -115,10 +116,13 @@ impl Estimator for MotionLikelihood {
         present: &RobotModel,
         present_parameters: &[f64],
     ) -> Result<Estimate, EstimationError> {
-        let standing = (evidence, self.standing_on.as_slice());
-        under_own_friction(design, standing, &self.newton, present_parameters, |evidence, start| {
-            self.minimum(design, evidence, present, start)
-        })
+        let own = OwnFriction { design, standing_on: &self.standing_on, settings: &self.newton };
+        own.estimate(
+            evidence,
+            present_parameters,
+            |evidence, start| self.minimum(design, evidence, present, start),
+            |evidence, w| Ok(self.problem(design, evidence)?.cost(&column(w))),
+        )
     }
 
     fn torque_noise(&self) -> Option<&[f64]> {
@@ -135,31 +139,6 @@ impl Estimator for MotionLikelihood {
         let problem = self.problem(design, under.as_ref().unwrap_or(evidence))?;
         Ok(Some(problem.cost(&column(parameters))))
     }
-}
-
-/// An estimate whose frictions turn within a period as it says itself: `estimate` from evidence and
-/// parameters to begin with, made again until it does.
-pub(super) fn under_own_friction(
-    design: &Design,
-    (evidence, standing_on): (&Evidence, &[usize]),
-    settings: &NewtonSettings,
-    present_parameters: &[f64],
-    mut estimate: impl FnMut(&Evidence, &[f64]) -> Result<Estimate, EstimationError>,
-) -> Result<Estimate, EstimationError> {
-    let under = evidence.under(design, present_parameters, standing_on)?;
-    let mut found = estimate(under.as_ref().unwrap_or(evidence), present_parameters)?;
-    for _ in 0..settings.friction_rounds {
-        let Some(under) = evidence.under(design, &found.parameters, standing_on)? else { break };
-        let next = estimate(&under, &found.parameters)?;
-        let before = std::mem::replace(&mut found, next);
-        let moved =
-            |k: usize| (found.parameters[k] - before.parameters[k]).abs() / found.standard_deviations[k];
-        // What has no standard deviation has not moved.
-        if (0..found.parameters.len()).map(moved).fold(0.0, f64::max) < settings.friction_settled {
-            break;
-        }
-    }
-    Ok(found)
 }
 
 impl MotionLikelihood {

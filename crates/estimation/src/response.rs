@@ -92,11 +92,12 @@ impl Modes {
         let along = |mode: usize| dot(self.vectors.col_as_slice(mode), &reduced).powi(2);
         let share = |(mode, x): (usize, &f64)| along(mode) * (1.0 - x * damped_slope(*x));
         let velocity = self.values.iter().enumerate().map(share).sum();
+        let acceleration = dot(&reduced, &reduced);
         let half_damped = self.half_damped.as_ref()?;
         let mut moved = toward.to_vec();
         half_damped.solve_lower(&mut moved);
         half_damped.solve_upper(&mut moved);
-        Some(TurningJoint { velocity, moved, toward: toward.to_vec() })
+        Some(TurningJoint { velocity, acceleration, moved, toward: toward.to_vec() })
     }
 
     /// That of a row, in the mean of those that the instant stands for.
@@ -265,7 +266,8 @@ mod tests {
             columns.resize_with(packed(n), parameters + 2, |_, _| 0.0);
         }
         let slopes = (0..6).map(|_| rng.random_range(0.0..1.5)).collect();
-        let turned = Turned { columns: vec![(parameters, 0), (parameters + 1, n - 1)], slopes };
+        let offsets = (0..6).map(|_| rng.random_range(0.0..0.2)).collect();
+        let turned = Turned { columns: vec![(parameters, 0), (parameters + 1, n - 1)], slopes, offsets };
         Sensitivity { weight: 4.0, turned, ..with }
     }
 

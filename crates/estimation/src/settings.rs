@@ -26,8 +26,10 @@ pub struct NewtonSettings {
     /// nothing determines stay where they are. Default: 10⁻¹⁰ and 10⁻¹².
     pub damping: [f64; 2],
     /// Times at most that an estimate is made anew with frictions that turn within a period as the last one
-    /// says. Default: 3.
+    /// says. Default: 6.
     pub friction_rounds: usize,
+    /// Share of such a step below which it is not halved any more. Default: 1/8.
+    pub least_friction_step: f64,
     /// The largest step of a parameter, in its standard deviations, at which both agree. Default: 0.1; no
     /// command calibrates it.
     pub friction_settled: f64,
@@ -49,7 +51,8 @@ impl Default for NewtonSettings {
             instants_every: 4,
             sufficient_decrease: 0.1,
             shortest_step: 1e-6,
-            friction_rounds: 3,
+            friction_rounds: 6,
+            least_friction_step: 0.125,
             friction_settled: 0.1,
             damping: [1e-10, 1e-12],
             sphere_radius: 0.1,

@@ -1,11 +1,14 @@
 //! What a friction that turns with the velocity takes of a period in which it turns.
 //!
-//! Within a period the noise moves the joint, and near a reversal it decides when the velocity passes
-//! through zero. The friction of the period is the mean c̄ of its column along the way of the velocity from
-//! v₀ at the beginning to v₁ at the end ([`super::turning_path`]): at a constant acceleration, or slowed by
-//! the friction that the joint is believed to have, so that it may come to rest. v₁ has the period's noise
-//! in it, and so has c̄: the likelihood of the motion counts it by the slope dc̄/dv₁
-//! ([`super::turning_response`]), as it counts the acceleration by the inertia.
+//! Within a period the noise moves the joint, and near a reversal it decides when the velocity passes through
+//! zero. The friction of the period is the mean c̄ of its column along the way of the velocity from v₀ at the
+//! beginning to v₁ at the end ([`super::turning_path`]): slowed by the damping and the friction that the
+//! joint is believed to have, so that it may come to rest. v₁ has the period's noise in it, and so has c̄:
+//! the likelihood of the motion counts it by the slope dc̄/dv₁ ([`super::turning_response`]), as it counts
+//! the acceleration by the inertia.
+//!
+//! The way depends on how large the friction is. So friction and slope are those of the way under the
+//! friction that is believed, and an estimate is made again until it agrees with what it believed.
 //!
 //! The slope is the larger the less the velocity changes, and where it changes by no more than the error with
 //! which encoders tell it, it is the error's own: a joint that rests would seem to rub. In such a period the
@@ -15,7 +18,7 @@ use super::evidence::{Instant, instants};
 use super::likelihood::column;
 use super::response::Modes;
 use super::sensitivity::Sensitivity;
-use super::turning_path::{Way, interpolated, velocities};
+use super::turning_path::{Mean, Slowed, Way, interpolated, velocities};
 use super::turning_response::TurningJoint;
 use crate::{EstimationError, MotionLog};
 use phiw_identification::Design;
@@ -62,13 +65,6 @@ pub(super) struct TurningColumn {
     pub place: usize,
     /// The column at the velocities of a table.
     table: Vec<f64>,
-}
-
-/// The mean of a column over a period and its slope by the velocity at the end.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Mean {
-    pub value: f64,
-    pub slope: f64,
 }
 
 impl<'a> TurningColumns<'a> {
@@ -173,13 +169,18 @@ impl<'a> TurningColumns<'a> {
         }
         let (joints, period_s) = (measured.joints, measured.period_s);
         let least = least_changes(measured);
-        let frictions = self.frictions(parameters);
-        let velocities_by_torque = felt.iter().flat_map(|felt| {
-            let of_joint = |joint: &Option<TurningJoint>| joint.as_ref().map_or(0.0, |joint| joint.velocity);
-            let own: Rc<[f64]> = felt.joints.iter().map(of_joint).collect();
+        let frictions = self.frictions(&self.rubbing(parameters));
+        let slowed = felt.iter().flat_map(|felt| {
+            let of_joint = |joint: &Option<TurningJoint>| {
+                let own = joint.as_ref().map(|joint| [joint.acceleration, joint.velocity]);
+                own.map_or_else(Slowed::default, |[free, damped]| {
+                    Slowed::of(period_s * free, period_s * damped)
+                })
+            };
+            let own: Rc<[Slowed]> = felt.joints.iter().map(of_joint).collect();
             std::iter::repeat_n(own, felt.periods)
         });
-        let velocities_by_torque: Vec<Rc<[f64]>> = velocities_by_torque.collect();
+        let slowed: Vec<Rc<[Slowed]>> = slowed.collect();
         let mut of_joints = vec![Vec::new(); joints];
         for (index, column) in self.columns.iter().enumerate() {
             of_joints[column.joint].push(index);
@@ -195,36 +196,44 @@ impl<'a> TurningColumns<'a> {
                     continue;
                 }
                 let friction = frictions.get(joint).and_then(Option::as_deref);
-                let scale = velocities_by_torque.get(row).map_or(0.0, |own| period_s * own[joint]);
-                way.lay([begun.qd[at], begun.qd[at] + change], &self.velocities, friction, scale);
+                let slowed = slowed.get(row).map_or_else(Slowed::default, |own| own[joint]);
+                way.lay([begun.qd[at], begun.qd[at] + change], (&self.velocities, friction), slowed);
+                let mut beside = if slowed.scale > 0.0 { way.beside() / slowed.scale } else { 0.0 };
                 for &index in own {
-                    let [value, slope] = way.mean_of(&self.velocities, &self.columns[index].table);
-                    let slope = if (slope * change).abs() < ROUNDING { 0.0 } else { slope };
-                    of_row[index] = Some(Mean { value, slope });
+                    let mut mean = way.mean_of(&self.velocities, &self.columns[index].table);
+                    mean.slope = if (mean.slope * change).abs() < ROUNDING { 0.0 } else { mean.slope };
+                    mean.beside = std::mem::take(&mut beside);
+                    of_row[index] = Some(mean);
                 }
             }
         }
         means
     }
 
-    /// The friction that each joint is believed to have \[N·m, N\] at the velocities of the tables; none
-    /// where it is believed to have none.
-    fn frictions(&self, parameters: &[f64]) -> Vec<Option<Vec<f64>>> {
-        let mut frictions = vec![None; self.design.tree().joint_count()];
-        for column in &self.columns {
-            let value = parameters.get(column.parameter).copied().unwrap_or_default();
-            if value != 0.0 {
-                let friction: &mut Vec<f64> =
-                    frictions[column.joint].get_or_insert_with(|| vec![0.0; self.velocities.len()]);
-                friction.iter_mut().zip(&column.table).for_each(|(sum, own)| *sum += value * own);
-            }
+    /// The parameters of the columns, in their order. What pushes along is no friction: where that of a joint
+    /// comes out so, as it may where nothing was believed to slow the joint, it is taken to rub as much.
+    fn rubbing(&self, parameters: &[f64]) -> Vec<f64> {
+        let value = |column: &TurningColumn| parameters.get(column.parameter).copied().unwrap_or_default();
+        let mut values: Vec<f64> = self.columns.iter().map(value).collect();
+        let mut power = vec![0.0; self.design.tree().joint_count()];
+        for (column, value) in self.columns.iter().zip(&values) {
+            let products = column.table.iter().zip(&self.velocities).map(|(own, velocity)| own * velocity);
+            power[column.joint] += value * products.sum::<f64>();
         }
-        // What pushes along is no friction: near nothing it may come out so.
-        for friction in frictions.iter_mut().flatten() {
-            let power = |(friction, velocity): (&f64, &f64)| friction * velocity;
-            if friction.iter().zip(&self.velocities).map(power).sum::<f64>() < 0.0 {
-                friction.fill(0.0);
-            }
+        for (column, value) in self.columns.iter().zip(&mut values) {
+            *value = if power[column.joint] < 0.0 { -*value } else { *value };
+        }
+        values
+    }
+
+    /// The friction of each joint \[N·m, N\] at the velocities of the tables under these parameters of the
+    /// columns; none where it has none.
+    fn frictions(&self, values: &[f64]) -> Vec<Option<Vec<f64>>> {
+        let mut frictions = vec![None; self.design.tree().joint_count()];
+        for (column, value) in self.columns.iter().zip(values).filter(|(_, value)| **value != 0.0) {
+            let friction: &mut Vec<f64> =
+                frictions[column.joint].get_or_insert_with(|| vec![0.0; self.velocities.len()]);
+            friction.iter_mut().zip(&column.table).for_each(|(sum, own)| *sum += value * own);
         }
         frictions
     }
@@ -283,6 +292,9 @@ pub(super) struct Turned {
     pub columns: Vec<(usize, usize)>,
     /// T·dc̄/dv₁ of each of them, `[period × column]` \[unit of the column × s²/rad, s²/m\].
     pub slopes: Vec<f64>,
+    /// What δ ([`super::turning_response`]) has beside these, since a friction also changes what damping takes,
+    /// with the first of a joint's columns, `[period × column]` \[N·m·s²/rad, N·s²/m\].
+    pub offsets: Vec<f64>,
 }
 
 /// The slopes of a log, for each stretch of `stride` periods.
@@ -306,14 +318,17 @@ pub(super) fn turned(
     let means = turning.means((&begun, &mean), measured, believed)?;
     let columns = turning.places();
     let of_stretch = |stretch: &[Option<Mean>]| {
-        let mut slopes = Vec::new();
+        let mut turned = Turned { columns: columns.clone(), ..Turned::default() };
         for period in stretch.chunks_exact(columns.len()) {
-            let slope = |mean: &Option<Mean>| mean.map_or(0.0, |mean| measured.period_s * mean.slope);
-            if period.iter().any(|mean| slope(mean) != 0.0) {
-                slopes.extend(period.iter().map(slope));
+            if period.iter().flatten().any(|mean| mean.slope != 0.0) {
+                let own = |of_mean: fn(&Mean) -> f64| {
+                    period.iter().map(move |mean| measured.period_s * mean.as_ref().map_or(0.0, of_mean))
+                };
+                turned.slopes.extend(own(|mean| mean.slope));
+                turned.offsets.extend(own(|mean| mean.beside));
             }
         }
-        Turned { columns: columns.clone(), slopes }
+        turned
     };
     Ok(means.chunks(stride * columns.len()).map(of_stretch).collect())
 }
@@ -363,5 +378,19 @@ mod tests {
         let log = MotionLog { readings: Some(readings), ..log(vec![0.2; 400], qd) };
         let found = means_of(&design(), &log).iter().flatten().count();
         assert!(found < 4, "{found}");
+    }
+
+    /// A wrist's friction came out below nothing under a way that nothing slowed, was taken for none, and
+    /// stayed there.
+    #[test]
+    fn a_friction_that_comes_out_below_nothing_is_taken_to_rub() {
+        let design = design();
+        let foreseen = foreseen(&design);
+        let turning = TurningColumns::of(&design, &foreseen).unwrap();
+        let mut parameters = vec![0.0; design.parameter_count()];
+        for friction in [-0.3, 0.3] {
+            parameters[turning.columns()[0].parameter] = friction;
+            assert_eq!(turning.rubbing(&parameters), [0.3]);
+        }
     }
 }

@@ -2,11 +2,12 @@
 //!
 //! A torque of one that is held over a period T changes the velocity of a joint at its end by T·ρ, ρ =
 //! nᵀA⁻¹φ₁(X)n with what the joint moves by with each direction, n, and X and φ₁ as in [`super::response`].
-//! A friction that turns adds δ = Σ w_p·T·dc̄_p/dv₁ to what its joint asks for, so that the determinant of
-//! the period is larger by the factor det(1 + H·Δ): Δ has the δ of each joint, and H what a torque on one
-//! does to the velocity of another, NᵀG⁻¹N with G = A + ½T·F, scaled to have the ρ on its diagonal. A joint
-//! that sticks has a large δ: of those that stick the determinant tells the friction, and of the inertia
-//! only what the others feel. How the scale follows from the inertia is not counted in the derivatives.
+//! A friction that turns adds δ = Σ w_p·T·dc̄_p/dv₁, and by how much it changes what damping takes, to what
+//! its joint asks for, so that the determinant of the period is larger by the factor det(1 + H·Δ): Δ has the
+//! δ of each joint, and H what a torque on one does to the velocity of another, NᵀG⁻¹N with G = A + ½T·F,
+//! scaled to have the ρ on its diagonal. A joint that sticks has a large δ: of those that stick the
+//! determinant tells the friction, and of the inertia only what the others feel. How the scale follows from
+//! the inertia is not counted in the derivatives.
 
 use super::sensitivity::{packed, place};
 use super::turning::Turned;
@@ -28,6 +29,8 @@ const LEAST_RESPONSE: f64 = 1e-6;
 pub(super) struct TurningJoint {
     /// ρ: by how much a torque of one changes its velocity in a period, over the period.
     pub velocity: f64,
+    /// The same if it were not damped.
+    pub acceleration: f64,
     /// G⁻¹n.
     pub moved: Vec<f64>,
     /// n.
@@ -77,9 +80,9 @@ impl TurningResponse {
         let of_joints: Vec<Vec<usize>> = present.iter().map(of_joint).collect();
         let mut together = Vec::with_capacity(count);
         let mut deltas = vec![0.0; count];
-        for slopes in turned.slopes.chunks_exact(own) {
+        for (slopes, offsets) in turned.slopes.chunks_exact(own).zip(turned.offsets.chunks_exact(own)) {
             for (joint, columns) in of_joints.iter().enumerate() {
-                let own = |&index: &usize| slopes[index] * w[(sum.parameters[index], 0)];
+                let own = |&index: &usize| slopes[index] * w[(sum.parameters[index], 0)] + offsets[index];
                 deltas[joint] = columns.iter().map(own).sum();
             }
             turning_together(&mut deltas, &response, &mut together);
@@ -88,7 +91,7 @@ impl TurningResponse {
                 sum.log_determinant += row.log_determinant / weight;
             }
             for (joint, columns) in of_joints.iter().enumerate() {
-                if columns.iter().all(|&index| slopes[index] == 0.0) {
+                if columns.iter().all(|&index| slopes[index] == 0.0 && offsets[index] == 0.0) {
                     continue;
                 }
                 let place = together.iter().position(|(own, _)| *own == joint);
@@ -259,7 +262,7 @@ fn turning_together(deltas: &mut [f64], response: &Mat<f64>, together: &mut Vec<
 /// G⁻¹N of these joints, scaled, and H.
 fn responses<J: Borrow<TurningJoint>>(present: &[usize], joints: &[J]) -> (Mat<f64>, Mat<f64>) {
     let scale = |&joint: &usize| {
-        let TurningJoint { velocity, moved, toward } = joints[joint].borrow();
+        let TurningJoint { velocity, moved, toward, .. } = joints[joint].borrow();
         let acceleration = dot(moved, toward);
         if acceleration > 0.0 { (velocity / acceleration).sqrt() } else { 0.0 }
     };

@@ -10,6 +10,11 @@ pub struct ScoreTestSettings {
     /// all of them together, one right model in two hundred gets a false name if their gains are χ²
     /// (arithmetic, not a count).
     pub least_merit: f64,
+    /// How exactly the form of an effect is known, as a share of its torque. An effect that saves less beside
+    /// others than this error of theirs may cost is not believed. Higher misses small effects beside large
+    /// ones, lower names effects for what the large ones leave. Default: 0.1, how exactly frictions that turn
+    /// are found (docs/results/curriculum.md).
+    pub form_error: f64,
     /// Effects of at least this share of the best one's merit are fitted in full beside it. Lower costs fits;
     /// higher misses an effect whose gain the score predicts too small. Default: 0.6, not calibrated.
     pub near: f64,
@@ -38,6 +43,7 @@ impl Default for ScoreTestSettings {
     fn default() -> Self {
         ScoreTestSettings {
             least_merit: 5.0,
+            form_error: 0.1,
             near: 0.6,
             most_near: 5,
             alike: 3.0,
@@ -73,6 +79,13 @@ pub struct Winner {
 }
 
 impl ScoreTestSettings {
+    /// The same beside effects that save this much of −log L. That is half the square of their torque over
+    /// the noise; a share of the torque leaves the square of the share.
+    pub fn beside(&self, saved: f64) -> Self {
+        let least_merit = self.least_merit.max(self.form_error.powi(2) * saved);
+        ScoreTestSettings { least_merit, ..self.clone() }
+    }
+
     /// How many effects are fitted in full, of those with these predicted `merits`, the largest first. None
     /// of them if the best is not worth its price.
     pub fn shortlist(&self, merits: &[f64]) -> usize {

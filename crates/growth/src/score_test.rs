@@ -73,16 +73,15 @@ impl ScoreTest {
     }
 
     /// The same with the noise that is left once these effects are in the model, and the model fitted with
-    /// it; `known` counts on the noise from before.
+    /// it; `known` counts on the noise from before, with which the model was `fitted`.
     fn known_with(
         &self,
         robot: &Robot,
         known: &Self,
-        model: &RobotModel,
+        fitted: RobotModel,
         effects: &[EffectSpec],
         logs: &[MotionLog],
     ) -> Result<(Self, RobotModel), CurriculumError> {
-        let fitted = known.fitted(robot, model, effects, logs)?;
         let Some(concentrated) = &self.noise else { return Ok((known.clone(), fitted)) };
         let specs = fitted.specs();
         let design = robot.design_of(&fitted)?;
@@ -211,12 +210,16 @@ impl ScoreTest {
                 continue;
             };
             // A family has no rival that one motion could tell it from.
-            let pair = |rival: usize| match (answers[winner].as_slice(), answers[rival].as_slice()) {
+            let pair = |rival: usize| match (
+                answers[winner].effects.as_slice(),
+                answers[rival].effects.as_slice(),
+            ) {
                 ([own], [other]) => Some([own.clone(), other.clone()]),
                 _ => None,
             };
             let rivals = rivals.into_iter().filter_map(pair).collect();
-            return Ok(Some((answers.swap_remove(winner), rivals)));
+            let merit = contenders[winner].merit;
+            return Ok(Some(Answer { rivals, merit, ..answers.swap_remove(winner) }));
         }
     }
 
@@ -230,36 +233,38 @@ impl ScoreTest {
         known: &[EffectSpec],
         near: &[Hypothesis],
         logs: &[MotionLog],
-    ) -> Result<(Vec<Vec<EffectSpec>>, Vec<Contender>), CurriculumError> {
+    ) -> Result<(Vec<Answer>, Vec<Contender>), CurriculumError> {
         let (_, without) = self.fit(robot, model, known, logs)?;
         let (mut answers, mut contenders) = (Vec::new(), Vec::new());
         for hypothesis in near {
-            let (effects, with) = self.fitted_best((robot, model), known, hypothesis, (logs, without))?;
+            let (effects, fitted, with) =
+                self.fitted_best((robot, model), known, hypothesis, (logs, without))?;
             let size = effects.iter().map(|effect| size(robot, effect)).fold(0, usize::saturating_add);
             let rank = effects.first().and_then(|effect| self.catalogue.rank(&effect.kind));
             let rank = rank.unwrap_or(usize::MAX);
             contenders.push(Contender { merit: hypothesis.merit_of(without - with), size, rank });
-            answers.push(effects);
+            answers.push(Answer { effects, fitted, merit: 0.0, rivals: Vec::new() });
         }
         Ok((answers, contenders))
     }
 
-    /// The effects of a hypothesis with their best constants, and −log L of a fit with them and with what is
-    /// `known`; it is `without` the hypothesis.
+    /// The effects of a hypothesis with their best constants, the model fitted with them and with what is
+    /// `known`, and −log L of it; it is `without` the hypothesis.
     fn fitted_best(
         &self,
         (robot, model): (&Robot, &RobotModel),
         known: &[EffectSpec],
         hypothesis: &Hypothesis,
         (logs, without): (&[MotionLog], f64),
-    ) -> Result<(Vec<EffectSpec>, f64), CurriculumError> {
+    ) -> Result<(Vec<EffectSpec>, RobotModel, f64), CurriculumError> {
         let specs = |gains: &[Gain]| gains.iter().map(|gain| gain.effect.clone()).collect::<Vec<_>>();
         let fit = |from: &RobotModel, foretold: &[Gain]| {
             let effects = [known, &specs(foretold)].concat();
             self.fit(robot, &with_foretold(from, foretold), &effects, logs)
         };
         let mut effects = self.refined(robot, model, logs, hypothesis.effects.clone())?;
-        let (mut fitted, mut with) = fit(model, &effects)?;
+        // What a score foretells may be far off; the fit begins with nothing.
+        let (mut fitted, mut with) = self.fit(robot, model, &[known, &specs(&effects)].concat(), logs)?;
         for round in 0..self.settings.most_exchanges {
             let exchanged = self.exchanged(robot, &fitted, logs, &specs(&effects), round)?;
             let saved: f64 = exchanged.iter().map(|gain| gain.gain).sum();
@@ -274,12 +279,20 @@ impl ScoreTest {
             (effects, fitted, with) = (exchanged, other, better);
         }
         let effects = specs(&effects);
-        Ok((effects, with))
+        Ok((effects, fitted, with))
     }
 }
 
-/// Effects, and pairs of them and their rivals.
-type Answer = (Vec<EffectSpec>, Vec<[EffectSpec; 2]>);
+/// What is believed to be missing.
+struct Answer {
+    effects: Vec<EffectSpec>,
+    /// The model fitted with them and with what was known before.
+    fitted: RobotModel,
+    /// −log L that they save, less their price.
+    merit: f64,
+    /// Pairs of them and their rivals.
+    rivals: Vec<[EffectSpec; 2]>,
+}
 
 impl Growth for ScoreTest {
     fn name(&self) -> &'static str {
@@ -320,16 +333,18 @@ impl ScoreTest {
             true => model.clone(),
             false => test.fitted(robot, model, &[], logs)?,
         };
+        let mut saved = 0.0;
         while found.answers.len() < self.settings.most_effects {
             let all = test.hypotheses(robot, &model, logs, refuted)?;
             let known = found.effects();
-            let Some((answer, rivals)) = test.best(robot, &model, &known, &all, logs)? else { break };
-            found.rivals.extend(rivals);
-            found.answers.push(answer);
-            if found.answers.len() < self.settings.most_effects {
-                // What was missing was in the noise.
-                (test, model) = self.known_with(robot, &test, &model, &found.effects(), logs)?;
-            }
+            let Some(answer) = test.best(robot, &model, &known, &all, logs)? else { break };
+            found.rivals.extend(answer.rivals);
+            found.answers.push(answer.effects);
+            // What was missing was in the noise.
+            (test, model) = self.known_with(robot, &test, answer.fitted, &found.effects(), logs)?;
+            found.fitted = Some(model.clone());
+            saved += answer.merit;
+            test.settings = self.settings.beside(saved);
         }
         Ok(found)
     }

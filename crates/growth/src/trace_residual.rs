@@ -113,7 +113,7 @@ impl Growth for TraceResidual {
         let mut torques = coloured(robot, model, logs, &self.whiteness)?;
         if torques.is_empty() && !doubted {
             let answers = present.iter().map(|effect| vec![effect.clone()]).collect();
-            return Ok(Found { answers, rivals: Vec::new() });
+            return Ok(Found { answers, ..Found::default() });
         }
         let (tree, catalogue) = (robot.tree(), self.catalogue.as_ref());
         for spec in present {

@@ -109,7 +109,7 @@ fn frictions_of_all_joints(arm: &Arm) -> Vec<PlantEffect> {
 
 /// Friction was taken of the velocity at the beginning of each period, and the noise turns it within the
 /// period. Signs that turn over 0.1 rad/s were best, friction of some joints came out below nothing, and the
-/// error of the rigid body's parameters was 0.026 where it is 0.015.
+/// error of the rigid body's parameters was 0.026 where it is 0.014.
 #[test]
 fn frictions_that_the_noise_turns_within_a_period_are_friction() {
     let arm = Arm::new(0.02);
@@ -129,13 +129,13 @@ fn frictions_that_the_noise_turns_within_a_period_are_friction() {
     for (joint, effect) in model.effects[arm.robot.declared().len()..].iter().enumerate() {
         let truth = 0.01 * arm.tree.joint(joint).limits.effort;
         let found = effect.parameters[0];
-        assert!((found / truth - 1.0).abs() < 0.25, "{joint}: {found}, {truth} N·m");
+        assert!((found / truth - 1.0).abs() < 0.2, "{joint}: {found}, {truth} N·m");
     }
     let rigid = arm.robot.design(arm.robot.declared()).unwrap().base().count();
     let (found, truth) = (model.parameters(&arm.robot).unwrap(), arm.truth.parameters(&arm.robot).unwrap());
     let squares: f64 = found[..rigid].iter().zip(&truth).map(|(own, truth)| (own - truth).powi(2)).sum();
     let error = (squares / rigid as f64).sqrt();
-    assert!(error < 0.02, "{error}");
+    assert!(error < 0.016, "{error}");
 }
 
 /// Friction of all joints that no joint's score tells is one hypothesis; of a right model none is found.
@@ -227,9 +227,9 @@ fn a_width_is_found_beside_the_friction_that_it_is_of() {
         let width = gain.effect.constants["sign_width"];
         assert!((0.01..=0.02).contains(&width), "{:?}: {width} rad/s", gain.effect.joints);
     }
-    // The width that the friction has saves nothing, and what is foretold is what a fit saves.
+    // The width that the friction has saves next to nothing, and what is foretold is what a fit saves.
     for own in gains.chunks_exact(widths.len()) {
-        assert!(own[widths.len() - 1].gain.abs() < 2.0, "{:?}", own[widths.len() - 1]);
+        assert!(own[widths.len() - 1].gain.abs() < 5.0, "{:?}", own[widths.len() - 1]);
     }
     let specs: Vec<EffectSpec> = best.iter().map(|gain| gain.effect.clone()).collect();
     let grown = test.fitted(&arm.robot, &model, &specs, &logs).unwrap();

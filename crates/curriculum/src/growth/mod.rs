@@ -15,6 +15,9 @@ pub struct Found {
     pub answers: Vec<Vec<EffectSpec>>,
     /// Pairs that the logs can not tell apart: one of the effects, and what might be there in its place.
     pub rivals: Vec<[EffectSpec; 2]>,
+    /// A model with all of it that has been fitted to the logs: where another estimate may begin. How a
+    /// friction turns depends on how large it is, and from nothing on another answer may be nearer.
+    pub fitted: Option<RobotModel>,
 }
 
 impl Found {
