@@ -29,7 +29,8 @@ use std::rc::Rc;
 /// Change of a velocity within a period from which on it is one, in standard deviations of one that encoders
 /// tell. Independent errors alone change it by 1.4 of them, and in one period of 2000 by so many.
 const CERTAIN: f64 = 5.0;
-/// What a column changes by within a period, at most, where it does not turn.
+/// What a column changes by within a period, at most, where it does not turn, and the share of a sum that is
+/// nothing.
 const ROUNDING: f64 = 1e-9;
 /// Change of a velocity that is rounding \[rad/s, m/s\].
 const LEAST_CHANGE: f64 = 1e-9;
@@ -211,17 +212,22 @@ impl<'a> TurningColumns<'a> {
     }
 
     /// The parameters of the columns, in their order. What pushes along is no friction: where that of a joint
-    /// comes out so, as it may where nothing was believed to slow the joint, it is taken to rub as much.
+    /// comes out so, as it may where nothing was believed to slow the joint, it is taken to rub as much. What
+    /// pushes along in one direction and rubs in the other is left as it is.
     fn rubbing(&self, parameters: &[f64]) -> Vec<f64> {
         let value = |column: &TurningColumn| parameters.get(column.parameter).copied().unwrap_or_default();
         let mut values: Vec<f64> = self.columns.iter().map(value).collect();
-        let mut power = vec![0.0; self.design.tree().joint_count()];
+        let mut power = vec![[0.0; 2]; self.design.tree().joint_count()];
         for (column, value) in self.columns.iter().zip(&values) {
-            let products = column.table.iter().zip(&self.velocities).map(|(own, velocity)| own * velocity);
-            power[column.joint] += value * products.sum::<f64>();
+            for (own, velocity) in column.table.iter().zip(&self.velocities) {
+                let product = value * own * velocity;
+                power[column.joint][0] += product;
+                power[column.joint][1] += product.abs();
+            }
         }
         for (column, value) in self.columns.iter().zip(&mut values) {
-            *value = if power[column.joint] < 0.0 { -*value } else { *value };
+            let [sum, of_sizes] = power[column.joint];
+            *value = if sum < -ROUNDING * of_sizes { -*value } else { *value };
         }
         values
     }
@@ -292,8 +298,8 @@ pub(super) struct Turned {
     pub columns: Vec<(usize, usize)>,
     /// T·dc̄/dv₁ of each of them, `[period × column]` \[unit of the column × s²/rad, s²/m\].
     pub slopes: Vec<f64>,
-    /// What δ ([`super::turning_response`]) has beside these, since a friction also changes what damping takes,
-    /// with the first of a joint's columns, `[period × column]` \[N·m·s²/rad, N·s²/m\].
+    /// What δ ([`super::turning_response`]) has beside these, since a friction also changes what damping
+    /// takes, with the first of a joint's columns, `[period × column]` \[N·m·s²/rad, N·s²/m\].
     pub offsets: Vec<f64>,
 }
 
@@ -350,9 +356,14 @@ mod tests {
 
     /// One joint with Coulomb friction.
     fn design() -> Design {
+        design_with(EffectSpec::new("coulomb_friction", &[]))
+    }
+
+    /// One joint with this effect.
+    fn design_with(spec: EffectSpec) -> Design {
         let tree = random_tree(3, &RandomTreeOptions { joints: 1, ..Default::default() }).unwrap();
         let joint = tree.joint(0).joint.clone();
-        let spec = EffectSpec::new("coulomb_friction", &[&joint]).with("sign_width", WIDTH);
+        let spec = EffectSpec { joints: vec![joint], ..spec }.with("sign_width", WIDTH);
         let effect = Catalogue::default().build(&spec, &tree).unwrap();
         let base = BaseParameters::of_tree(&tree, Default::default()).unwrap();
         Design::new(tree, base, vec![effect])
@@ -391,6 +402,20 @@ mod tests {
         for friction in [-0.3, 0.3] {
             parameters[turning.columns()[0].parameter] = friction;
             assert_eq!(turning.rubbing(&parameters), [0.3]);
+        }
+    }
+
+    /// Its power over both directions is nothing but rounding, which turned its sign: a right model was given
+    /// such a friction.
+    #[test]
+    fn what_rubs_in_one_direction_only_keeps_its_sign() {
+        let design = design_with(EffectSpec::new("asymmetric_friction", &[]).with("part", 1.0));
+        let foreseen = foreseen(&design);
+        let turning = TurningColumns::of(&design, &foreseen).unwrap();
+        let mut parameters = vec![0.0; design.parameter_count()];
+        for friction in [-5.45, 5.45, 0.3, -0.3] {
+            parameters[turning.columns()[0].parameter] = friction;
+            assert_eq!(turning.rubbing(&parameters), [friction]);
         }
     }
 }

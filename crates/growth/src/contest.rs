@@ -35,8 +35,6 @@ pub struct ScoreTestSettings {
     pub least_exchange: f64,
     /// Effects at most. Default: 3, a limit on the time.
     pub most_effects: usize,
-    /// Measured time below which nothing is looked for \[s\]. Default: 12.
-    pub least_s: f64,
 }
 
 impl Default for ScoreTestSettings {
@@ -52,7 +50,6 @@ impl Default for ScoreTestSettings {
             most_exchanges: 3,
             least_exchange: 1.0,
             most_effects: 3,
-            least_s: 12.0,
         }
     }
 }

@@ -7,7 +7,7 @@ use phiw_curriculum::end::FixedCount;
 use phiw_curriculum::growth::Growth;
 use phiw_curriculum::{Curriculum, CurriculumError, CurriculumRun, Experiment, unreliable_model};
 use phiw_estimation::{Estimator, Evidence, Gain, MotionLog, RobotModel, RowsAt};
-use phiw_growth::{ScoreTest, ScoreTestSettings};
+use phiw_growth::ScoreTest;
 use phiw_identification::EffectSpec;
 use phiw_plant::{Friction, Mechanism, PlantEffect};
 use rand::SeedableRng;
@@ -190,8 +190,7 @@ fn an_effect_that_was_found_does_not_change_what_cond_is_of() {
     let mut experiment = arm.experiment();
     experiment.effects.push(spring);
     let (estimator, end) = (arm.estimator(), FixedCount(3));
-    let growth =
-        ScoreTest { settings: ScoreTestSettings { least_s: 5.0, ..Default::default() }, ..test_of(&arm) };
+    let growth = test_of(&arm);
     let curriculum = Curriculum { growth: Some(&growth), ..arm.curriculum(&experiment, &estimator, &end) };
     let mut run = CurriculumRun::new(1, unreliable_model(&arm.truth, 1));
     curriculum.run::<CurriculumError>(&mut run, |_| Ok(())).unwrap();
