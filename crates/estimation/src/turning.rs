@@ -356,14 +356,14 @@ mod tests {
 
     /// One joint with Coulomb friction.
     fn design() -> Design {
-        design_with(EffectSpec::new("coulomb_friction", &[]))
+        design_with(EffectSpec::new("coulomb_friction", &[]).with("sign_width", WIDTH))
     }
 
     /// One joint with this effect.
     fn design_with(spec: EffectSpec) -> Design {
         let tree = random_tree(3, &RandomTreeOptions { joints: 1, ..Default::default() }).unwrap();
         let joint = tree.joint(0).joint.clone();
-        let spec = EffectSpec { joints: vec![joint], ..spec }.with("sign_width", WIDTH);
+        let spec = EffectSpec { joints: vec![joint], ..spec };
         let effect = Catalogue::default().build(&spec, &tree).unwrap();
         let base = BaseParameters::of_tree(&tree, Default::default()).unwrap();
         Design::new(tree, base, vec![effect])
@@ -409,13 +409,16 @@ mod tests {
     /// such a friction.
     #[test]
     fn what_rubs_in_one_direction_only_keeps_its_sign() {
-        let design = design_with(EffectSpec::new("asymmetric_friction", &[]).with("part", 1.0));
-        let foreseen = foreseen(&design);
-        let turning = TurningColumns::of(&design, &foreseen).unwrap();
-        let mut parameters = vec![0.0; design.parameter_count()];
-        for friction in [-5.45, 5.45, 0.3, -0.3] {
-            parameters[turning.columns()[0].parameter] = friction;
-            assert_eq!(turning.rubbing(&parameters), [friction]);
+        for width in [0.0011, 0.003, 0.01, WIDTH, 0.1] {
+            let spec = EffectSpec::new("asymmetric_friction", &[]).with("part", 1.0);
+            let design = design_with(spec.with("sign_width", width));
+            let foreseen = foreseen(&design);
+            let turning = TurningColumns::of(&design, &foreseen).unwrap();
+            let mut parameters = vec![0.0; design.parameter_count()];
+            for friction in [-5.45, -5.3, -4.7, -0.3, 0.3, 4.7, 5.3, 5.45] {
+                parameters[turning.columns()[0].parameter] = friction;
+                assert_eq!(turning.rubbing(&parameters), [friction], "{width} rad/s");
+            }
         }
     }
 }
