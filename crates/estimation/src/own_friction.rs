@@ -67,6 +67,7 @@ impl OwnFriction<'_> {
             belief = next;
             found = minimum(&belief.evidence, &belief.parameters)?;
         }
+        // The last minimum was not tried under its own frictions.
         found.parameters = belief.parameters;
         Ok(found)
     }

@@ -12,8 +12,8 @@ pub struct ScoreTestSettings {
     pub least_merit: f64,
     /// How exactly the form of an effect is known, as a share of its torque. An effect that saves less beside
     /// others than this error of theirs may cost is not believed. Higher misses small effects beside large
-    /// ones, lower names effects for what the large ones leave. Default: 0.1, how exactly frictions that turn
-    /// are found (docs/results/curriculum.md).
+    /// ones, lower names effects for what the large ones leave. Default: 0.1, reasoned and not calibrated:
+    /// frictions that turn are found within 16 % (docs/results/curriculum.md).
     pub form_error: f64,
     /// Effects of at least this share of the best one's merit are fitted in full beside it. Lower costs fits;
     /// higher misses an effect whose gain the score predicts too small. Default: 0.6, not calibrated.
