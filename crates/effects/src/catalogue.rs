@@ -2,8 +2,8 @@
 
 use crate::declaration::{cannot_act, joint_indices, nearest};
 use crate::{Constants, EffectKind, FittedEffect, Mechanisms, Refinement, ServoFriction, SignalRanges};
-use crate::{coupling, drift, drive, efficiency, elasticity, external, friction, hysteresis};
-use crate::{logged_torque, position, position_map, sensing, torque_gain, torque_zero};
+use crate::{coupling, drift, drive, efficiency, elasticity, external, friction, friction_over_position};
+use crate::{hysteresis, logged_torque, position, position_map, sensing, torque_gain, torque_zero};
 use phiw_codegen::JointTorque;
 use phiw_dynamics::Tree;
 use phiw_identification::effect::{EffectError, EffectParameter, JointProperty};
@@ -44,6 +44,7 @@ impl Default for Catalogue {
                 Box::new(external::ExternalForce),
                 Box::new(efficiency::DriveEfficiency),
                 Box::new(position_map::PositionMap),
+                Box::new(friction_over_position::FrictionOverPosition),
                 Box::new(logged_torque::TorqueSmoothing),
                 Box::new(torque_zero::TorqueZeroByLog),
                 Box::new(logged_torque::ClockDrift),

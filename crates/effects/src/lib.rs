@@ -12,6 +12,7 @@ mod elasticity;
 mod external;
 mod fitted;
 mod friction;
+mod friction_over_position;
 mod hysteresis;
 mod kind;
 mod logged_torque;

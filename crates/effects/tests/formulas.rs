@@ -10,7 +10,7 @@ use phiw_regressor::BaseParameters;
 use phiw_telemetry::Block;
 
 /// Kinds of the present motion alone: each has a formula.
-const OF_THE_MOTION: [&str; 15] = [
+const OF_THE_MOTION: [&str; 16] = [
     "viscous_friction",
     "coulomb_friction",
     "torque_offset",
@@ -20,6 +20,7 @@ const OF_THE_MOTION: [&str; 15] = [
     "quadratic_friction",
     "stribeck_friction",
     "load_dependent_friction",
+    "position_dependent_friction",
     "drive_efficiency",
     "joint_spring",
     "gravity_balancer",

@@ -65,6 +65,10 @@ const SENTENCES: &[(&str, &str)] = &[
         "position_map",
         "The torque of shoulder depends on its position in no simple form (a cable, a hose, cogging): it varies by 0.159 N·m RMS from -1.000 to 1.000 rad.",
     ),
+    (
+        "position_dependent_friction",
+        "The dry friction of shoulder depends on its position: 0.500 N·m more at 0.750 rad than where it is lowest, 6.28 times a turn.",
+    ),
     ("torque_smoothing", "The torque of shoulder is low-passed before it is logged, at about 0.2 Hz."),
     ("torque_zero_by_log", "The zero of the torque of shoulder differs from log to log, by up to 1.00 N·m."),
     (

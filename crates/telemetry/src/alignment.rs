@@ -11,6 +11,8 @@ const LARGEST_LAG: f64 = 0.3;
 const MOST_LAGS: usize = 40;
 /// Stretches from which on there is something to tell.
 const FEWEST: f64 = 100.0;
+/// What the decimals of a log may do to a difference of two positions, as a share of it.
+const SAME_DIFFERENCE: f64 = 1e-3;
 
 /// How a velocity column relates to the positions' differences.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -36,6 +38,9 @@ pub struct Alignment {
     /// Distance of the lags that were tried, in seconds.
     #[serde(with = "crate::any_number")]
     pub resolution: f64,
+    /// Share of the rows in which the position changes whose velocity is its difference to the row before.
+    #[serde(with = "crate::any_number", default)]
+    pub differenced: f64,
 }
 
 /// Collects an [`Alignment`] in constant memory.
@@ -54,10 +59,45 @@ pub(crate) struct AlignmentCollector {
     count: f64,
     all: [f64; 2],
     zero: [f64; 2],
+    short: ShortLag,
+    /// Rows in which the position changes, and those of them whose velocity is the difference.
+    differences: [f64; 2],
+}
+
+/// Least squares of a velocity by the positions' derivative and its change from stretch to stretch: a lag
+/// shorter than a stretch takes the lag's share of that change off.
+#[derive(Default)]
+struct ShortLag {
+    /// Σ v², Σ v·Δv, Σ Δv².
+    square: [f64; 3],
+    /// Σ qd·v, Σ qd·Δv.
+    product: [f64; 2],
+}
+
+impl ShortLag {
+    /// A stretch's mean of `qd`, and those of the positions' derivative before, in and after it.
+    fn push(&mut self, qd: f64, [before, v, after]: [f64; 3]) {
+        let change = 0.5 * (after - before);
+        for (sum, term) in self.square.iter_mut().zip([v * v, v * change, change * change]) {
+            *sum += term;
+        }
+        self.product[0] += qd * v;
+        self.product[1] += qd * change;
+    }
+
+    /// The lag in stretches, and what both explain of Σ qd². `None` where the velocity never changes.
+    fn finish(&self) -> Option<(f64, f64)> {
+        let ([vv, va, aa], [qv, qa]) = (self.square, self.product);
+        let determinant = vv * aa - va * va;
+        let (slope, change) = ((qv * aa - qa * va) / determinant, (qa * vv - qv * va) / determinant);
+        let lag = -change / slope;
+        lag.is_finite().then_some((lag, slope * qv + change * qa))
+    }
 }
 
 struct Stretch {
     first: [f64; 2],
+    /// Time, position and velocity of the latest row.
     last: [f64; 3],
     area: f64,
     rows: usize,
@@ -81,6 +121,8 @@ impl AlignmentCollector {
             count: 0.0,
             all: [0.0; 2],
             zero: [0.0; 2],
+            short: ShortLag::default(),
+            differences: [0.0; 2],
         }
     }
 
@@ -91,6 +133,12 @@ impl AlignmentCollector {
                 Some(Stretch { first: [t, q], last: [t, q, qd], area: 0.0, rows: 0, zero: qd == 0.0 });
             return;
         };
+        let step = q - open.last[1];
+        if step != 0.0 {
+            self.differences[0] += 1.0;
+            let off = (qd * (t - open.last[0]) - step).abs();
+            self.differences[1] += f64::from(off < SAME_DIFFERENCE * step.abs());
+        }
         open.area += 0.5 * (open.last[2] + qd) * (t - open.last[0]);
         open.last = [t, q, qd];
         open.rows += 1;
@@ -121,6 +169,7 @@ impl AlignmentCollector {
             return;
         }
         let qd = self.recent[self.lags][0];
+        self.short.push(qd, [self.lags - 1, self.lags, self.lags + 1].map(|place| self.recent[place][1]));
         self.square += qd * qd;
         self.count += 1.0;
         // A delayed column shows an earlier derivative of the positions.
@@ -157,14 +206,22 @@ impl AlignmentCollector {
                 if bend < 0.0 { 0.5 * (before - after) / bend } else { 0.0 }
             }
         };
+        let mut lag = best as f64 + shift - self.lags as f64;
+        let mut unexplained_at_lag = 1.0 - explained(best);
+        if best == self.lags
+            && let Some((short, explained)) = self.short.finish()
+        {
+            (lag, unexplained_at_lag) = (short, (1.0 - explained / self.square).max(0.0));
+        }
         Some(Alignment {
-            lag: (best as f64 + shift - self.lags as f64) * self.resolution,
+            lag: lag * self.resolution,
             scale: self.sums[best][0] / self.square,
             unexplained: 1.0 - explained(self.lags),
-            unexplained_at_lag: 1.0 - explained(best),
+            unexplained_at_lag,
             zero_share: self.zero[0] / self.all[0],
             motion_at_zero: (self.zero[1] / self.zero[0].max(1.0) / (self.all[1] / self.all[0])).sqrt(),
             resolution: self.resolution,
+            differenced: self.differences[1] / self.differences[0].max(1.0),
         })
     }
 }
@@ -172,6 +229,7 @@ impl AlignmentCollector {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::check_settings::CheckSettings;
 
     /// A column of `q(t) = sin 3t + 0.3 sin 11t` that is `lag` late, times `unit`, and 0 where it is below
     /// `dead_band`.
@@ -204,6 +262,36 @@ mod tests {
         }
         let found = alignment(0.0, 1.0, 1.5, 500.0);
         assert!(found.zero_share > 0.1 && found.motion_at_zero > 0.2, "{found:?}");
+    }
+
+    /// Velocities that were differences to the row before, 5 ms late at 100 Hz, were used, and a delay of
+    /// -5.3 ms was named in torques that were not late.
+    #[test]
+    fn a_difference_to_the_row_before_is_late_by_half_a_row() {
+        for (rate, step) in [(100.0, 0.0), (250.0, 0.0), (500.0, 0.0), (100.0, 7.7e-4), (500.0, 7.7e-4)] {
+            let mut collector = AlignmentCollector::new(1.0 / rate);
+            let position = |k: i32| {
+                let t = f64::from(k) / rate;
+                let q = (3.0 * t).sin() + 0.3 * (11.0 * t).sin();
+                if step > 0.0 { (q / step).round() * step } else { q }
+            };
+            for k in 1..(20.0 * rate) as i32 {
+                let qd = (position(k) - position(k - 1)) * rate;
+                // As a log has them.
+                let decimals = |x: f64| (x * 1e7).round() * 1e-7;
+                collector.push(f64::from(k) / rate, position(k), decimals(qd));
+            }
+            let found = collector.finish().expect("enough to tell by");
+            assert!(found.differenced > 0.95, "{rate} Hz, {step}: {found:?}");
+            assert!((found.lag * rate - 0.5).abs() < 0.1, "{rate} Hz, {step}: {found:?}");
+            assert!(CheckSettings::default().contradicts(&found), "{rate} Hz, {step}: {found:?}");
+        }
+        // A velocity that is measured by itself is not.
+        for (lag, used) in [(0.0, true), (0.0005, true), (0.002, false), (-0.003, false)] {
+            let found = alignment(lag, 1.0, 0.0, 1000.0);
+            assert!((found.lag - lag).abs() < 2e-4, "{lag}: {found:?}");
+            assert_eq!(CheckSettings::default().contradicts(&found), !used, "{lag}: {found:?}");
+        }
     }
 
     #[test]

@@ -12,6 +12,12 @@ pub struct CheckSettings {
     /// Share of what is unexplained that is left at the lag, below which a lag is one however little it
     /// costs: a slow joint's velocity is as late as that of a quick one.
     pub lag_left: f64,
+    /// The shortest lag that is one \[s\]: simulators write velocities that are late by half of their step,
+    /// which is no error of a torque; 1 ms is one of 2 % at 3 Hz.
+    pub least_lag: f64,
+    /// Share of the rows whose velocity is the position's difference to the row before, from which on it is
+    /// that: half a row late, and nothing that the positions do not say.
+    pub differenced: f64,
     /// Distance of a velocity's scale from 1; gear ratios and radii are known better than this.
     pub scale_error: f64,
     /// Share of a velocity's power that may be unexplained for its scale to be judged.
@@ -55,6 +61,8 @@ impl Default for CheckSettings {
         CheckSettings {
             lag_cost: 0.0025,
             lag_left: 0.1,
+            least_lag: 8e-4,
+            differenced: 0.95,
             scale_error: 0.05,
             scale_unexplained: 0.05,
             zero_share: 0.02,
@@ -85,7 +93,8 @@ impl CheckSettings {
         let cost = alignment.unexplained - alignment.unexplained_at_lag;
         let left = alignment.unexplained_at_lag / alignment.unexplained;
         let costs = cost > self.lag_cost && left < 0.5;
-        (costs || left < self.lag_left) && alignment.lag.abs() > 0.5 * alignment.resolution
+        let computed = alignment.differenced > self.differenced;
+        (costs || left < self.lag_left || computed) && alignment.lag.abs() > self.least_lag
     }
 
     pub(crate) fn is_scaled(&self, alignment: &Alignment) -> bool {
@@ -113,6 +122,7 @@ mod tests {
             zero_share: 0.0,
             motion_at_zero: 0.0,
             resolution: 0.01,
+            differenced: 0.0,
         };
         let settings = CheckSettings::default();
         assert!(settings.is_late(&alignment(0.02, 0.001)));

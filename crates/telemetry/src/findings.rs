@@ -113,7 +113,8 @@ impl FindingKind {
     /// What to do about it.
     pub fn mend(self) -> &'static str {
         match self {
-            FindingKind::LateVelocity | FindingKind::VelocityScale | FindingKind::VelocityDeadBand => {
+            FindingKind::LateVelocity => "no velocity of this log is used, positions are differentiated",
+            FindingKind::VelocityScale | FindingKind::VelocityDeadBand => {
                 "it is not used, positions are differentiated"
             }
             FindingKind::ZeroTorque | FindingKind::StillTorque => {

@@ -111,6 +111,12 @@ impl DerivativeSurvey {
         self.is_derivative() && !self.alignment.is_some_and(|alignment| settings.contradicts(&alignment))
     }
 
+    /// Whether the column is another moment's derivative.
+    pub fn is_late(&self) -> bool {
+        let settings = CheckSettings::default();
+        self.is_derivative() && self.alignment.is_some_and(|alignment| settings.is_late(&alignment))
+    }
+
     /// Whether the column is the derivative that it says within a third.
     pub fn is_derivative(&self) -> bool {
         self.min < self.max && !(self.agreement < 0.67 || self.agreement > 1.5)

@@ -69,6 +69,9 @@ impl LogPlan {
         let kernel = SmoothingKernel::new(LowPass::new(cutoff_hz, ATTENUATION_DB), period);
         let parallel = ParallelFilter::new(parallel_cutoff_hz, period, options.decimation);
         let edge = edge(&kernel);
+        // One logger wrote the velocities of all joints. Of a joint that moves slowly it shows less whether
+        // they are late, and its torque is none the less.
+        let on_time = !survey.joints.iter().any(|joint| joint.velocity.is_some_and(|own| own.is_late()));
         let measured = |plausible: &dyn Fn(&crate::joint_survey::JointSurvey) -> bool| {
             survey.joints.iter().map(|joint| options.use_measured_derivatives && plausible(joint)).collect()
         };
@@ -81,7 +84,9 @@ impl LogPlan {
             warm_up: (options.warm_up / period).ceil() as usize,
             // Bounded so that sample numbers can't overflow.
             outputs_per_block: (options.block_samples / parallel.decimation()).clamp(1, 1 << 32),
-            measured_velocity: measured(&|joint| joint.velocity.is_some_and(|velocity| velocity.plausible())),
+            measured_velocity: measured(&|joint| {
+                on_time && joint.velocity.is_some_and(|velocity| velocity.plausible())
+            }),
             measured_acceleration: measured(&|joint| {
                 joint.acceleration.is_some_and(|signal| signal.plausible())
             }),

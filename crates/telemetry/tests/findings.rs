@@ -98,6 +98,37 @@ fn a_velocity_that_lags_is_not_used() {
     }
 }
 
+/// A joint that moves little shows too little of how late its velocity is; it was used, and a delay of this
+/// joint was named that was none.
+#[test]
+fn no_velocity_is_used_where_one_of_the_log_is_late() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("log.csv");
+    let joints = ["a".to_owned(), "b".to_owned()];
+    for late in [0, 10] {
+        let mut text = String::from("t,q.a,qd.a,tau.a,q.b,qd.b,tau.b\n");
+        for k in 0..4000 {
+            let [t, q, _, tau] = clean(k + late);
+            let qd = clean(k)[2];
+            let noise = (k as f64 * 12.9898).sin();
+            let _ = writeln!(
+                text,
+                "{t:.6},{q:.9},{qd:.7},{tau:.6},{:.9},{:.7},{tau:.6}",
+                0.1 * q,
+                0.1 * qd + 0.1 * noise
+            );
+        }
+        std::fs::write(&path, text).expect("written");
+        let survey = survey(&path, &joints, TorqueColumns::Required, &mut |_, _| {}).expect("it reads");
+        let own = survey.joints[1].velocity.expect("a velocity column");
+        assert!(own.plausible(), "{own:?}");
+        let conditioning =
+            Conditioning::choose(std::slice::from_ref(&survey), &ConditioningOptions::default());
+        let plan = conditioning.expect("a log like any").plan(&survey).expect("a log like any");
+        assert_eq!(plan.measured_velocity, [late == 0; 2], "{late}");
+    }
+}
+
 /// Where the drives of all joints stop logging, the rows say nothing: they are left out of both passes, and
 /// counted.
 #[test]

@@ -54,6 +54,21 @@ pub struct VelocityColumn {
     pub noise: Vec<f64>,
 }
 
+/// A `qd` column that is made of the positions as they are read.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DifferencedVelocity {
+    /// Corner of the first-order low-pass over the differences \[Hz\]; none without.
+    pub corner: Option<f64>,
+}
+
+impl DifferencedVelocity {
+    /// The next value of the column, from its last one and a step of the position in the time that it took.
+    fn next(self, last: f64, step: f64, time: f64) -> f64 {
+        let share = self.corner.map_or(1.0, |corner| 1.0 - (-TAU * corner * time).exp());
+        last + share * (step / time - last)
+    }
+}
+
 /// Everything that the situations ask of a logger.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Logging {
@@ -66,6 +81,9 @@ pub struct Logging {
     pub smoothing: Option<Smoothing>,
     /// A velocity column; none is written without.
     pub velocity: Option<VelocityColumn>,
+    /// A velocity column of the positions as they are read; none is written without.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub differenced: Option<DifferencedVelocity>,
     /// Torques below this are written as 0 \[N·m, N\], joint by joint.
     pub dead_band: Vec<f64>,
     /// Steps of the torque \[N·m, N\], joint by joint; 0 for none.
@@ -221,12 +239,15 @@ impl Logging {
             let first = rng.index(joints);
             held_positions.extend((0..joints).map(|joint| if all || joint >= first { held } else { 1 }));
         }
+        let differenced = (situation == Situation::DifferencedVelocity)
+            .then(|| DifferencedVelocity { corner: rng.chance(0.5).then(|| rng.log_uniform(20.0, 80.0)) });
         let pushes = if situation == Situation::Pushes { Push::draw(rng) } else { Vec::new() };
         Logging {
             tails,
             filter,
             smoothing,
             velocity,
+            differenced,
             dead_band,
             torque_step,
             held_samples,
@@ -252,7 +273,10 @@ impl Logging {
         let mut read = vec![0.0; joints];
         let mut text = String::with_capacity(record.times.len() * (12 + 32 * joints));
         text.push('t');
-        let prefixes: &[&str] = if self.velocity.is_some() { &["q", "qd", "tau"] } else { &["q", "tau"] };
+        let has_velocity = self.velocity.is_some() || self.differenced.is_some();
+        let prefixes: &[&str] = if has_velocity { &["q", "qd", "tau"] } else { &["q", "tau"] };
+        // Of each joint, position and velocity of the row before, and the row's time.
+        let mut before: Option<(f64, Vec<[f64; 2]>)> = None;
         for prefix in prefixes {
             tree.joint_names().for_each(|joint| {
                 let _ = write!(text, ",{prefix}.{joint}");
@@ -281,6 +305,20 @@ impl Logging {
                     };
                     let _ = write!(text, ",{speed:.7}");
                 }
+            }
+            if let Some(differenced) = self.differenced {
+                let next = |joint: usize| match &before {
+                    Some((time, rows)) => {
+                        let [position, last] = rows[joint];
+                        [read[joint], differenced.next(last, read[joint] - position, stamp - time)]
+                    }
+                    None => [read[joint], 0.0],
+                };
+                let row: Vec<[f64; 2]> = (0..joints).map(next).collect();
+                row.iter().for_each(|[_, speed]| {
+                    let _ = write!(text, ",{speed:.7}");
+                });
+                before = Some((stamp, row));
             }
             for joint in 0..joints {
                 let _ = write!(text, ",{:.6}", torque[sample * joints + joint]);

@@ -37,6 +37,7 @@ fn logging() -> Logging {
         filter: None,
         smoothing: None,
         velocity: None,
+        differenced: None,
         dead_band: vec![0.0; 2],
         torque_step: vec![0.0; 2],
         held_samples: 1,
@@ -128,6 +129,34 @@ fn a_late_velocity_is_the_velocity_of_earlier() {
     }
     let drawn = case.sensors.logging.and_then(|logging| logging.velocity).expect("this is its situation");
     assert!((0.02..=0.2).contains(&drawn.lag));
+}
+
+/// Steps of the encoder are in it, and it is half a row late.
+#[test]
+fn a_differenced_velocity_is_the_step_of_the_logged_position() {
+    let robots = models();
+    let mut seen = [false; 2];
+    for number in 0..6 {
+        let case = small(Situation::DifferencedVelocity, number, &robots);
+        let logging = case.sensors.logging.clone().expect("a wide case");
+        let corner = logging.differenced.expect("this is its situation").corner;
+        seen[usize::from(corner.is_some())] = true;
+        let (_, log) = &case.logs()[0];
+        let [t, q, qd] = ["t", "q.joint_1", "qd.joint_1"].map(|name| column(log, name));
+        let share =
+            |time: f64| corner.map_or(1.0, |corner| 1.0 - (-std::f64::consts::TAU * corner * time).exp());
+        for row in 1..t.len() {
+            let time = t[row] - t[row - 1];
+            let step = (q[row] - q[row - 1]) / time;
+            let expected = qd[row - 1] + share(time) * (step - qd[row - 1]);
+            assert!(
+                (qd[row] - expected).abs() < 1e-3 * step.abs() + 1e-5,
+                "row {row}: {} {expected}",
+                qd[row]
+            );
+        }
+    }
+    assert_eq!(seen, [true; 2]);
 }
 
 #[test]

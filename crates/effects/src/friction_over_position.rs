@@ -1,0 +1,103 @@
+//! Dry friction that depends on where the joint is: a bent shaft, a gear that runs out, a tight spot.
+
+use crate::columns::{OwnTorque, ParameterKind};
+use crate::fitted::FittedEffect;
+use crate::kind::{
+    Constants, EffectKind, Refinement, Signal, SignalRanges, around, constant, product, values,
+};
+use crate::sign::{Sign, WIDTH, few_sign_widths};
+use phiw_codegen::{Expression, Function, JointTorque};
+use phiw_dynamics::Tree;
+use phiw_identification::Effect;
+use phiw_identification::effect::Sample;
+use std::f64::consts::{PI, TAU};
+
+/// f·(1 + cos(N·(q − q₁)))/2·sign(q̇): on top of Coulomb friction, f at q₁ and nothing half a wave away.
+///
+/// With f ≥ 0 beside a Coulomb friction it is every friction that is a wave of the position and never drives.
+/// Gears' frictions vary so with the angle of their parts (Armstrong 1988, on the PUMA 560).
+pub struct FrictionOverPosition;
+
+/// N \[1/rad, 1/m\].
+const FREQUENCY: &str = "periods";
+/// q₁ \[rad, m\].
+const HIGHEST: &str = "highest_at";
+/// Half waves over the joint's travel that are tried at first.
+const HALF_WAVES: [f64; 3] = [1.0, 2.0, 4.0];
+/// Places of the highest friction that are tried at first, in waves from the middle of the travel.
+const PLACES: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
+/// A travel that is shorter counts as this long \[rad, m\].
+const SHORTEST_TRAVEL: f64 = 1e-3;
+
+impl EffectKind for FrictionOverPosition {
+    fn name(&self) -> &str {
+        "position_dependent_friction"
+    }
+    fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
+        let (lower, upper) = ranges.joints[site[0]].position;
+        let travel = (upper - lower).max(SHORTEST_TRAVEL);
+        let of_half_waves = |half_waves: f64| {
+            let frequency = PI * half_waves / travel;
+            let places = PLACES.map(|place| 0.5 * (lower + upper) + place * TAU / frequency);
+            product(&values(FREQUENCY, [frequency]), &values(HIGHEST, places))
+        };
+        let waves = HALF_WAVES.map(of_half_waves).concat();
+        let widths: Vec<Constants> = few_sign_widths(site[0], ranges).into_iter().skip(1).take(1).collect();
+        if widths.is_empty() { product(&waves, &values(WIDTH, [0.0])) } else { product(&waves, &widths) }
+    }
+    fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
+        let Some(frequency) = found.get(FREQUENCY).copied().filter(|frequency| *frequency > 0.0) else {
+            return Vec::new();
+        };
+        let highest = constant(found, HIGHEST, 0.0);
+        let shift = 0.125 * TAU / frequency * 0.5_f64.powi(step as i32);
+        let moved = values(HIGHEST, [highest - shift, highest + shift]);
+        let near = [around(found, FREQUENCY, step), product(std::slice::from_ref(found), &moved)];
+        near.into_iter().flatten().chain(around(found, WIDTH, step)).collect()
+    }
+    fn telling_motion(&self) -> &'static str {
+        "slow motion over the whole range, forth and back"
+    }
+    fn sentence(&self, found: &FittedEffect<'_>) -> String {
+        let frequency = constant(found.constants(), FREQUENCY, 1.0);
+        let wave = match found.unit_of_position() {
+            "m" => format!("once in {:.2} mm", 1e3 * TAU / frequency),
+            _ => format!("{frequency:.2} times a turn"),
+        };
+        format!(
+            "The dry friction of {} depends on its position: {} more at {:.3} {} than where it is lowest, {wave}.",
+            found.joints(),
+            found.quantity(0),
+            found.constant(HIGHEST),
+            found.unit_of_position(),
+        )
+    }
+    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
+        let frequency = constant(found.constants(), FREQUENCY, 1.0);
+        let highest = Expression::Constant(-found.constant(HIGHEST));
+        found.own_torque(|joint| {
+            let angle = frequency * (Expression::position(joint) + highest.clone());
+            let wave = Expression::Constant(1.0) + angle.of(Function::Cosine);
+            (0.5 * found.value(0)) * (wave * found.sign_of_velocity(joint))
+        })
+    }
+    fn seen_against(&self) -> Signal {
+        Signal::Position
+    }
+    fn dissipates(&self) -> bool {
+        true
+    }
+    fn form_of(&self) -> &'static [&'static str] {
+        &["viscous_friction", "coulomb_friction"]
+    }
+    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
+        let (joint, sign) = (site[0], Sign::of(constants));
+        let (frequency, highest) = (constant(constants, FREQUENCY, 1.0), constant(constants, HIGHEST, 0.0));
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            let wave = 0.5 + 0.5 * (frequency * (sample.q()[joint] - highest)).cos();
+            out[0] = wave * sign.of_joint(sample, joint);
+        };
+        let parameters = [("fc_variation", ParameterKind::Torque, 0.0)];
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+    }
+}
