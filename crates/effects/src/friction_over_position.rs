@@ -22,8 +22,10 @@ pub struct FrictionOverPosition;
 const FREQUENCY: &str = "periods";
 /// q₁ \[rad, m\].
 const HIGHEST: &str = "highest_at";
-/// Half waves over the joint's travel that are tried at first.
-const HALF_WAVES: [f64; 3] = [1.0, 2.0, 4.0];
+/// Half waves over the joint's travel that are tried at first, beside the frequencies of the residual.
+const HALF_WAVES: [f64; 2] = [1.0, 2.0];
+/// Frequencies of the residual that are tried.
+const PEAKS: usize = 2;
 /// Places of the highest friction that are tried at first, in waves from the middle of the travel.
 const PLACES: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 /// A travel that is shorter counts as this long \[rad, m\].
@@ -35,24 +37,32 @@ impl EffectKind for FrictionOverPosition {
     }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         let (lower, upper) = ranges.joints[site[0]].position;
-        let travel = (upper - lower).max(SHORTEST_TRAVEL);
-        let of_half_waves = |half_waves: f64| {
-            let frequency = PI * half_waves / travel;
+        let peaks = ranges.friction_frequencies.get(site[0]).into_iter().flatten().copied().take(PEAKS);
+        let of_frequency = |frequency: f64| {
             let places = PLACES.map(|place| 0.5 * (lower + upper) + place * TAU / frequency);
             product(&values(FREQUENCY, [frequency]), &values(HIGHEST, places))
         };
-        let waves = HALF_WAVES.map(of_half_waves).concat();
+        let long = HALF_WAVES.map(|half_waves| PI * half_waves / travel(ranges, site[0]));
+        let waves: Vec<Constants> = long.into_iter().chain(peaks).flat_map(of_frequency).collect();
         let widths: Vec<Constants> = few_sign_widths(site[0], ranges).into_iter().skip(1).take(1).collect();
         if widths.is_empty() { product(&waves, &values(WIDTH, [0.0])) } else { product(&waves, &widths) }
     }
-    fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
+    fn refine(&self, &Refinement { found, step, site, ranges }: &Refinement<'_>) -> Vec<Constants> {
         let Some(frequency) = found.get(FREQUENCY).copied().filter(|frequency| *frequency > 0.0) else {
             return Vec::new();
         };
         let highest = constant(found, HIGHEST, 0.0);
-        let shift = 0.125 * TAU / frequency * 0.5_f64.powi(step as i32);
-        let moved = values(HIGHEST, [highest - shift, highest + shift]);
-        let near = [around(found, FREQUENCY, step), product(std::slice::from_ref(found), &moved)];
+        let share = 0.5_f64.powi(step as i32);
+        // A wave over the travel more or less is another friction.
+        let slip = (0.5 * share * PI / travel(ranges, site[0])).min(0.3 * frequency);
+        let shift = 0.125 * share * TAU / frequency;
+        let with = |name: &str, value: f64| product(std::slice::from_ref(found), &values(name, [value]));
+        let near = [
+            with(FREQUENCY, frequency - slip),
+            with(FREQUENCY, frequency + slip),
+            with(HIGHEST, highest - shift),
+            with(HIGHEST, highest + shift),
+        ];
         near.into_iter().flatten().chain(around(found, WIDTH, step)).collect()
     }
     fn telling_motion(&self) -> &'static str {
@@ -100,4 +110,9 @@ impl EffectKind for FrictionOverPosition {
         let parameters = [("fc_variation", ParameterKind::Torque, 0.0)];
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
     }
+}
+
+/// How far the joint moves \[rad, m\].
+fn travel(ranges: &SignalRanges, joint: usize) -> f64 {
+    ranges.joints.get(joint).map_or(1.0, |joint| joint.position.1 - joint.position.0).max(SHORTEST_TRAVEL)
 }

@@ -263,6 +263,8 @@ pub struct SignalRanges {
     pub period: f64,
     /// For each joint, spatial frequencies N \[1/rad, 1/m\] at which its residual has peaks.
     pub ripple_frequencies: Vec<Vec<f64>>,
+    /// The same of its residual with the sign of the velocity.
+    pub friction_frequencies: Vec<Vec<f64>>,
     /// Whether any joint has a temperature.
     pub temperature: bool,
     /// Number of training logs.
@@ -297,6 +299,7 @@ impl SignalRanges {
             session: (moment(|range| range.0, f64::min), moment(|range| range.1, f64::max)),
             period: surveys.first().map_or(0.0, |survey| survey.period),
             ripple_frequencies: vec![Vec::new(); count],
+            friction_frequencies: vec![Vec::new(); count],
             temperature: surveys.iter().any(|survey| survey.joints.iter().any(|joint| joint.temperature)),
             logs: surveys.len(),
         }

@@ -64,6 +64,7 @@ pub(crate) fn ranges(robot: &Robot, logs: &[MotionLog]) -> SignalRanges {
         session: (0.0, logs.iter().map(MotionLog::duration_s).fold(0.0, f64::max)),
         period: logs.first().map_or(0.0, |log| log.period_s),
         ripple_frequencies: vec![Vec::new(); joints],
+        friction_frequencies: vec![Vec::new(); joints],
         temperature: false,
         // A simulated or real loop zeroes no torque between motions.
         logs: 1,
