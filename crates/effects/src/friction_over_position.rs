@@ -12,16 +12,20 @@ use phiw_identification::Effect;
 use phiw_identification::effect::Sample;
 use std::f64::consts::{PI, TAU};
 
-/// f·(1 + cos(N·(q − q₁)))/2·sign(q̇): on top of Coulomb friction, f at q₁ and nothing half a wave away.
+/// f·((1 + cos(N·(q − q₁)))/2)ᵖ·sign(q̇): on top of Coulomb friction, f at q₁ and nothing half a wave away.
 ///
-/// With f ≥ 0 beside a Coulomb friction it is every friction that is a wave of the position and never drives.
-/// Gears' frictions vary so with the angle of their parts (Armstrong 1988, on the PUMA 560).
+/// With f ≥ 0 and p = 1 beside a Coulomb friction it is every friction that is a wave of the position and
+/// never drives; the larger p, the narrower the spots at which it is high. Gears' frictions vary so with the angle of their parts (Armstrong 1988, on the PUMA 560).
 pub struct FrictionOverPosition;
 
 /// N \[1/rad, 1/m\].
 const FREQUENCY: &str = "periods";
 /// q₁ \[rad, m\].
 const HIGHEST: &str = "highest_at";
+/// p; 1 where nothing is said of it.
+const SHARPNESS: &str = "sharpness";
+/// The largest p that is tried: a spot that is an eighth of the wave wide.
+const SHARPEST: f64 = 16.0;
 /// Half waves over the joint's travel that are tried at first, beside the frequencies of the residual.
 const HALF_WAVES: [f64; 2] = [1.0, 2.0];
 /// Frequencies of the residual that are tried.
@@ -63,7 +67,12 @@ impl EffectKind for FrictionOverPosition {
             with(HIGHEST, highest - shift),
             with(HIGHEST, highest + shift),
         ];
-        near.into_iter().flatten().chain(around(found, WIDTH, step)).collect()
+        let sharpness = constant(found, SHARPNESS, 1.0);
+        let factor = 1.0 + share;
+        let spots = [sharpness / factor, sharpness * factor].map(|other| other.clamp(1.0, SHARPEST));
+        let spots = spots.into_iter().filter(|other| *other != sharpness);
+        let spots = spots.flat_map(|sharpness| with(SHARPNESS, sharpness));
+        near.into_iter().flatten().chain(spots).chain(around(found, WIDTH, step)).collect()
     }
     fn telling_motion(&self) -> &'static str {
         "slow motion over the whole range, forth and back"
@@ -85,10 +94,12 @@ impl EffectKind for FrictionOverPosition {
     fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
         let frequency = constant(found.constants(), FREQUENCY, 1.0);
         let highest = Expression::Constant(-found.constant(HIGHEST));
+        let sharpness = constant(found.constants(), SHARPNESS, 1.0);
         found.own_torque(|joint| {
             let angle = frequency * (Expression::position(joint) + highest.clone());
-            let wave = Expression::Constant(1.0) + angle.of(Function::Cosine);
-            (0.5 * found.value(0)) * (wave * found.sign_of_velocity(joint))
+            let wave = 0.5 * (Expression::Constant(1.0) + angle.of(Function::Cosine));
+            let wave = if sharpness == 1.0 { wave } else { wave.of(Function::Power(sharpness)) };
+            found.value(0) * (wave * found.sign_of_velocity(joint))
         })
     }
     fn seen_against(&self) -> Signal {
@@ -103,8 +114,10 @@ impl EffectKind for FrictionOverPosition {
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let (joint, sign) = (site[0], Sign::of(constants));
         let (frequency, highest) = (constant(constants, FREQUENCY, 1.0), constant(constants, HIGHEST, 0.0));
+        let sharpness = constant(constants, SHARPNESS, 1.0);
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
             let wave = 0.5 + 0.5 * (frequency * (sample.q()[joint] - highest)).cos();
+            let wave = if sharpness == 1.0 { wave } else { wave.powf(sharpness) };
             out[0] = wave * sign.of_joint(sample, joint);
         };
         let parameters = [("fc_variation", ParameterKind::Torque, 0.0)];
