@@ -15,7 +15,8 @@ use std::f64::consts::{PI, TAU};
 /// f·((1 + cos(N·(q − q₁)))/2)ᵖ·sign(q̇): on top of Coulomb friction, f at q₁ and nothing half a wave away.
 ///
 /// With f ≥ 0 and p = 1 beside a Coulomb friction it is every friction that is a wave of the position and
-/// never drives; the larger p, the narrower the spots at which it is high. Gears' frictions vary so with the angle of their parts (Armstrong 1988, on the PUMA 560).
+/// never drives; the larger p, the narrower the spots at which it is high. Gears' frictions vary so with the
+/// angle of their parts (Armstrong 1988, on the PUMA 560).
 pub struct FrictionOverPosition;
 
 /// N \[1/rad, 1/m\].
@@ -107,6 +108,9 @@ impl EffectKind for FrictionOverPosition {
     }
     fn dissipates(&self) -> bool {
         true
+    }
+    fn varies(&self) -> Option<&'static str> {
+        Some("coulomb_friction")
     }
     fn form_of(&self) -> &'static [&'static str] {
         &["viscous_friction", "coulomb_friction"]

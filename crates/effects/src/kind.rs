@@ -106,6 +106,12 @@ pub trait EffectKind: Send + Sync {
         &[]
     }
 
+    /// The simpler kind whose size it makes depend on something: it is sought on joints where that one is in
+    /// the model, since alone it does the same work less simply.
+    fn varies(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Names of its constants that belong to the joint rather than to the effect: where it is in a model,
     /// other kinds on the same site take the values that it has.
     fn constants_of_the_site(&self) -> &'static [&'static str] {

@@ -30,7 +30,10 @@ pub(crate) fn candidates(
             };
             let needs = kind.build(tree, &site, &Constants::new()).needs();
             let is_present = present.iter().any(|other| is_alike(other, &spec(Constants::new())));
-            if !is_present && !needs.derivatives {
+            let varied = kind.varies().is_none_or(|varied| {
+                present.iter().any(|other| other.kind == varied && other.joints == joints)
+            });
+            if !is_present && varied && !needs.derivatives {
                 specs.extend(kind.scan(&site, ranges).into_iter().map(spec));
             }
         }

@@ -216,7 +216,8 @@ fn every_situation_draws_what_it_says() {
             let causal = logging.filter.is_some_and(|filter| filter.causal);
             assert_eq!(causal, situation == Situation::LateFilter);
             let log = &case.logs()[0].1;
-            assert_eq!(log.starts_with("t,q.joint_1,q.joint_2,qd."), logging.velocity.is_some());
+            let has_velocity = logging.velocity.is_some() || logging.differenced.is_some();
+            assert_eq!(log.starts_with("t,q.joint_1,q.joint_2,qd."), has_velocity);
             assert!(case.secrets.is_empty() && Truth::of(&case).situation == Some(situation));
         }
     }

@@ -90,6 +90,11 @@ impl Candidates {
                 if options.excluded.iter().any(is_this) {
                     continue;
                 }
+                let is_varied =
+                    |varied| present.specs.iter().any(|spec| spec.kind == varied && spec.joints == joints);
+                if !kind.varies().is_none_or(is_varied) && !present.specs.iter().any(is_this) {
+                    continue;
+                }
                 let constants = scan(fixed.catalogue, kind, &site, ranges, present.specs, &joints);
                 let place = present.specs.iter().position(is_this);
                 let changed =
