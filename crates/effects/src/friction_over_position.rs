@@ -27,10 +27,8 @@ const HIGHEST: &str = "highest_at";
 const SHARPNESS: &str = "sharpness";
 /// The largest p that is tried: a spot that is an eighth of the wave wide.
 const SHARPEST: f64 = 16.0;
-/// Half waves over the joint's travel that are tried at first, beside the frequencies of the residual.
-const HALF_WAVES: [f64; 2] = [1.0, 2.0];
-/// Frequencies of the residual that are tried.
-const PEAKS: usize = 2;
+/// Half waves over the joint's travel that are tried at first: from one up to these.
+const MOST_HALF_WAVES: u32 = 12;
 /// Places of the highest friction that are tried at first, in waves from the middle of the travel.
 const PLACES: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 /// A travel that is shorter counts as this long \[rad, m\].
@@ -42,13 +40,13 @@ impl EffectKind for FrictionOverPosition {
     }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         let (lower, upper) = ranges.joints[site[0]].position;
-        let peaks = ranges.friction_frequencies.get(site[0]).into_iter().flatten().copied().take(PEAKS);
         let of_frequency = |frequency: f64| {
             let places = PLACES.map(|place| 0.5 * (lower + upper) + place * TAU / frequency);
             product(&values(FREQUENCY, [frequency]), &values(HIGHEST, places))
         };
-        let long = HALF_WAVES.map(|half_waves| PI * half_waves / travel(ranges, site[0]));
-        let waves: Vec<Constants> = long.into_iter().chain(peaks).flat_map(of_frequency).collect();
+        let half_wave = PI / travel(ranges, site[0]);
+        let frequencies = (1..=MOST_HALF_WAVES).map(|count| f64::from(count) * half_wave);
+        let waves: Vec<Constants> = frequencies.flat_map(of_frequency).collect();
         let widths: Vec<Constants> = few_sign_widths(site[0], ranges).into_iter().skip(1).take(1).collect();
         if widths.is_empty() { product(&waves, &values(WIDTH, [0.0])) } else { product(&waves, &widths) }
     }
@@ -109,8 +107,10 @@ impl EffectKind for FrictionOverPosition {
     fn dissipates(&self) -> bool {
         true
     }
-    fn varies(&self) -> Option<&'static str> {
-        Some("coulomb_friction")
+    /// It does the work of other frictions: of a joint whose torque is logged twice as large, load-dependent
+    /// friction took the place of viscous and Coulomb friction where this was tried.
+    fn is_sought(&self) -> bool {
+        false
     }
     fn form_of(&self) -> &'static [&'static str] {
         &["viscous_friction", "coulomb_friction"]

@@ -19,7 +19,8 @@ pub(crate) fn candidates(
 ) -> Vec<EffectSpec> {
     let tree = robot.tree();
     let mut specs = Vec::new();
-    let can_be_identified = |kind: &&dyn EffectKind| !kind.needs_held_model() && !kind.needs_session_time();
+    let can_be_identified =
+        |kind: &&dyn EffectKind| kind.is_sought() && !kind.needs_held_model() && !kind.needs_session_time();
     for kind in catalogue.kinds().filter(can_be_identified) {
         for site in kind.sites(tree) {
             let joints: Vec<String> = site.iter().map(|&joint| tree.joint(joint).joint.clone()).collect();
@@ -30,10 +31,7 @@ pub(crate) fn candidates(
             };
             let needs = kind.build(tree, &site, &Constants::new()).needs();
             let is_present = present.iter().any(|other| is_alike(other, &spec(Constants::new())));
-            let varied = kind.varies().is_none_or(|varied| {
-                present.iter().any(|other| other.kind == varied && other.joints == joints)
-            });
-            if !is_present && varied && !needs.derivatives {
+            if !is_present && !needs.derivatives {
                 specs.extend(kind.scan(&site, ranges).into_iter().map(spec));
             }
         }
@@ -67,7 +65,6 @@ pub(crate) fn ranges(robot: &Robot, logs: &[MotionLog]) -> SignalRanges {
         session: (0.0, logs.iter().map(MotionLog::duration_s).fold(0.0, f64::max)),
         period: logs.first().map_or(0.0, |log| log.period_s),
         ripple_frequencies: vec![Vec::new(); joints],
-        friction_frequencies: vec![Vec::new(); joints],
         temperature: false,
         // A simulated or real loop zeroes no torque between motions.
         logs: 1,
