@@ -107,8 +107,8 @@ impl EffectKind for FrictionOverPosition {
     fn dissipates(&self) -> bool {
         true
     }
-    /// It does the work of other frictions: of a joint whose torque is logged twice as large, load-dependent
-    /// friction took the place of viscous and Coulomb friction where this was tried.
+    /// It does the work of other frictions in part: with it in the search, a joint whose torque is logged
+    /// twice as large had a load-dependent friction for a name that it has not.
     fn is_sought(&self) -> bool {
         false
     }

@@ -89,6 +89,7 @@ proptest! {
         let reduced: Vec<f64> = phi.chunks_exact(standard.len())
             .flat_map(|row| base.independent().iter().map(|&column| row[column]).collect::<Vec<_>>()).collect();
         let torque = inverse_dynamics(&tree, &state);
+        // Columns that are dropped are nearly dependent and no more: one tree in many was 3e-8 off.
         assert_relative(&times(&reduced, &parameters), &torque, 1e-7);
 
         // The way back: exact in the base parameters, and the reference itself when nothing has changed.
