@@ -27,8 +27,12 @@ const HIGHEST: &str = "highest_at";
 const SHARPNESS: &str = "sharpness";
 /// The largest p that is tried: a spot that is an eighth of the wave wide.
 const SHARPEST: f64 = 16.0;
-/// Half waves over the joint's travel that are tried at first: from one up to these.
-const MOST_HALF_WAVES: u32 = 12;
+/// Half waves over the joint's travel that are tried at first, from one up to these: beside the residual's
+/// frequencies, and where it has none.
+const HALF_WAVES_BESIDE_PEAKS: u32 = 2;
+const HALF_WAVES: u32 = 12;
+/// Frequencies of the residual that are tried.
+const PEAKS: usize = 2;
 /// Places of the highest friction that are tried at first, in waves from the middle of the travel.
 const PLACES: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 /// A travel that is shorter counts as this long \[rad, m\].
@@ -40,13 +44,15 @@ impl EffectKind for FrictionOverPosition {
     }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         let (lower, upper) = ranges.joints[site[0]].position;
+        let peaks = ranges.friction_frequencies.get(site[0]).into_iter().flatten().copied().take(PEAKS);
         let of_frequency = |frequency: f64| {
             let places = PLACES.map(|place| 0.5 * (lower + upper) + place * TAU / frequency);
             product(&values(FREQUENCY, [frequency]), &values(HIGHEST, places))
         };
-        let half_wave = PI / travel(ranges, site[0]);
-        let frequencies = (1..=MOST_HALF_WAVES).map(|count| f64::from(count) * half_wave);
-        let waves: Vec<Constants> = frequencies.flat_map(of_frequency).collect();
+        let peaks: Vec<f64> = peaks.collect();
+        let most = if peaks.is_empty() { HALF_WAVES } else { HALF_WAVES_BESIDE_PEAKS };
+        let long = (1..=most).map(|half_waves| f64::from(half_waves) * PI / travel(ranges, site[0]));
+        let waves: Vec<Constants> = long.chain(peaks).flat_map(of_frequency).collect();
         let widths: Vec<Constants> = few_sign_widths(site[0], ranges).into_iter().skip(1).take(1).collect();
         if widths.is_empty() { product(&waves, &values(WIDTH, [0.0])) } else { product(&waves, &widths) }
     }
@@ -107,10 +113,8 @@ impl EffectKind for FrictionOverPosition {
     fn dissipates(&self) -> bool {
         true
     }
-    /// It does the work of other frictions in part: with it in the search, a joint whose torque is logged
-    /// twice as large had a load-dependent friction for a name that it has not.
-    fn is_sought(&self) -> bool {
-        false
+    fn varies(&self) -> Option<&'static str> {
+        Some("coulomb_friction")
     }
     fn form_of(&self) -> &'static [&'static str] {
         &["viscous_friction", "coulomb_friction"]

@@ -106,9 +106,10 @@ pub trait EffectKind: Send + Sync {
         &[]
     }
 
-    /// Whether a search for what a model lacks tries it; one that it does not try can be declared.
-    fn is_sought(&self) -> bool {
-        true
+    /// The simpler kind whose size it makes depend on something: a search tries it last, on joints where that
+    /// one is in the model, since alone it does the same work less simply, and beside it the work of others.
+    fn varies(&self) -> Option<&'static str> {
+        None
     }
 
     /// Names of its constants that belong to the joint rather than to the effect: where it is in a model,
@@ -268,6 +269,8 @@ pub struct SignalRanges {
     pub period: f64,
     /// For each joint, spatial frequencies N \[1/rad, 1/m\] at which its residual has peaks.
     pub ripple_frequencies: Vec<Vec<f64>>,
+    /// The same of its residual with the sign of the velocity.
+    pub friction_frequencies: Vec<Vec<f64>>,
     /// Whether any joint has a temperature.
     pub temperature: bool,
     /// Number of training logs.
@@ -302,6 +305,7 @@ impl SignalRanges {
             session: (moment(|range| range.0, f64::min), moment(|range| range.1, f64::max)),
             period: surveys.first().map_or(0.0, |survey| survey.period),
             ripple_frequencies: vec![Vec::new(); count],
+            friction_frequencies: vec![Vec::new(); count],
             temperature: surveys.iter().any(|survey| survey.joints.iter().any(|joint| joint.temperature)),
             logs: surveys.len(),
         }

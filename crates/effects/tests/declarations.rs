@@ -53,6 +53,7 @@ impl Zoo {
             session: (0.0, 60.0),
             period: PERIOD,
             ripple_frequencies: vec![vec![12.0]; joints],
+            friction_frequencies: vec![vec![5.0]; joints],
             temperature: true,
             logs: 2,
         };

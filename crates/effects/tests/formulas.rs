@@ -82,6 +82,7 @@ fn every_formula_is_its_effect() {
         session: (0.0, 60.0),
         period: 0.01,
         ripple_frequencies: vec![vec![12.0]; joints],
+        friction_frequencies: vec![vec![5.0]; joints],
         temperature: false,
         logs: 2,
     };

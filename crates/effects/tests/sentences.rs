@@ -67,7 +67,7 @@ const SENTENCES: &[(&str, &str)] = &[
     ),
     (
         "position_dependent_friction",
-        "The dry friction of shoulder depends on its position: 0.500 N·m more at 0.250 rad than where it is lowest, 18.85 times a turn.",
+        "The dry friction of shoulder depends on its position: 0.500 N·m more at 0.942 rad than where it is lowest, 5.00 times a turn.",
     ),
     ("torque_smoothing", "The torque of shoulder is low-passed before it is logged, at about 0.2 Hz."),
     ("torque_zero_by_log", "The zero of the torque of shoulder differs from log to log, by up to 1.00 N·m."),
@@ -91,6 +91,7 @@ fn said(tree: &Tree, kind: &dyn EffectKind) -> String {
         session: (0.0, 60.0),
         period: 0.01,
         ripple_frequencies: vec![vec![12.0]; 2],
+        friction_frequencies: vec![vec![5.0]; 2],
         temperature: false,
         logs: 2,
     };

@@ -19,8 +19,9 @@ pub(crate) fn candidates(
 ) -> Vec<EffectSpec> {
     let tree = robot.tree();
     let mut specs = Vec::new();
-    let can_be_identified =
-        |kind: &&dyn EffectKind| kind.is_sought() && !kind.needs_held_model() && !kind.needs_session_time();
+    let can_be_identified = |kind: &&dyn EffectKind| {
+        kind.varies().is_none() && !kind.needs_held_model() && !kind.needs_session_time()
+    };
     for kind in catalogue.kinds().filter(can_be_identified) {
         for site in kind.sites(tree) {
             let joints: Vec<String> = site.iter().map(|&joint| tree.joint(joint).joint.clone()).collect();
@@ -65,6 +66,7 @@ pub(crate) fn ranges(robot: &Robot, logs: &[MotionLog]) -> SignalRanges {
         session: (0.0, logs.iter().map(MotionLog::duration_s).fold(0.0, f64::max)),
         period: logs.first().map_or(0.0, |log| log.period_s),
         ripple_frequencies: vec![Vec::new(); joints],
+        friction_frequencies: vec![Vec::new(); joints],
         temperature: false,
         // A simulated or real loop zeroes no torque between motions.
         logs: 1,

@@ -128,6 +128,7 @@ pub fn catalogue(
         Kind::LoadDependentFriction => one(Friction::LoadDependent),
         Kind::DriveEfficiency => one(efficiency(rng)),
         Kind::PositionMap => mechanism(position_map(joint, survey, rng)?, rng.sign()),
+        Kind::PositionDependentFriction => mechanism(position_friction(joint, survey, rng), 1.0),
         Kind::ThermalDrift => one(Friction::Thermal {
             time_constant: rng.log_uniform(10.0, 60.0),
             viscous: rng.uniform(0.2, 2.0) / speed,
@@ -224,10 +225,7 @@ pub fn outside(
             let pair = vec![joint.min(other), joint.max(other)];
             Some((pair, Form::Mechanism(Mechanism::SpeedProduct { felt: joint, other }), rng.sign()))
         }
-        Stranger::PositionFriction => {
-            let cycles = TAU * rng.uniform(1.5, 4.0) / survey.travel(joint);
-            mechanism(Mechanism::PositionFriction { cycles, phase: rng.uniform(0.0, TAU) })
-        }
+        Stranger::PositionFriction => mechanism(waves_of_friction(joint, survey, rng)),
         Stranger::LoadRipple => {
             let cycles = TAU * rng.log_uniform(3.0, 20.0) / survey.travel(joint);
             distortion(joint, Distortion::Ripple { cycles, phase: rng.uniform(0.0, TAU) })
@@ -297,6 +295,20 @@ fn position_map(joint: usize, survey: &Survey, rng: &mut CaseRng) -> Option<Mech
     }
     let mut wave = || [TAU * rng.uniform(0.6, 2.5) / arc, rng.uniform(0.0, TAU), rng.uniform(0.4, 1.0)];
     Some(Mechanism::Beats { waves: (0..count).map(|_| wave()).collect() })
+}
+
+/// Waves of friction, or one tight spot that is felt where all logs are.
+fn position_friction(joint: usize, survey: &Survey, rng: &mut CaseRng) -> Mechanism {
+    if rng.chance(0.6) {
+        return waves_of_friction(joint, survey, rng);
+    }
+    let width = rng.uniform(0.15, 0.4) * survey.travel(joint);
+    Mechanism::TightSpot { center: survey.inside(joint, rng), width }
+}
+
+fn waves_of_friction(joint: usize, survey: &Survey, rng: &mut CaseRng) -> Mechanism {
+    let cycles = TAU * rng.uniform(1.5, 4.0) / survey.travel(joint);
+    Mechanism::PositionFriction { cycles, phase: rng.uniform(0.0, TAU) }
 }
 
 fn ripple(joint: usize, survey: &Survey, rng: &mut CaseRng) -> Option<Mechanism> {

@@ -35,6 +35,7 @@ pub enum Kind {
     ActuatorSaturation,
     PositionMap,
     DriveEfficiency,
+    PositionDependentFriction,
 }
 
 /// An effect that no name of the catalogue fits.
@@ -58,7 +59,7 @@ pub enum Stranger {
     LoadStep,
     /// A torque that follows the product of two joints' speeds.
     SpeedProduct,
-    /// Friction that comes and goes around the turn.
+    /// Friction that comes and goes around the turn. The catalogue has had a kind for it since.
     PositionFriction,
     /// Ripple that grows with the load: teeth that mesh badly, or a motor's commutation.
     LoadRipple,
@@ -105,7 +106,7 @@ pub enum Name {
 
 impl Kind {
     /// Kinds that have a suite of their own: the cases of the others stay what they were.
-    pub const NEW: [Kind; 2] = [Kind::PositionMap, Kind::DriveEfficiency];
+    pub const NEW: [Kind; 3] = [Kind::PositionMap, Kind::DriveEfficiency, Kind::PositionDependentFriction];
 
     /// All others.
     pub fn of_other_suites() -> Vec<Kind> {
@@ -152,6 +153,7 @@ impl Kind {
             || group(&[RotorInertia, TransmissionCoupling, JointElasticity])
             || group(&[TorqueOffset, JointSpring, GravityBalancer, ExternalForce, GravityTilt])
             || group(&[CoulombFriction, LoadDependentFriction, DriveEfficiency])
+            || group(&[CoulombFriction, PositionDependentFriction])
             || group(&[TorqueGain, DriveEfficiency])
             || (group(&[
                 PositionMap,

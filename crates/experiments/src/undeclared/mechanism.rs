@@ -43,6 +43,8 @@ pub enum Mechanism {
     SpeedProduct { felt: usize, other: usize },
     /// (1 + sin(Nq + φ))·sign(q̇).
     PositionFriction { cycles: f64, phase: f64 },
+    /// exp(−((q − center)/width)²)·sign(q̇).
+    TightSpot { center: f64, width: f64 },
     /// sign(q̇) in these parts of the session \[s\].
     FrictionJump { when: Vec<[f64; 2]> },
 }
@@ -101,6 +103,9 @@ impl Mechanism {
             Mechanism::SpeedProduct { .. } => 0.0,
             Mechanism::PositionFriction { cycles, phase } => {
                 (1.0 + (cycles * q + phase).sin()) * scene.ordinary.sign(v)
+            }
+            Mechanism::TightSpot { center, width } => {
+                (-((q - center) / width).powi(2)).exp() * scene.ordinary.sign(v)
             }
             Mechanism::FrictionJump { when } => {
                 let time = scene.times[sample];

@@ -90,7 +90,9 @@ impl Candidates {
                 if options.excluded.iter().any(is_this) {
                     continue;
                 }
-                if !kind.is_sought() && !present.specs.iter().any(is_this) {
+                let is_varied =
+                    |varied| present.specs.iter().any(|spec| spec.kind == varied && spec.joints == joints);
+                if !kind.varies().is_none_or(is_varied) && !present.specs.iter().any(is_this) {
                     continue;
                 }
                 let constants = scan(fixed.catalogue, kind, &site, ranges, present.specs, &joints);

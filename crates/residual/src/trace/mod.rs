@@ -35,6 +35,7 @@ mod thresholds;
 mod tracing;
 mod trial;
 mod turning;
+mod variation;
 mod verdict;
 
 pub use floor::{noise_floor, noise_floor_at, poses};

@@ -43,6 +43,9 @@ const PEAKS: usize = 4;
 /// Highest frequency that is tried over a position, however fast the joint moves \[1/rad, 1/m\], and over the
 /// time \[rad/s\].
 const HIGHEST_FREQUENCY: f64 = 130.0;
+/// Highest frequency over a position at which friction is tried \[1/rad, 1/m\]: what varies faster along a
+/// turn is a bearing's or a tooth's, and averages out within a motion.
+const HIGHEST_OF_FRICTION: f64 = 32.0;
 /// Angular frequency of a ripple at the RMS of a joint's speed up to which it is tried \[rad/s\]: what swings
 /// faster is filtered from the torques. The teeth of a screw are a few millimetres apart.
 const HIGHEST_IN_TIME: f64 = 62.8;
@@ -60,6 +63,7 @@ pub fn ranges_of_residual(
     let (train, sources) = (&data.train, &data.sources);
     let shape = residual_shape(design, parameters, train, sources, &ranges.joints, Peaks::OverPosition)?;
     ranges.ripple_frequencies = shape.ripple_frequencies;
+    ranges.friction_frequencies = shape.friction_ripple_frequencies;
     ranges.joints.iter_mut().zip(shape.rms).for_each(|(joint, rms)| joint.residual_rms = rms);
     Ok(ranges)
 }
@@ -67,7 +71,7 @@ pub fn ranges_of_residual(
 /// Which frequencies are looked for.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Peaks {
-    /// Those over the position alone.
+    /// Those over the position alone, of friction the long ones.
     OverPosition,
     /// All of [`ResidualShape`].
     All,
@@ -290,7 +294,10 @@ impl Collector {
             squares: (0.0, 0.0),
             positions: Grid::over_position(range),
             loads: all(&|| Grid::over_position(range)),
-            frictions: all(&|| Grid::over_position(range)),
+            frictions: match peaks {
+                Peaks::All => Grid::over_position(range),
+                Peaks::OverPosition => Grid::new(range.position, HIGHEST_OF_FRICTION),
+            },
             times: all(&|| Grid::new((0.0, duration), HIGHEST_FREQUENCY)),
         }
     }

@@ -10,7 +10,7 @@ use super::special_cases::Refined;
 use super::stage::{Fixed, Stage, specs_and_values};
 use super::tracing::{Tracing, Withdrawn};
 use crate::selection::{Judged, Member, Policy, Problem, select};
-use phiw_effects::{Constants, SignalRanges};
+use phiw_effects::{Constants, EffectKind, SignalRanges};
 use phiw_identification::{Data, Design, Effect, EffectCatalogue, EffectSpec, Fold, IdentificationError};
 
 /// Times that all is chosen anew: columns that are made of the model's torque need a second, what they bring
@@ -47,6 +47,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         grows: true,
         chosen: Chosen::default(),
         asks_of_logs: false,
+        asks_of_variation: false,
         refuted: Vec::new(),
         uncertain: Vec::new(),
         refined: Vec::new(),
@@ -103,6 +104,8 @@ pub(super) struct Search<'a> {
     pub chosen: Chosen,
     /// Whether what training logs may have of their own is sought, too.
     pub asks_of_logs: bool,
+    /// Whether kinds that make the size of others vary are sought, too.
+    pub asks_of_variation: bool,
     /// Effects that promised more to first order than they held in force: they are not sought again.
     pub refuted: Vec<EffectSpec>,
     /// Kinds and joints of which no parameter is certain once their constants are free: they have no name.
@@ -129,6 +132,7 @@ impl Search<'_> {
                 break;
             }
         }
+        self.ask_of_variation()?;
         self.ask_of_logs()?;
         self.prefer_simpler_forms()?;
         self.prefer_special_cases()?;
@@ -193,12 +197,21 @@ impl Search<'_> {
 
     /// Chooses among all hypotheses, from the present model on.
     pub(super) fn choose(&mut self) -> Result<(), IdentificationError> {
+        let (logs, variation) = (self.asks_of_logs, self.asks_of_variation);
+        self.choose_among(|kind| {
+            (logs || !kind.is_of_training_logs()) && (variation || kind.varies().is_none())
+        })
+    }
+
+    /// Chooses among the effects of the model and the hypotheses of the kinds that are `sought`.
+    pub(super) fn choose_among(
+        &mut self,
+        sought: impl Fn(&dyn EffectKind) -> bool,
+    ) -> Result<(), IdentificationError> {
         let present = Present { specs: &self.specs, declared: self.declared };
         let mut options = self.options.clone();
         options.excluded.extend(self.refuted.iter().cloned());
-        let mut candidates = Candidates::all(self.fixed, present, &self.ranges()?, &options, |kind| {
-            self.asks_of_logs || !kind.is_of_training_logs()
-        })?;
+        let mut candidates = Candidates::all(self.fixed, present, &self.ranges()?, &options, sought)?;
         let effects = std::mem::take(&mut candidates.effects);
         let stage = self.pass(effects, Keep::Always)?;
         let problem = self.fixed.problem(stage, &mut candidates)?;

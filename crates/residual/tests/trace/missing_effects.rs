@@ -253,6 +253,22 @@ fn a_long_soft_stop_is_neither_a_spring_nor_a_balancer() {
     }
 }
 
+/// Friction of a shaft that runs out was left in the errors, or taken for a rotor and an elasticity. Neither
+/// the waves nor the spot are in the catalogue's form to the last digit.
+#[test]
+fn friction_that_comes_and_goes_with_the_position_has_a_name() {
+    let frictions: [fn(f64) -> f64; 2] = [
+        |q| 1.15 + (2.0 * q + 0.7).sin() + 0.15 * (4.0 * q).cos(),
+        |q| 2.0 * (-((q + 0.3) / 0.6).powi(2)).exp(),
+    ];
+    for friction in frictions {
+        check(
+            |state, torque| torque[1] += 0.6 * friction(state.q[1]) * (state.qd[1] / 0.01).tanh(),
+            &[("position_dependent_friction", &["elbow"])],
+        );
+    }
+}
+
 /// Friction of the load is the same both ways.
 #[test]
 fn a_drive_that_is_harder_to_drive_back_has_an_efficiency_by_the_direction_of_power() {
