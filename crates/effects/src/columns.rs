@@ -3,7 +3,7 @@
 use crate::Constants;
 use phiw_dynamics::{JointType, Tree};
 use phiw_identification::effect::{
-    EffectParameter, Entry, Evaluator, Needs, QuadraticForm, QuadraticTerm, Sample,
+    EffectParameter, Entry, Evaluator, Needs, QuadraticForm, QuadraticTerm, Sample, VelocitySum,
 };
 use phiw_identification::{Effect, EffectSpec};
 
@@ -153,8 +153,8 @@ impl<F: Formula> Effect for OwnTorque<F> {
     fn is_linear_in_motion(&self, _parameter: usize) -> bool {
         self.linear_in_motion
     }
-    fn turns_with(&self) -> Option<usize> {
-        self.turns_with_velocity.then_some(self.joint)
+    fn turns_with(&self, _parameter: usize) -> Option<VelocitySum> {
+        self.turns_with_velocity.then(|| VelocitySum::of_joint(self.joint))
     }
     fn quadratic_terms(&self) -> Vec<QuadraticTerm> {
         let coordinates = [self.joint; 2];

@@ -9,7 +9,7 @@ use crate::sign::{WIDTH, smooth_sign};
 use phiw_codegen::{Expression, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::effect::{
-    EffectParameter, Entry, Evaluator, JointProperty, QuadraticForm, QuadraticTerm, Sample,
+    EffectParameter, Entry, Evaluator, JointProperty, QuadraticForm, QuadraticTerm, Sample, VelocitySum,
 };
 use phiw_identification::{Effect, EffectSpec};
 
@@ -142,6 +142,12 @@ impl EffectKind for TransmissionCoupling {
         }
         crate::kind::around(found, WIDTH, step)
     }
+    fn with_other_parameters(&self, found: &Constants) -> Vec<Constants> {
+        let own = constant(found, TERMS_CONSTANT, 0.0) as u32;
+        let is_other = |terms: &u32| *terms != own && [own, *terms].contains(&(terms & own));
+        let others = COMBINATIONS.into_iter().filter(is_other).map(f64::from);
+        product(std::slice::from_ref(found), &values(TERMS_CONSTANT, others))
+    }
     fn telling_motion(&self) -> &'static str {
         "each of the two joints moving alone, then both together"
     }
@@ -270,6 +276,16 @@ impl Effect for Coupling {
     /// Terms with a sign, whose parameters are torques, are not.
     fn is_linear_in_motion(&self, parameter: usize) -> bool {
         self.terms.get(parameter).is_some_and(|term| term.dimension != ParameterKind::Torque)
+    }
+    /// Friction of the shaft that turns with the sum or with the difference.
+    fn turns_with(&self, parameter: usize) -> Option<VelocitySum> {
+        let [first, second] = self.site;
+        let of_second = match self.terms.get(parameter)?.name {
+            "fc_sum" => 1.0,
+            "fc_difference" => -1.0,
+            _ => return None,
+        };
+        Some(VelocitySum { terms: vec![(first, 1.0), (second, of_second)] })
     }
     fn quadratic_terms(&self) -> Vec<QuadraticTerm> {
         let of_term = |(parameter, term): (usize, &Term)| {

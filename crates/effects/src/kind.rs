@@ -106,6 +106,12 @@ pub trait EffectKind: Send + Sync {
         &[]
     }
 
+    /// Constants with which it has more or fewer of its parameters than with the `found` ones; none by
+    /// default. A search that chose among all of them roughly tries these once more.
+    fn with_other_parameters(&self, _found: &Constants) -> Vec<Constants> {
+        Vec::new()
+    }
+
     /// The simpler kind whose size it makes depend on something: a search tries it last, on joints where that
     /// one is in the model, since alone it does the same work less simply, and beside it the work of others.
     fn varies(&self) -> Option<&'static str> {

@@ -9,10 +9,10 @@
 use super::joint_rows::JointRows;
 use super::turning::{Believed, Felt, TurningColumns};
 use super::turning_path::Mean;
-use super::turning_response::TurningJoints;
+use super::turning_response::TurningAxes;
 use super::{Gain, MotionLikelihood, foresight};
 use crate::{EstimationError, KnownEffect, MotionLog, Robot, RobotModel};
-use phiw_identification::{Design, EffectSpec};
+use phiw_identification::{Design, Effect, EffectSpec};
 use phiw_telemetry::Block;
 use std::ops::Range;
 
@@ -23,7 +23,7 @@ impl MotionLikelihood {
     /// What each of the `candidates` would save in the place of the model's effect of the same kind on the
     /// same joint: its gain is that of the exchange, and its parameters are those that are then best. The
     /// model has been fitted to these logs with this estimator. None for one that takes nothing's place,
-    /// whose columns do not turn with the joint's velocity ([`phiw_identification::Effect::turns_with`]), or
+    /// whose columns do not turn with one joint's velocity ([`phiw_identification::Effect::turns_with`]), or
     /// that has other parameters.
     ///
     /// # Errors
@@ -108,7 +108,7 @@ fn exchanges_of(
     let mut first = robot.base().count();
     let mut present = Vec::with_capacity(model.effects.len());
     for (effect, KnownEffect { spec, parameters }) in model.effects.iter().enumerate() {
-        let joint = robot.catalogue().build(spec, robot.tree())?.turns_with();
+        let joint = joint_that_turns(robot.catalogue().build(spec, robot.tree())?.as_ref());
         let range = first..first + parameters.len();
         first = range.end;
         present.extend(joint.map(|joint| (effect, spec, joint, range, parameters)));
@@ -119,13 +119,20 @@ fn exchanges_of(
             |(_, spec, ..): &&(_, &EffectSpec, _, _, _)| spec.kind == own.kind && spec.joints == own.joints;
         let Some((effect, _, joint, parameters, values)) = present.iter().find(is_its) else { continue };
         let built = robot.catalogue().build(own, robot.tree())?;
-        if built.turns_with() == Some(*joint) && built.parameters().len() == values.len() {
+        if joint_that_turns(built.as_ref()) == Some(*joint) && built.parameters().len() == values.len() {
             let (effect, joint, parameters, values) =
                 (*effect, *joint, parameters.clone(), (*values).clone());
             exchanges.push(Exchange { candidate, effect, joint, parameters, values, gain: 0.0 });
         }
     }
     Ok(exchanges)
+}
+
+/// The joint with whose velocity all columns of an effect turn.
+fn joint_that_turns(effect: &dyn Effect) -> Option<usize> {
+    let joint = effect.turns_with(0)?.joint()?;
+    let is_its = |own| effect.turns_with(own).and_then(|axis| axis.joint()) == Some(joint);
+    (0..effect.parameters().len()).all(is_its).then_some(joint)
 }
 
 /// A candidate that takes the place of an effect of the model.
@@ -148,7 +155,7 @@ impl Exchange {
         w: &[f64],
         precision: f64,
     ) {
-        let of_joint = |index: &usize| own.columns()[*index].joint == self.joint;
+        let of_joint = |index: &usize| own.axes()[own.columns()[*index].axis].joint() == Some(self.joint);
         let of_joint: Vec<usize> = (0..own.columns().len()).filter(of_joint).collect();
         let mut before = JointRows::new(0, precision);
         let mut after = JointRows::new(self.values.len(), precision);
@@ -226,29 +233,26 @@ impl<'a> Periods<'a> {
     fn felt_alone(&self, turning: &TurningColumns<'_>, w: &[f64]) -> Vec<f64> {
         let joints = self.measured.joints;
         let columns = turning.places();
-        let mut present: Vec<usize> = columns.iter().map(|(_, joint)| *joint).collect();
-        present.sort_unstable();
-        present.dedup();
         let mut felt_alone = vec![0.0; self.left.len()];
         let mut first = 0;
         for felt in &self.felt {
             let rows = first..first + felt.periods;
             first = rows.end;
-            let Some(own) = felt.joints.iter().map(Option::as_ref).collect::<Option<Vec<_>>>() else {
+            let Some(own) = felt.axes.iter().map(Option::as_ref).collect::<Option<Vec<_>>>() else {
                 continue;
             };
-            let together = TurningJoints::of(&present, &own);
+            let together = TurningAxes::of(&own);
             for row in rows {
-                let mut deltas = vec![0.0; present.len()];
-                for (index, (parameter, joint)) in columns.iter().enumerate() {
+                let mut deltas = vec![0.0; turning.axes().len()];
+                for (index, (parameter, axis)) in columns.iter().enumerate() {
                     let ([_, slope], beside) = self.column(turning, &self.means, (row, index));
-                    if let Ok(place) = present.binary_search(joint) {
-                        deltas[place] += w[*parameter] * slope + beside;
-                    }
+                    deltas[*axis] += w[*parameter] * slope + beside;
                 }
                 let Some(alone) = together.felt_alone(&deltas) else { continue };
-                for (joint, alone) in present.iter().zip(alone) {
-                    felt_alone[row * joints + joint] = alone;
+                for (axis, alone) in turning.axes().iter().zip(alone) {
+                    if let Some(joint) = axis.joint() {
+                        felt_alone[row * joints + joint] = alone;
+                    }
                 }
             }
         }
@@ -260,7 +264,7 @@ impl<'a> Periods<'a> {
         turning.means_under((&self.begun, &self.mean), self.measured, (w, &self.felt))
     }
 
-    /// A column in a period and T times its slope, and T times what the slope of its joint has beside.
+    /// A column in a period and T times its slope, and T times what the slope of its axis has beside.
     fn column(
         &self,
         turning: &TurningColumns<'_>,
@@ -268,8 +272,8 @@ impl<'a> Periods<'a> {
         (row, index): (usize, usize),
     ) -> ([f64; 2], f64) {
         let of_beginning = || {
-            let joint = turning.columns()[index].joint;
-            ([turning.at(index, self.begun.qd[self.begun.row(row).start + joint]), 0.0], 0.0)
+            let axis = &turning.axes()[turning.columns()[index].axis];
+            ([turning.at(index, axis.of(&self.begun.qd[self.begun.row(row)])), 0.0], 0.0)
         };
         let period_s = self.measured.period_s;
         let of_mean = |mean: Mean| ([mean.value, period_s * mean.slope], period_s * mean.beside);

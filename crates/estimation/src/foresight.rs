@@ -69,7 +69,9 @@ pub(super) fn rows(
         }
         let means = means.iter().skip(sample * turning.columns().len());
         for (column, mean) in turning.columns().iter().zip(means) {
-            row[column.place] = mean.map_or(row[column.place], |mean| mean.value);
+            if let Some(mean) = mean {
+                column.places.iter().for_each(|&(place, share)| row[place] = share * mean.value);
+            }
         }
         take(&row)?;
     }

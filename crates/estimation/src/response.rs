@@ -7,7 +7,7 @@
 //! of friction alone, log(1 + x/2), is then so far off that a thousand rows take the difference for friction.
 
 use super::sensitivity::{Sensitivity, element, packed, place};
-use super::turning_response::{TurningJoint, TurningResponse};
+use super::turning_response::{TurningAxis, TurningResponse};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par, Side};
 use phiw_dynamics::dense::{Cholesky, dot};
@@ -76,17 +76,16 @@ impl Modes {
         let vectors = eigen.U().to_owned();
         let mut modes = Modes { factor, values, vectors, half_damped, turning: None };
         if !sensitivity.turned.slopes.is_empty() {
-            let mut joints = Vec::with_capacity(sensitivity.toward.len());
-            for toward in &sensitivity.toward {
-                joints.push(modes.joint(toward)?);
-            }
-            modes.turning = Some(TurningResponse::of(&sensitivity.turned, &joints, w, sensitivity.weight));
+            let axes = &sensitivity.turned.axes;
+            let axes = axes.iter().map(|axis| modes.axis(&sensitivity.toward(axis)));
+            let axes: Vec<TurningAxis> = axes.collect::<Option<_>>()?;
+            modes.turning = Some(TurningResponse::of(&sensitivity.turned, &axes, w, sensitivity.weight));
         }
         Some(modes)
     }
 
-    /// What a torque on a joint that moves by `toward` with each direction does; none where G is no inertia.
-    pub fn joint(&self, toward: &[f64]) -> Option<TurningJoint> {
+    /// What a torque on an axis that moves by `toward` with each direction does; none where G is no inertia.
+    pub fn axis(&self, toward: &[f64]) -> Option<TurningAxis> {
         let mut reduced = toward.to_vec();
         self.factor.solve_lower(&mut reduced);
         let along = |mode: usize| dot(self.vectors.col_as_slice(mode), &reduced).powi(2);
@@ -97,7 +96,7 @@ impl Modes {
         let mut moved = toward.to_vec();
         half_damped.solve_lower(&mut moved);
         half_damped.solve_upper(&mut moved);
-        Some(TurningJoint { velocity, acceleration, moved, toward: toward.to_vec() })
+        Some(TurningAxis { velocity, acceleration, moved, toward: toward.to_vec() })
     }
 
     /// That of a row, in the mean of those that the instant stands for.
@@ -241,6 +240,7 @@ mod tests {
     use super::super::turning::Turned;
     use super::*;
     use faer::prelude::Solve;
+    use phiw_identification::effect::VelocitySum;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -267,7 +267,11 @@ mod tests {
         }
         let slopes = (0..6).map(|_| rng.random_range(0.0..1.5)).collect();
         let offsets = (0..6).map(|_| rng.random_range(0.0..0.2)).collect();
-        let turned = Turned { columns: vec![(parameters, 0), (parameters + 1, n - 1)], slopes, offsets };
+        // The first joint, and a shaft between it and the last where there are two.
+        let shaft = (n > 1).then(|| VelocitySum { terms: vec![(0, 1.0), (n - 1, -0.7)] });
+        let axes: Vec<VelocitySum> = std::iter::once(VelocitySum::of_joint(0)).chain(shaft).collect();
+        let columns = vec![(parameters, 0), (parameters + 1, axes.len() - 1)];
+        let turned = Turned { axes, columns, slopes, offsets };
         Sensitivity { weight: 4.0, turned, ..with }
     }
 

@@ -126,7 +126,8 @@ impl MotionLikelihood {
         score: &mut Score<'_>,
     ) -> Result<(), EstimationError> {
         let moves = |index: &usize| {
-            let turns = score.design.effects()[score.effects + index].turns_with().is_some();
+            let effect = &score.design.effects()[score.effects + index];
+            let turns = (0..score.range(*index).len()).any(|own| effect.turns_with(own).is_some());
             turns || score.range(*index).any(|parameter| !foreseen[score.present + parameter])
         };
         let moving: Vec<usize> = (0..candidates.len()).filter(moves).collect();

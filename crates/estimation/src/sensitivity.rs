@@ -6,6 +6,7 @@ use crate::EstimationError;
 use crate::free_directions::free_directions;
 use faer::Mat;
 use phiw_identification::Design;
+use phiw_identification::effect::VelocitySum;
 use phiw_telemetry::Block;
 
 /// Change of speed for a central difference \[rad/s, m/s\]. Any is exact for Coriolis' terms, which are
@@ -107,6 +108,14 @@ impl Sensitivity {
             toward,
             turned: turned.clone(),
         })
+    }
+
+    /// What an axis moves by with each of the directions.
+    pub fn toward(&self, axis: &VelocitySum) -> Vec<f64> {
+        let along = |direction: usize| {
+            axis.terms.iter().map(|&(joint, factor)| factor * self.toward[joint][direction]).sum()
+        };
+        (0..self.directions).map(along).collect()
     }
 
     /// Those of all instants.

@@ -7,6 +7,9 @@
 //! the likelihood of the motion counts it by the slope dc̄/dv₁ ([`super::turning_response`]), as it counts
 //! the acceleration by the inertia.
 //!
+//! A friction between two joints is one of the shaft that turns with their sum or their difference: its
+//! column, its way and its slope are that shaft's.
+//!
 //! The way depends on how large the friction is. So friction and slope are those of the way under the
 //! friction that is believed, and an estimate is made again until it agrees with what it believed.
 //!
@@ -19,9 +22,10 @@ use super::likelihood::column;
 use super::response::Modes;
 use super::sensitivity::Sensitivity;
 use super::turning_path::{Mean, Slowed, Way, interpolated, velocities};
-use super::turning_response::TurningJoint;
+use super::turning_response::TurningAxis;
 use crate::{EstimationError, MotionLog};
 use phiw_identification::Design;
+use phiw_identification::effect::VelocitySum;
 use phiw_telemetry::Block;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
@@ -41,6 +45,8 @@ const INSTANT_EVERY_S: f64 = 0.4;
 /// The columns of a design that turn with the velocity.
 pub(super) struct TurningColumns<'a> {
     design: &'a Design,
+    /// The velocities that they turn with.
+    axes: Vec<VelocitySum>,
     columns: Vec<TurningColumn>,
     /// Velocities of the columns' tables.
     velocities: Vec<f64>,
@@ -60,10 +66,10 @@ pub(super) struct Believed {
 pub(super) struct TurningColumn {
     /// The parameter that it is of.
     pub parameter: usize,
-    /// The joint whose velocity it turns with, and whose torque it is in.
-    pub joint: usize,
-    /// Its place in an evaluation of the design.
-    pub place: usize,
+    /// The velocity that it turns with: its place among those of all columns.
+    pub axis: usize,
+    /// Its places in an evaluation of the design, one for each joint of the axis, and the factor there.
+    pub places: Vec<(usize, f64)>,
     /// The column at the velocities of a table.
     table: Vec<f64>,
 }
@@ -74,51 +80,100 @@ impl<'a> TurningColumns<'a> {
     /// # Errors
     /// None that a design can cause.
     pub fn of(design: &'a Design, foreseen: &'a [bool]) -> Result<Self, EstimationError> {
-        let is_foreseen = |effect: usize| {
-            let parameters = design.effect_parameters(effect);
-            let is_foreseen = parameters.clone().all(|own| foreseen.get(own).copied().unwrap_or(false));
-            !parameters.is_empty() && is_foreseen
+        let mut turning = TurningColumns {
+            design,
+            axes: Vec::new(),
+            columns: Vec::new(),
+            velocities: velocities(),
+            foreseen,
         };
-        let chosen: Vec<usize> = (0..design.effects().len())
-            .filter(|&effect| design.effects()[effect].turns_with().is_some() && is_foreseen(effect))
-            .collect();
-        let mut turning = TurningColumns { design, columns: Vec::new(), velocities: velocities(), foreseen };
-        if chosen.is_empty() {
-            return Ok(turning);
+        // Effects and their parameters, by what they turn with.
+        let mut of_axes: Vec<(VelocitySum, Vec<[usize; 2]>)> = Vec::new();
+        for (effect, own) in design.effects().iter().enumerate() {
+            for (place, parameter) in design.effect_parameters(effect).enumerate() {
+                let is_foreseen = foreseen.get(parameter).copied().unwrap_or(false);
+                let Some(axis) = own.turns_with(place).filter(|_| is_foreseen) else { continue };
+                match of_axes.iter_mut().find(|(other, _)| *other == axis) {
+                    Some((_, parameters)) => parameters.push([effect, place]),
+                    None => of_axes.push((axis, vec![[effect, place]])),
+                }
+            }
         }
-        // They are functions of one velocity alone: all joints move with the same.
-        let part = design.part(&chosen, false);
+        // Of those that turn with one joint's velocity each, all joints move with the same at once.
         let joints = design.tree().joint_count();
-        let still = vec![0.0; joints * turning.velocities.len()];
-        let moving = turning.velocities.iter().flat_map(|&velocity| std::iter::repeat_n(velocity, joints));
-        let signals = [still.clone(), moving.collect(), still];
-        let block = Block::unfiltered(joints, vec![0.0; turning.velocities.len()], signals, Vec::new());
+        let (single, several): (Vec<_>, Vec<_>) =
+            of_axes.into_iter().partition(|(axis, _)| axis.joint().is_some());
+        turning.add(&single, &vec![1.0; joints])?;
+        for of_axis in several {
+            let square: f64 = of_axis.0.terms.iter().map(|(_, factor)| factor * factor).sum();
+            let mut moved = vec![0.0; joints];
+            of_axis.0.terms.iter().for_each(|&(joint, factor)| moved[joint] = factor / square);
+            turning.add(&[of_axis], &moved)?;
+        }
+        Ok(turning)
+    }
+
+    /// Adds the columns of these axes, with effects and parameters, where a velocity of one along each of
+    /// them moves the joints so.
+    fn add(
+        &mut self,
+        of_axes: &[(VelocitySum, Vec<[usize; 2]>)],
+        moved: &[f64],
+    ) -> Result<(), EstimationError> {
+        let mut chosen: Vec<usize> =
+            of_axes.iter().flat_map(|(_, parameters)| parameters.iter().map(|[effect, _]| *effect)).collect();
+        chosen.sort_unstable();
+        chosen.dedup();
+        if chosen.is_empty() {
+            return Ok(());
+        }
+        let (design, joints) = (self.design, moved.len());
+        let part = design.part(&chosen, false);
+        let still = vec![0.0; joints * self.velocities.len()];
+        let moving = |velocity: &f64| moved.iter().map(|share| share * velocity).collect::<Vec<f64>>();
+        let moving = self.velocities.iter().flat_map(moving).collect();
+        let block = Block::unfiltered(
+            joints,
+            vec![0.0; self.velocities.len()],
+            [still.clone(), moving, still],
+            Vec::new(),
+        );
         let mut scratch = part.scratch();
         scratch.begin(&block)?;
-        let mut evaluations = vec![vec![0.0; part.evaluation_width()]; turning.velocities.len()];
+        let mut evaluations = vec![vec![0.0; part.evaluation_width()]; self.velocities.len()];
         for (sample, evaluation) in evaluations.iter_mut().enumerate() {
             scratch.evaluate(&block, sample, evaluation)?;
         }
-        for (own, &effect) in chosen.iter().enumerate() {
-            let Some(joint) = design.effects()[effect].turns_with() else { continue };
-            let parameters = design.effect_parameters(effect).zip(part.effect_parameters(own));
-            for (parameter, parameter_of_part) in parameters {
-                let place = |design: &Design, parameter: usize| {
-                    let layout = design.rows().get(joint)?;
-                    let column = layout.parameters.iter().position(|own| *own == parameter)?;
-                    Some(layout.range.start + column)
-                };
-                let Some((place, place_in_part)) =
-                    place(design, parameter).zip(place(&part, parameter_of_part))
-                else {
+        let place = |design: &Design, joint: usize, parameter: usize| {
+            let layout = design.rows().get(joint)?;
+            let column = layout.parameters.iter().position(|own| *own == parameter)?;
+            Some(layout.range.start + column)
+        };
+        for (axis, parameters) in of_axes {
+            let Some(&(first, factor)) = axis.terms.first() else { continue };
+            for &[effect, own] in parameters {
+                let parameter = design.effect_parameters(effect).start + own;
+                let Ok(of_part) = chosen.binary_search(&effect) else { continue };
+                let Some(column) = place(&part, first, part.effect_parameters(of_part).start + own) else {
                     continue;
                 };
-                let factor = design.logged_factors()[joint];
-                let table = evaluations.iter().map(|evaluation| factor * evaluation[place_in_part]).collect();
-                turning.columns.push(TurningColumn { parameter, joint, place, table });
+                let scale = design.logged_factors()[first] / factor;
+                let table = evaluations.iter().map(|evaluation| scale * evaluation[column]).collect();
+                let place_of = |&(joint, factor): &(usize, f64)| {
+                    let share = factor * design.logged_factors()[joint] / design.logged_factors()[first];
+                    Some((place(design, joint, parameter)?, share))
+                };
+                let Some(places) = axis.terms.iter().map(place_of).collect() else { continue };
+                self.columns.push(TurningColumn { parameter, axis: self.axes.len(), places, table });
             }
+            self.axes.push(axis.clone());
         }
-        Ok(turning)
+        Ok(())
+    }
+
+    /// The velocities that columns turn with.
+    pub fn axes(&self) -> &[VelocitySum] {
+        &self.axes
     }
 
     /// The columns, in the order of the means.
@@ -126,12 +181,12 @@ impl<'a> TurningColumns<'a> {
         &self.columns
     }
 
-    /// The parameter and the joint of each.
+    /// The parameter and the axis of each.
     pub fn places(&self) -> Vec<(usize, usize)> {
-        self.columns.iter().map(|column| (column.parameter, column.joint)).collect()
+        self.columns.iter().map(|column| (column.parameter, column.axis)).collect()
     }
 
-    /// A column where a joint moves at a velocity \[rad/s, m/s\].
+    /// A column where its axis moves at a velocity \[rad/s, m/s\].
     pub fn at(&self, column: usize, velocity: f64) -> f64 {
         interpolated(&self.velocities, &self.columns[column].table, velocity)
     }
@@ -168,37 +223,37 @@ impl<'a> TurningColumns<'a> {
         if self.columns.is_empty() {
             return Vec::new();
         }
-        let (joints, period_s) = (measured.joints, measured.period_s);
-        let least = least_changes(measured);
+        let period_s = measured.period_s;
+        let least = self.least_changes(measured);
         let frictions = self.frictions(&self.rubbing(parameters));
         let slowed = felt.iter().flat_map(|felt| {
-            let of_joint = |joint: &Option<TurningJoint>| {
-                let own = joint.as_ref().map(|joint| [joint.acceleration, joint.velocity]);
+            let of_axis = |axis: &Option<TurningAxis>| {
+                let own = axis.as_ref().map(|axis| [axis.acceleration, axis.velocity]);
                 own.map_or_else(Slowed::default, |[free, damped]| {
                     Slowed::of(period_s * free, period_s * damped)
                 })
             };
-            let own: Rc<[Slowed]> = felt.joints.iter().map(of_joint).collect();
+            let own: Rc<[Slowed]> = felt.axes.iter().map(of_axis).collect();
             std::iter::repeat_n(own, felt.periods)
         });
         let slowed: Vec<Rc<[Slowed]>> = slowed.collect();
-        let mut of_joints = vec![Vec::new(); joints];
+        let mut of_axes = vec![Vec::new(); self.axes.len()];
         for (index, column) in self.columns.iter().enumerate() {
-            of_joints[column.joint].push(index);
+            of_axes[column.axis].push(index);
         }
         let mut way = Way::default();
         let mut means = vec![None; mean.len() * self.columns.len()];
         for row in 0..mean.len() {
             let of_row = &mut means[row * self.columns.len()..(row + 1) * self.columns.len()];
-            for (joint, own) in of_joints.iter().enumerate().filter(|(_, own)| !own.is_empty()) {
-                let at = mean.row(row).start + joint;
-                let change = period_s * mean.qdd[at];
-                if change.abs() <= least[joint] {
+            for (axis, own) in of_axes.iter().enumerate() {
+                let change = period_s * self.axes[axis].of(&mean.qdd[mean.row(row)]);
+                if change.abs() <= least[axis] {
                     continue;
                 }
-                let friction = frictions.get(joint).and_then(Option::as_deref);
-                let slowed = slowed.get(row).map_or_else(Slowed::default, |own| own[joint]);
-                way.lay([begun.qd[at], begun.qd[at] + change], (&self.velocities, friction), slowed);
+                let begin = self.axes[axis].of(&begun.qd[begun.row(row)]);
+                let friction = frictions.get(axis).and_then(Option::as_deref);
+                let slowed = slowed.get(row).map_or_else(Slowed::default, |own| own[axis]);
+                way.lay([begin, begin + change], (&self.velocities, friction), slowed);
                 let mut beside = if slowed.scale > 0.0 { way.beside() / slowed.scale } else { 0.0 };
                 for &index in own {
                     let mut mean = way.mean_of(&self.velocities, &self.columns[index].table);
@@ -211,40 +266,55 @@ impl<'a> TurningColumns<'a> {
         means
     }
 
-    /// The parameters of the columns, in their order. What pushes along is no friction: where that of a joint
+    /// The parameters of the columns, in their order. What pushes along is no friction: where that of an axis
     /// comes out so, as it may where nothing was believed to slow the joint, it is taken to rub as much. What
     /// pushes along in one direction and rubs in the other is left as it is.
     fn rubbing(&self, parameters: &[f64]) -> Vec<f64> {
         let value = |column: &TurningColumn| parameters.get(column.parameter).copied().unwrap_or_default();
         let mut values: Vec<f64> = self.columns.iter().map(value).collect();
-        let mut power = vec![[0.0; 2]; self.design.tree().joint_count()];
+        let mut power = vec![[0.0; 2]; self.axes.len()];
         for (column, value) in self.columns.iter().zip(&values) {
             for (own, velocity) in column.table.iter().zip(&self.velocities) {
                 let product = value * own * velocity;
-                power[column.joint][0] += product;
-                power[column.joint][1] += product.abs();
+                power[column.axis][0] += product;
+                power[column.axis][1] += product.abs();
             }
         }
         for (column, value) in self.columns.iter().zip(&mut values) {
-            let [sum, of_sizes] = power[column.joint];
+            let [sum, of_sizes] = power[column.axis];
             *value = if sum < -ROUNDING * of_sizes { -*value } else { *value };
         }
         values
     }
 
-    /// The friction of each joint \[N·m, N\] at the velocities of the tables under these parameters of the
+    /// The friction along each axis \[N·m, N\] at the velocities of the tables under these parameters of the
     /// columns; none where it has none.
     fn frictions(&self, values: &[f64]) -> Vec<Option<Vec<f64>>> {
-        let mut frictions = vec![None; self.design.tree().joint_count()];
+        let mut frictions = vec![None; self.axes.len()];
         for (column, value) in self.columns.iter().zip(values).filter(|(_, value)| **value != 0.0) {
             let friction: &mut Vec<f64> =
-                frictions[column.joint].get_or_insert_with(|| vec![0.0; self.velocities.len()]);
+                frictions[column.axis].get_or_insert_with(|| vec![0.0; self.velocities.len()]);
             friction.iter_mut().zip(&column.table).for_each(|(sum, own)| *sum += value * own);
         }
         frictions
     }
 
-    /// What inertia the joints feel under a belief, at instants that stand for a log's periods. Frictions
+    /// For each axis, the change of its velocity within a period from which on it is certain \[rad/s, m/s\]:
+    /// what the steps of its encoders leave of it.
+    fn least_changes(&self, measured: &MotionLog) -> Vec<f64> {
+        let noise = measured.readings.as_ref().map_or(&[][..], |readings| &readings.noise);
+        let of_axis = |axis: &VelocitySum| {
+            let noise = axis
+                .terms
+                .iter()
+                .map(|&(joint, factor)| (factor * noise.get(joint).copied().unwrap_or_default()).powi(2));
+            let error = std::f64::consts::SQRT_2 * noise.sum::<f64>().sqrt() / measured.period_s;
+            (CERTAIN * error).max(LEAST_CHANGE)
+        };
+        self.axes.iter().map(of_axis).collect()
+    }
+
+    /// What inertia the axes feel under a belief, at instants that stand for a log's periods. Frictions
     /// that turn are no part of it.
     ///
     /// # Errors
@@ -263,43 +333,30 @@ impl<'a> TurningColumns<'a> {
             let sensitivity =
                 Sensitivity::of(self.design, (&instant, &nothing), &believed.standing_on, foreseen)?;
             let modes = Modes::of(&sensitivity, &w);
-            let joint = |toward: &Vec<f64>| modes.as_ref().and_then(|modes| modes.joint(toward));
-            Ok(Felt {
-                periods: instant.weight as usize,
-                joints: sensitivity.toward.iter().map(joint).collect(),
-            })
+            let axis = |axis: &VelocitySum| modes.as_ref()?.axis(&sensitivity.toward(axis));
+            Ok(Felt { periods: instant.weight as usize, axes: self.axes.iter().map(axis).collect() })
         };
         instants(mean, period_s, INSTANT_EVERY_S).into_iter().map(felt).collect()
     }
 }
 
-/// What inertia each joint feels at an instant that stands for some periods; none where it is no inertia.
+/// What inertia each axis feels at an instant that stands for some periods; none where it is no inertia.
 pub(super) struct Felt {
     pub periods: usize,
-    pub joints: Vec<Option<TurningJoint>>,
-}
-
-/// For each joint, the change of its velocity within a period from which on it is certain \[rad/s, m/s\]:
-/// what the steps of its encoder leave of it.
-fn least_changes(measured: &MotionLog) -> Vec<f64> {
-    let noise = measured.readings.as_ref().map_or(&[][..], |readings| &readings.noise);
-    let of_joint = |joint: usize| {
-        let error =
-            noise.get(joint).map_or(0.0, |noise| std::f64::consts::SQRT_2 * noise / measured.period_s);
-        (CERTAIN * error).max(LEAST_CHANGE)
-    };
-    (0..measured.joints).map(of_joint).collect()
+    pub axes: Vec<Option<TurningAxis>>,
 }
 
 /// Slopes of the columns that turn in the periods in which any does.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Turned {
-    /// The parameters of the columns, and the joint that each turns with.
+    /// The velocities that columns turn with.
+    pub axes: Vec<VelocitySum>,
+    /// The parameters of the columns, and the axis of each.
     pub columns: Vec<(usize, usize)>,
     /// T·dc̄/dv₁ of each of them, `[period × column]` \[unit of the column × s²/rad, s²/m\].
     pub slopes: Vec<f64>,
     /// What δ ([`super::turning_response`]) has beside these, since a friction also changes what damping
-    /// takes, with the first of a joint's columns, `[period × column]` \[N·m·s²/rad, N·s²/m\].
+    /// takes, with the first of an axis's columns, `[period × column]` \[N·m·s²/rad, N·s²/m\].
     pub offsets: Vec<f64>,
 }
 
@@ -324,8 +381,9 @@ pub(super) fn turned(
     let means = turning.means((&begun, &mean), measured, believed)?;
     let columns = turning.places();
     let of_stretch = |stretch: &[Option<Mean>]| {
-        let mut turned = Turned { columns: columns.clone(), ..Turned::default() };
-        for period in stretch.chunks_exact(columns.len()) {
+        let (axes, columns) = (turning.axes.clone(), columns.clone());
+        let mut turned = Turned { axes, columns, ..Turned::default() };
+        for period in stretch.chunks_exact(turning.columns.len()) {
             if period.iter().flatten().any(|mean| mean.slope != 0.0) {
                 let own = |of_mean: fn(&Mean) -> f64| {
                     period.iter().map(move |mean| measured.period_s * mean.as_ref().map_or(0.0, of_mean))

@@ -2,6 +2,8 @@
 //!
 //! A torque of one that is held over a period T changes the velocity of a joint at its end by T·ρ, ρ =
 //! nᵀA⁻¹φ₁(X)n with what the joint moves by with each direction, n, and X and φ₁ as in [`super::response`].
+//! Of a friction between two joints the joint is the shaft that turns with the sum of both, n the sum of
+//! theirs.
 //! A friction that turns adds δ = Σ w_p·T·dc̄_p/dv₁, and by how much it changes what damping takes, to what
 //! its joint asks for, so that the determinant of the period is larger by the factor det(1 + H·Δ): Δ has the
 //! δ of each joint, and H what a torque on one does to the velocity of another, NᵀG⁻¹N with G = A + ½T·F,
@@ -19,14 +21,14 @@ use std::borrow::Borrow;
 /// there.
 pub(super) const LEAST: f64 = 0.9;
 
-/// δ·ρ from which on a joint turns together with others that do; below, each turns as if no other did.
+/// δ·ρ from which on an axis turns together with others that do; below, each turns as if no other did.
 const COUPLED: f64 = 0.02;
 
 /// What is added to H's diagonal, over its largest element.
 const LEAST_RESPONSE: f64 = 1e-6;
 
-/// A joint, as the inertia of an instant has it.
-pub(super) struct TurningJoint {
+/// An axis that a friction turns with: a joint, or the sum of several; as the inertia of an instant has it.
+pub(super) struct TurningAxis {
     /// ρ: by how much a torque of one changes its velocity in a period, over the period.
     pub velocity: f64,
     /// The same if it were not damped.
@@ -42,7 +44,7 @@ pub(super) struct TurningJoint {
 pub(super) struct TurningResponse {
     /// Mean of log det(1 + H·Δ).
     pub log_determinant: f64,
-    /// G⁻¹N of the joints that turn, scaled, `[direction × joint]`.
+    /// G⁻¹N of the axes that turn, scaled, `[direction × axis]`.
     moved: Mat<f64>,
     /// Its derivatives by H.
     by_response: Mat<f64>,
@@ -52,19 +54,16 @@ pub(super) struct TurningResponse {
     by_parameter: Vec<f64>,
     /// Less its derivatives by a parameter and by H, for each parameter.
     across: Vec<Mat<f64>>,
-    /// Less its second derivatives by the parameters of the same joint, `[column × column]`.
+    /// Less its second derivatives by the parameters of the same axis, `[column × column]`.
     curvature: Mat<f64>,
 }
 
 impl TurningResponse {
     /// Of frictions under parameters `w`; the instant stands for `weight` rows.
-    pub fn of(turned: &Turned, joints: &[TurningJoint], w: &Mat<f64>, weight: f64) -> Self {
-        let mut present: Vec<usize> = turned.columns.iter().map(|(_, joint)| *joint).collect();
-        present.sort_unstable();
-        present.dedup();
-        let (moved, response) = responses(&present, joints);
+    pub fn of(turned: &Turned, axes: &[TurningAxis], w: &Mat<f64>, weight: f64) -> Self {
+        let (moved, response) = responses(axes);
         let parameters: Vec<usize> = turned.columns.iter().map(|(parameter, _)| *parameter).collect();
-        let (count, own) = (present.len(), parameters.len());
+        let (count, own) = (axes.len(), parameters.len());
         let mut sum = TurningResponse {
             log_determinant: 0.0,
             moved,
@@ -74,34 +73,34 @@ impl TurningResponse {
             curvature: Mat::zeros(own, own),
             parameters,
         };
-        let of_joint = |joint: &usize| -> Vec<usize> {
-            (0..own).filter(|&index| turned.columns[index].1 == *joint).collect()
+        let of_axis = |axis: usize| -> Vec<usize> {
+            (0..own).filter(|&index| turned.columns[index].1 == axis).collect()
         };
-        let of_joints: Vec<Vec<usize>> = present.iter().map(of_joint).collect();
+        let of_axes: Vec<Vec<usize>> = (0..count).map(of_axis).collect();
         let mut together = Vec::with_capacity(count);
         let mut deltas = vec![0.0; count];
         for (slopes, offsets) in turned.slopes.chunks_exact(own).zip(turned.offsets.chunks_exact(own)) {
-            for (joint, columns) in of_joints.iter().enumerate() {
+            for (axis, columns) in of_axes.iter().enumerate() {
                 let own = |&index: &usize| slopes[index] * w[(sum.parameters[index], 0)] + offsets[index];
-                deltas[joint] = columns.iter().map(own).sum();
+                deltas[axis] = columns.iter().map(own).sum();
             }
             turning_together(&mut deltas, &response, &mut together);
             let row = Row::of(&together, &response);
             if let Some(row) = &row {
                 sum.log_determinant += row.log_determinant / weight;
             }
-            for (joint, columns) in of_joints.iter().enumerate() {
+            for (axis, columns) in of_axes.iter().enumerate() {
                 if columns.iter().all(|&index| slopes[index] == 0.0 && offsets[index] == 0.0) {
                     continue;
                 }
-                let place = together.iter().position(|(own, _)| *own == joint);
+                let place = together.iter().position(|(own, _)| *own == axis);
                 match row.as_ref().zip(place) {
                     Some((row, place)) => {
                         sum.add_together((slopes, columns), (&together, place), row, weight)
                     }
                     None => {
-                        let (alone, delta) = (response[(joint, joint)], deltas[joint]);
-                        sum.add_alone((slopes, columns), (joint, delta), alone, weight);
+                        let (alone, delta) = (response[(axis, axis)], deltas[axis]);
+                        sum.add_alone((slopes, columns), (axis, delta), alone, weight);
                     }
                 }
             }
@@ -109,28 +108,28 @@ impl TurningResponse {
         sum
     }
 
-    /// Adds a joint that turns in a row as if no other did; `alone` is its ρ.
+    /// Adds an axis that turns in a row as if no other did; `alone` is its ρ.
     fn add_alone(
         &mut self,
         (slopes, columns): (&[f64], &[usize]),
-        (joint, delta): (usize, f64),
+        (axis, delta): (usize, f64),
         alone: f64,
         weight: f64,
     ) {
         let factor = 1.0 + delta * alone;
         self.log_determinant += factor.ln() / weight;
-        self.by_response[(joint, joint)] += delta / (factor * weight);
+        self.by_response[(axis, axis)] += delta / (factor * weight);
         for &index in columns {
             let slope = slopes[index] / weight;
             self.by_parameter[index] += slope * alone / factor;
-            self.across[index][(joint, joint)] += slope / (factor * factor);
+            self.across[index][(axis, axis)] += slope / (factor * factor);
             for &other in columns {
                 self.curvature[(index, other)] += slope * slopes[other] * (alone / factor).powi(2);
             }
         }
     }
 
-    /// Adds the derivatives of the joint at a `place` of those that turn `together` in a row.
+    /// Adds the derivatives of the axis at a `place` of those that turn `together` in a row.
     fn add_together(
         &mut self,
         (slopes, columns): (&[f64], &[usize]),
@@ -138,12 +137,12 @@ impl TurningResponse {
         row: &Row,
         weight: f64,
     ) {
-        let (joint, delta) = together[place];
+        let (axis, delta) = together[place];
         for (b, &(other, other_delta)) in together.iter().enumerate() {
             let own = if place == b { delta } else { 0.0 };
-            self.by_response[(joint, other)] += (own - delta * row.at(place, b) * other_delta) / weight;
+            self.by_response[(axis, other)] += (own - delta * row.at(place, b) * other_delta) / weight;
         }
-        // The joint's row of 1 − K·Δ.
+        // The axis's row of 1 − K·Δ.
         let through = |b: usize| f64::from(u8::from(place == b)) - row.at(place, b) * together[b].1;
         let own = row.at(place, place);
         for &index in columns.iter().filter(|index| slopes[**index] != 0.0) {
@@ -161,9 +160,9 @@ impl TurningResponse {
         }
     }
 
-    /// M·S·Mᵀ of a symmetric S over the joints, packed.
-    fn packed(&self, over_joints: &Mat<f64>) -> Mat<f64> {
-        let whole = &self.moved * over_joints * self.moved.transpose();
+    /// M·S·Mᵀ of a symmetric S over the axes, packed.
+    fn packed(&self, over_axes: &Mat<f64>) -> Mat<f64> {
+        let whole = &self.moved * over_axes * self.moved.transpose();
         let mut column = Mat::zeros(packed(whole.nrows()), 1);
         for row in 0..whole.nrows() {
             for other in 0..=row {
@@ -191,7 +190,7 @@ impl TurningResponse {
     }
 
     /// Adds `weight` times less its second derivatives, for all parameters and those from `first` on: those
-    /// by two parameters of a joint, and by one and the inertia. Another determinant outweighs those by the
+    /// by two parameters of an axis, and by one and the inertia. Another determinant outweighs those by the
     /// inertia alone. `columns` are the packed G of each parameter.
     pub fn add_curvature(&self, columns: &Mat<f64>, first: usize, weight: f64, curvature: &mut Mat<f64>) {
         for (own, &parameter) in self.parameters.iter().enumerate() {
@@ -221,66 +220,65 @@ impl TurningResponse {
 }
 
 /// Joints with frictions that turn, as the inertia of an instant has them.
-pub(super) struct TurningJoints {
+pub(super) struct TurningAxes {
     response: Mat<f64>,
 }
 
-impl TurningJoints {
-    /// Of those `present` among the joints of an instant.
-    pub fn of(present: &[usize], joints: &[&TurningJoint]) -> Self {
-        TurningJoints { response: responses(present, joints).1 }
+impl TurningAxes {
+    /// Of these.
+    pub fn of(axes: &[&TurningAxis]) -> Self {
+        TurningAxes { response: responses(axes).1 }
     }
 
-    /// What a torque on each joint does to its own velocity in a row in which the others have these δ, ρ
+    /// What a torque on each axis does to its own velocity in a row in which the others have these δ, ρ
     /// where none of them turns: the determinant of the row is larger by 1 + δ times this than it were
-    /// without the friction of the joint. None where H is no response.
+    /// without the friction of the axis. None where H is no response.
     pub fn felt_alone(&self, deltas: &[f64]) -> Option<Vec<f64>> {
-        let least = |joint: usize| -LEAST / self.response[(joint, joint)];
+        let least = |axis: usize| -LEAST / self.response[(axis, axis)];
         let all: Vec<(usize, f64)> =
-            deltas.iter().enumerate().map(|(joint, delta)| (joint, delta.max(least(joint)))).collect();
+            deltas.iter().enumerate().map(|(axis, delta)| (axis, delta.max(least(axis)))).collect();
         let row = Row::of(&all, &self.response)?;
-        let alone = |&(joint, delta): &(usize, f64)| {
-            let felt = row.at(joint, joint);
+        let alone = |&(axis, delta): &(usize, f64)| {
+            let felt = row.at(axis, axis);
             felt / (1.0 - delta * felt)
         };
         Some(all.iter().map(alone).collect())
     }
 }
 
-/// Of joints with these δ, those that turn together in a row; a δ that pushes along is kept where some
+/// Of axes with these δ, those that turn together in a row; a δ that pushes along is kept where some
 /// inertia is left.
 fn turning_together(deltas: &mut [f64], response: &Mat<f64>, together: &mut Vec<(usize, f64)>) {
     together.clear();
-    for (joint, delta) in deltas.iter_mut().enumerate() {
-        *delta = delta.max(-LEAST / response[(joint, joint)]);
-        if delta.abs() * response[(joint, joint)] > COUPLED {
-            together.push((joint, *delta));
+    for (axis, delta) in deltas.iter_mut().enumerate() {
+        *delta = delta.max(-LEAST / response[(axis, axis)]);
+        if delta.abs() * response[(axis, axis)] > COUPLED {
+            together.push((axis, *delta));
         }
     }
 }
 
-/// G⁻¹N of these joints, scaled, and H.
-fn responses<J: Borrow<TurningJoint>>(present: &[usize], joints: &[J]) -> (Mat<f64>, Mat<f64>) {
-    let scale = |&joint: &usize| {
-        let TurningJoint { velocity, moved, toward, .. } = joints[joint].borrow();
+/// G⁻¹N of these axes, scaled, and H.
+fn responses<A: Borrow<TurningAxis>>(axes: &[A]) -> (Mat<f64>, Mat<f64>) {
+    let scale = |axis: &A| {
+        let TurningAxis { velocity, moved, toward, .. } = axis.borrow();
         let acceleration = dot(moved, toward);
         if acceleration > 0.0 { (velocity / acceleration).sqrt() } else { 0.0 }
     };
-    let scales: Vec<f64> = present.iter().map(scale).collect();
-    let directions = present.first().map_or(0, |&first| joints[first].borrow().moved.len());
-    let moved = Mat::from_fn(directions, present.len(), |row, joint| {
-        scales[joint] * joints[present[joint]].borrow().moved[row]
+    let scales: Vec<f64> = axes.iter().map(scale).collect();
+    let directions = axes.first().map_or(0, |first| first.borrow().moved.len());
+    let moved =
+        Mat::from_fn(directions, axes.len(), |row, axis| scales[axis] * axes[axis].borrow().moved[row]);
+    let mut response = Mat::from_fn(axes.len(), axes.len(), |row, column| {
+        scales[row] * dot(&axes[row].borrow().toward, moved.col_as_slice(column))
     });
-    let mut response = Mat::from_fn(present.len(), present.len(), |row, column| {
-        scales[row] * dot(&joints[present[row]].borrow().toward, moved.col_as_slice(column))
-    });
-    // Legs on the floor move together: there are more joints than directions.
-    let largest = (0..present.len()).map(|joint| response[(joint, joint)]).fold(0.0, f64::max);
-    (0..present.len()).for_each(|joint| response[(joint, joint)] += LEAST_RESPONSE * largest);
+    // Legs on the floor move together, and two joints with their sum: there are more axes than directions.
+    let largest = (0..axes.len()).map(|axis| response[(axis, axis)]).fold(0.0, f64::max);
+    (0..axes.len()).for_each(|axis| response[(axis, axis)] += LEAST_RESPONSE * largest);
     (moved, response)
 }
 
-/// The joints that turn in one row.
+/// The axes that turn in one row.
 struct Row {
     log_determinant: f64,
     size: usize,
@@ -289,7 +287,7 @@ struct Row {
 }
 
 impl Row {
-    /// Of joints, each with its δ. None where none turns, or H is no response.
+    /// Of axes, each with its δ. None where none turns, or H is no response.
     fn of(turning: &[(usize, f64)], response: &Mat<f64>) -> Option<Self> {
         let size = turning.len();
         if size == 0 {

@@ -2,6 +2,7 @@
 #![warn(missing_docs)]
 
 mod candidates;
+mod completion;
 mod constants;
 mod contest;
 mod hypothesis;

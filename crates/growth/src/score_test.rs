@@ -1,6 +1,7 @@
 //! The loop closed by the estimator's own likelihood.
 
 use crate::candidates::{candidates, is_alike, ranges};
+use crate::completion::Fitted;
 use crate::constants::with_foretold;
 use crate::contest::{Contender, ScoreTestSettings, Winner};
 use crate::hypothesis::Hypothesis;
@@ -138,7 +139,7 @@ impl ScoreTest {
     }
 
     /// [`Self::fitted`], and −log L of it.
-    fn fit(
+    pub(crate) fn fit(
         &self,
         robot: &Robot,
         model: &RobotModel,
@@ -204,7 +205,8 @@ impl ScoreTest {
             if near.is_empty() {
                 return Ok(None);
             }
-            let (mut answers, contenders) = self.contenders(robot, model, known, near, logs)?;
+            let (_, without) = self.fit(robot, model, known, logs)?;
+            let (mut answers, contenders) = self.contenders((robot, model), known, near, (logs, without))?;
             let Some(Winner { winner, rivals }) = self.settings.contest(&contenders) else {
                 all = others;
                 continue;
@@ -218,8 +220,11 @@ impl ScoreTest {
                 _ => None,
             };
             let rivals = rivals.into_iter().filter_map(pair).collect();
-            let merit = contenders[winner].merit;
-            return Ok(Some(Answer { rivals, merit, ..answers.swap_remove(winner) }));
+            let found = answers.swap_remove(winner);
+            let (Fitted { effects, model: fitted, .. }, more) =
+                self.completed(robot, found, (known, logs), without)?;
+            let merit = contenders[winner].merit + more;
+            return Ok(Some(Answer { effects, fitted, merit, rivals }));
         }
     }
 
@@ -228,35 +233,34 @@ impl ScoreTest {
     /// roughly, and may predict as much for an effect that explains half of it.
     fn contenders(
         &self,
-        robot: &Robot,
-        model: &RobotModel,
+        (robot, model): (&Robot, &RobotModel),
         known: &[EffectSpec],
         near: &[Hypothesis],
-        logs: &[MotionLog],
-    ) -> Result<(Vec<Answer>, Vec<Contender>), CurriculumError> {
-        let (_, without) = self.fit(robot, model, known, logs)?;
+        (logs, without): (&[MotionLog], f64),
+    ) -> Result<(Vec<Fitted>, Vec<Contender>), CurriculumError> {
         let (mut answers, mut contenders) = (Vec::new(), Vec::new());
         for hypothesis in near {
-            let (effects, fitted, with) =
-                self.fitted_best((robot, model), known, hypothesis, (logs, without))?;
+            let found = self.fitted_best((robot, model), known, hypothesis, (logs, without))?;
+            let merit = hypothesis.merit_of(without - found.cost);
+            let effects = &found.effects;
             let size = effects.iter().map(|effect| size(robot, effect)).fold(0, usize::saturating_add);
             let rank = effects.first().and_then(|effect| self.catalogue.rank(&effect.kind));
             let rank = rank.unwrap_or(usize::MAX);
-            contenders.push(Contender { merit: hypothesis.merit_of(without - with), size, rank });
-            answers.push(Answer { effects, fitted, merit: 0.0, rivals: Vec::new() });
+            contenders.push(Contender { merit, size, rank });
+            answers.push(found);
         }
         Ok((answers, contenders))
     }
 
-    /// The effects of a hypothesis with their best constants, the model fitted with them and with what is
-    /// `known`, and −log L of it; it is `without` the hypothesis.
+    /// The effects of a hypothesis with their best constants, fitted with what is `known`; −log L is
+    /// `without` the hypothesis so large.
     fn fitted_best(
         &self,
         (robot, model): (&Robot, &RobotModel),
         known: &[EffectSpec],
         hypothesis: &Hypothesis,
         (logs, without): (&[MotionLog], f64),
-    ) -> Result<(Vec<EffectSpec>, RobotModel, f64), CurriculumError> {
+    ) -> Result<Fitted, CurriculumError> {
         let specs = |gains: &[Gain]| gains.iter().map(|gain| gain.effect.clone()).collect::<Vec<_>>();
         let fit = |from: &RobotModel, foretold: &[Gain]| {
             let effects = [known, &specs(foretold)].concat();
@@ -278,8 +282,7 @@ impl ScoreTest {
             }
             (effects, fitted, with) = (exchanged, other, better);
         }
-        let effects = specs(&effects);
-        Ok((effects, fitted, with))
+        Ok(Fitted { effects: specs(&effects), model: fitted, cost: with })
     }
 }
 

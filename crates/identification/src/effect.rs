@@ -83,6 +83,34 @@ pub struct QuadraticTerm {
     pub factor: f64,
 }
 
+/// The velocity of one joint, or a sum of several joints' that one shaft turns with \[rad/s, m/s\]. A torque
+/// on that shaft is one on each of the joints, times its factor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct VelocitySum {
+    /// Velocity coordinates of the tree, each with its factor, which is not zero.
+    pub terms: Vec<(usize, f64)>,
+}
+
+impl VelocitySum {
+    /// That of one joint.
+    pub fn of_joint(joint: usize) -> Self {
+        VelocitySum { terms: vec![(joint, 1.0)] }
+    }
+
+    /// The joint whose own velocity it is; none for a sum of several.
+    pub fn joint(&self) -> Option<usize> {
+        match self.terms.as_slice() {
+            [(joint, factor)] if *factor == 1.0 => Some(*joint),
+            _ => None,
+        }
+    }
+
+    /// The sum of what each joint has, times its factor.
+    pub fn of(&self, joints: &[f64]) -> f64 {
+        self.terms.iter().map(|&(joint, factor)| factor * joints[joint]).sum()
+    }
+}
+
 /// A physical effect beside the rigid body: linear in its parameters, once its constants are fixed.
 pub trait Effect: Send + Sync {
     /// What builds the effect again.
@@ -105,13 +133,14 @@ pub trait Effect: Send + Sync {
     fn is_linear_in_motion(&self, _parameter: usize) -> bool {
         false
     }
-    /// The joint with whose velocity its columns turn, if they are functions of that of the same sample and
-    /// of nothing else that changes within a control period, in that joint's own torque. Coulomb friction is
-    /// one: what it takes of a period in which the joint reverses is its mean on the way from one velocity to
-    /// the next.
+    /// The velocity with which the columns of a parameter (an index into [`Effect::parameters`]) turn, if
+    /// they are functions of that of the same sample and of nothing else that changes within a control
+    /// period: in the torque of each of its joints the same function, times the joint's factor. Coulomb
+    /// friction is one: what it takes of a period in which the joint reverses is its mean on the way from one
+    /// velocity to the next.
     ///
     /// None is always safe.
-    fn turns_with(&self) -> Option<usize> {
+    fn turns_with(&self, _parameter: usize) -> Option<VelocitySum> {
         None
     }
     /// Whether the columns of a sample depend on that sample and earlier ones alone. A rate of change of the

@@ -9,7 +9,7 @@ use phiw_curriculum::{Curriculum, CurriculumError, CurriculumRun, Experiment, un
 use phiw_estimation::{Estimator, Evidence, Gain, MotionLog, RobotModel, RowsAt};
 use phiw_growth::ScoreTest;
 use phiw_identification::EffectSpec;
-use phiw_plant::{Friction, Mechanism, PlantEffect};
+use phiw_plant::{Coupling, Friction, Mechanism, PlantEffect};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -136,6 +136,57 @@ fn frictions_that_the_noise_turns_within_a_period_are_friction() {
     let squares: f64 = found[..rigid].iter().zip(&truth).map(|(own, truth)| (own - truth).powi(2)).sum();
     let error = (squares / rigid as f64).sqrt();
     assert!(error < 0.016, "{error}");
+}
+
+/// A shaft that turns with the sum of two joints, its damping \[N·m·s/rad\] and its friction \[N·m\].
+fn shared_friction(arm: &Arm) -> (PlantEffect, [f64; 2]) {
+    let joints = [2, 3];
+    let effort = joints.map(|joint| arm.tree.joint(joint).limits.effort);
+    let torque = 0.02 * effort[0].min(effort[1]);
+    let coefficient = 3.0 * torque;
+    let shaft = Coupling::SharedFriction { joints, coefficient, torque, width: 0.01 };
+    (PlantEffect::Coupling(shaft), [coefficient, torque])
+}
+
+fn coupling(arm: &Arm, terms: f64) -> EffectSpec {
+    let joints = [2, 3].map(|joint| arm.tree.joint(joint).joint.as_str());
+    EffectSpec::new("transmission_coupling", &joints).with("terms", terms)
+}
+
+/// A shaft between two joints comes to rest and turns within a period as a joint does.
+#[test]
+fn friction_of_a_sum_of_two_velocities_turns_within_a_period() {
+    let arm = Arm::new(0.02);
+    let test = test_of(&arm);
+    let (secret, truth) = shared_friction(&arm);
+    let logs = logs(&arm, &[secret], 3);
+    let fitted = |width: f64| {
+        let spec = coupling(&arm, 5.0).with("sign_width", width);
+        let model = test.fitted(&arm.robot, &arm.truth, &[spec], &logs).unwrap();
+        (negative_log_likelihood(&arm, &model, &logs), model.effects.last().unwrap().parameters.clone())
+    };
+    let (own, found) = fitted(0.01);
+    for width in [0.003, 0.03] {
+        let (other, _) = fitted(width);
+        assert!(other > own, "{width} rad/s: {other}, and {own}");
+    }
+    for (found, truth) in found.iter().zip(truth) {
+        assert!((found / truth - 1.0).abs() < 0.1, "{found}, not {truth}");
+    }
+}
+
+/// A score may choose the friction alone, or an inertia that makes up for the width: fits choose again.
+#[test]
+fn damping_is_found_beside_the_friction_between_two_joints() {
+    let arm = Arm::new(0.02);
+    let test = test_of(&arm);
+    let logs = logs(&arm, &[shared_friction(&arm).0], 3);
+    let declared = test.fitted(&arm.robot, &arm.truth, &[], &logs).unwrap();
+    let found = test.look(&arm.robot, &declared, &logs, false, &[]).unwrap().effects();
+    let [effect] = found.as_slice() else { panic!("{found:?}") };
+    let expected = coupling(&arm, 5.0);
+    assert_eq!((&effect.kind, &effect.joints), (&expected.kind, &expected.joints), "{found:?}");
+    assert_eq!(effect.constants["terms"], 5.0, "{found:?}");
 }
 
 /// Friction of all joints that no joint's score tells is one hypothesis; of a right model none is found.

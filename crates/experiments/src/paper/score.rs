@@ -69,7 +69,7 @@ impl Setup {
         validation: &Validation,
     ) -> anyhow::Result<Score> {
         let parameters = model.parameters(&self.robot)?;
-        let truth = self.settings.truth();
+        let truth = &validation.truth;
         let declared = model.effects.len() == self.robot.declared().len();
         let (factor, samples) = match declared {
             true => &validation.declared,
@@ -83,11 +83,11 @@ impl Setup {
             // Rows that count can be few, where the base rocks: then least squares has no answer.
             match estimator.estimate(&design, evidence, model, &parameters) {
                 Err(EstimationError::Regressor(RegressorError::RankDeficient { .. })) => Ok(None),
-                estimate => Ok(Some(parameter_rmse(&estimate?.parameters, &truth))),
+                estimate => Ok(Some(parameter_rmse(&estimate?.parameters, truth))),
             }
         };
         Ok(Score {
-            rmse_w: parameter_rmse(&parameters, &truth),
+            rmse_w: parameter_rmse(&parameters, truth),
             rmse_torque: torque_rmse(factor, &parameters, *samples)?,
             rmse_w_least_squares: bystander(&LeastSquares)?,
             rmse_w_weighted: bystander(&WeightedLeastSquares)?,

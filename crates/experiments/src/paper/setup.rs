@@ -24,8 +24,9 @@ use phiw_curriculum::{Experiment, unreliable_model};
 use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
 use phiw_dynamics::{Workspace, World};
 use phiw_estimation::{Evidence, MotionLog, Robot, RobotModel, RowsAt};
+use phiw_identification::EffectSpec;
 use phiw_identification::model::{parameter_name, standard_unit};
-use phiw_plant::{PlantEffect, Sensors, Timing};
+use phiw_plant::{Coupling, PlantEffect, Sensors, Timing};
 use phiw_regressor::factor::Factor;
 use phiw_report::statistics::median;
 use phiw_simulated_robot::{FeedForward, KnownOfController, SimulatedRobot};
@@ -68,6 +69,8 @@ pub struct Validation {
     pub logs: Vec<MotionLog>,
     /// R of [Φ f], and the number of samples T.
     pub declared: (Factor, f64),
+    /// The true parameters of what is declared, in this plant.
+    pub truth: Vec<f64>,
 }
 
 /// What decides the results of a run, beside its arm and seed. Runs with different settings are never mixed.
@@ -241,7 +244,7 @@ impl Setup {
         let mut setup = Setup {
             constraint,
             relaxation: relaxation_of_alpha,
-            validation: Validation { logs: Vec::new(), declared: (Factor::empty(0), 0.0) },
+            validation: Validation { logs: Vec::new(), declared: (Factor::empty(0), 0.0), truth: Vec::new() },
             held_out: motions.validation,
             settings,
             subject,
@@ -275,7 +278,29 @@ impl Setup {
     pub fn validation(&self, backend: Engine, secret: &[PlantEffect]) -> anyhow::Result<Validation> {
         let logs = self.validation_logs(backend, secret)?;
         let declared = self.validation_of(&self.truth, &logs)?;
-        Ok(Validation { logs, declared })
+        Ok(Validation { logs, declared, truth: self.truth_beside(secret) })
+    }
+
+    /// The true parameters of what is declared beside a secret. Damping of a shaft that turns with two joints
+    /// is damping of each of them, and only what crosses over is not declared.
+    fn truth_beside(&self, secret: &[PlantEffect]) -> Vec<f64> {
+        let mut truth = self.settings.truth();
+        for effect in secret {
+            let PlantEffect::Coupling(Coupling::SharedFriction { joints, coefficient, .. }) = effect else {
+                continue;
+            };
+            for &joint in joints {
+                let joint = &self.subject.tree.joint(joint).joint;
+                let is_its =
+                    |own: &&EffectSpec| own.kind == "viscous_friction" && own.joints[..] == [joint.clone()];
+                let place = self.robot.declared().iter().position(|own| is_its(&own));
+                // One parameter each.
+                if let Some(own) = place.and_then(|place| truth.get_mut(self.robot.base().count() + place)) {
+                    *own += coefficient;
+                }
+            }
+        }
+        truth
     }
 
     /// The initial model that all seeds share, if they do.
