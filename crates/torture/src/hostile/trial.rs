@@ -267,10 +267,16 @@ impl Trial {
     }
 }
 
-/// The most resident memory that a process has had \[bytes\], 0 where that cannot be read.
+/// The most resident memory that a child process has had \[bytes\], 0 where that cannot be read.
+///
+/// `spawn` returns when the child is about to leave the memory that it shares with us (`vfork`), and what is read
+/// before it has left is our own peak. Its program is ours for as long.
 fn peak_of(process: u32) -> u64 {
+    let program = |process: &str| std::fs::read_link(format!("/proc/{process}/exe"));
+    // The program is read first: a child never comes back.
+    let left = matches!((program(&process.to_string()), program("self")), (Ok(its), Ok(ours)) if its != ours);
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).filter(|_| left);
     line.and_then(|line| line.trim().trim_end_matches(" kB").trim().parse::<u64>().ok()).unwrap_or(0) * 1024
 }
 
@@ -307,4 +313,25 @@ fn collect(folder: &Path, inputs: &[String]) -> io::Result<(ResultFiles, Vec<Str
         }
     }
     Ok((results, left_over))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::peak_of;
+    use std::io::{BufRead, BufReader};
+    use std::process::{Command, Stdio};
+
+    #[test]
+    fn a_child_that_still_has_our_memory_is_not_charged_with_it() {
+        assert_eq!(peak_of(std::process::id()), 0, "our own memory was taken for a child's");
+        let mut shell = Command::new("sh");
+        let script = ["-c", "echo started; read end"];
+        let mut child = shell.args(script).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
+        let peak = peak_of(child.id());
+        drop(child.stdin.take());
+        child.wait().unwrap();
+        assert!(peak > 0 || !cfg!(target_os = "linux"), "the memory of a child that runs was not read");
+    }
 }
