@@ -215,7 +215,9 @@ fn torque_at_rest_decides_nothing() {
     let rows = |identified: &Identified, joint: usize| -> u64 {
         identified.train_folds.iter().map(|fold| fold.groups()[joint].factor.rows()).sum()
     };
-    assert_eq!(rows(&fitted, 1), rows(&misled, 1));
+    // A reversal takes less than a tenth of the filter's window, unless it is a slow one.
+    let kept = rows(&fitted, 1) as f64 / rows(&misled, 1) as f64;
+    assert!(kept > 0.99, "{kept} of the rows of a joint that moves");
     let share = rows(&fitted, 0) as f64 / rows(&misled, 0) as f64;
     assert!((0.45..0.6).contains(&share), "joint 0 moves half of the time, {share} of its rows count");
     assert!(misled.train.rmse[0] > 1.0);
@@ -227,14 +229,15 @@ fn torque_at_rest_decides_nothing() {
         misled.train.rmse
     );
 
-    let (mut resting, mut outputs) = (0, 0);
+    let (mut resting, mut before_the_stop, mut outputs) = (0, 0, 0);
     predict(&fitted.design, &fitted.fit.parameters, &[&blocks], &mut |prediction| {
         outputs += 1;
         resting += u32::from(!prediction.counts(0));
-        assert!(prediction.counts(0) || prediction.t > 19.0);
+        before_the_stop += u32::from(!prediction.counts(0) && prediction.t < 19.0);
     })
     .unwrap();
     assert!((0.4..0.6).contains(&(f64::from(resting) / f64::from(outputs))));
+    assert!(before_the_stop * 100 < outputs, "{before_the_stop} of {outputs} rest before the joint stops");
 }
 
 /// The errors that the factors tell are those of the predictions, summed one by one.

@@ -221,7 +221,7 @@ pub fn conditioning_entries(analysis: &Analysis<'_>) -> Vec<(String, String)> {
     entry(
         "Rest",
         format!(
-            "rows where a joint is slower than 1 % of its RMS speed in half of the filter's window do not count for its torque: {rests}"
+            "rows where a joint is slower than 1 % of its RMS speed in a tenth of the filter's window do not count for its torque: {rests}"
         ),
     );
     entries

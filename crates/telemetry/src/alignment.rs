@@ -38,9 +38,20 @@ pub struct Alignment {
     /// Distance of the lags that were tried, in seconds.
     #[serde(with = "crate::any_number")]
     pub resolution: f64,
+    /// Number of stretches of time whose means were compared.
+    #[serde(with = "crate::any_number", default)]
+    pub stretches: f64,
     /// Share of the rows in which the position changes whose velocity is its difference to the row before.
     #[serde(with = "crate::any_number", default)]
     pub differenced: f64,
+}
+
+impl Alignment {
+    /// The lag over its standard error, if what is unexplained at the lag is white.
+    pub fn lag_significance(&self) -> f64 {
+        let cost = (self.unexplained - self.unexplained_at_lag).max(0.0);
+        (cost * self.stretches / self.unexplained_at_lag).sqrt()
+    }
 }
 
 /// Collects an [`Alignment`] in constant memory.
@@ -221,6 +232,7 @@ impl AlignmentCollector {
             zero_share: self.zero[0] / self.all[0],
             motion_at_zero: (self.zero[1] / self.zero[0].max(1.0) / (self.all[1] / self.all[0])).sqrt(),
             resolution: self.resolution,
+            stretches: self.count,
             differenced: self.differences[1] / self.differences[0].max(1.0),
         })
     }

@@ -6,12 +6,12 @@ use crate::alignment::Alignment;
 /// unless it is truly there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CheckSettings {
-    /// Share of the velocity's power that a lag costs; 0.0025 is an error of 5 % of its root mean square,
-    /// which is that of good frictions.
-    pub lag_cost: f64,
-    /// Share of what is unexplained that is left at the lag, below which a lag is one however little it
-    /// costs: a slow joint's velocity is as late as that of a quick one.
-    pub lag_left: f64,
+    /// A lag over its standard error, from which on it is one, however little of the velocity's power it
+    /// costs: a slow joint's velocity is as late as that of a quick one, and steps of a coarse encoder hide
+    /// it. The error is that of white noise; noise of a few samples' correlation makes it twice as large.
+    /// `cargo xtask undeclared --suite wide_right --situation differenced_velocity,late_velocity` holds it
+    /// against velocities that are late.
+    pub lag_significance: f64,
     /// The shortest lag that is one \[s\]: simulators write velocities that are late by half of their step,
     /// which is no error of a torque; 1 ms is one of 2 % at 3 Hz.
     pub least_lag: f64,
@@ -59,8 +59,7 @@ pub struct CheckSettings {
 impl Default for CheckSettings {
     fn default() -> Self {
         CheckSettings {
-            lag_cost: 0.0025,
-            lag_left: 0.1,
+            lag_significance: 8.0,
             least_lag: 8e-4,
             differenced: 0.95,
             scale_error: 0.05,
@@ -90,11 +89,9 @@ impl CheckSettings {
     }
 
     pub(crate) fn is_late(&self, alignment: &Alignment) -> bool {
-        let cost = alignment.unexplained - alignment.unexplained_at_lag;
-        let left = alignment.unexplained_at_lag / alignment.unexplained;
-        let costs = cost > self.lag_cost && left < 0.5;
         let computed = alignment.differenced > self.differenced;
-        (costs || left < self.lag_left || computed) && alignment.lag.abs() > self.least_lag
+        let certain = alignment.lag_significance() > self.lag_significance;
+        (certain || computed) && alignment.lag.abs() > self.least_lag
     }
 
     pub(crate) fn is_scaled(&self, alignment: &Alignment) -> bool {
@@ -111,11 +108,13 @@ impl CheckSettings {
 mod tests {
     use super::*;
 
-    /// On a slow joint a lag costs little; its velocity was used, and a delay was named that was none.
+    /// On a slow joint a lag costs little; its velocity was used, and a delay was named that was none. The
+    /// same where the steps of a coarse encoder are more than what the lag costs.
     #[test]
-    fn a_slow_joints_velocity_is_as_late_as_a_quick_ones() {
+    fn a_lag_counts_by_its_error_and_not_by_what_it_costs() {
         let alignment = |unexplained: f64, unexplained_at_lag: f64| Alignment {
             lag: 0.03,
+            stretches: 2000.0,
             scale: 1.0,
             unexplained,
             unexplained_at_lag,
@@ -127,6 +126,8 @@ mod tests {
         let settings = CheckSettings::default();
         assert!(settings.is_late(&alignment(0.02, 0.001)));
         assert!(settings.is_late(&alignment(0.001, 0.00001)));
-        assert!(!settings.is_late(&alignment(0.001, 0.0005)));
+        assert!(settings.is_late(&alignment(0.0088, 0.0083)));
+        assert!(!settings.is_late(&alignment(0.0085, 0.0083)));
+        assert!(!settings.is_late(&Alignment { lag: 5e-4, ..alignment(0.02, 0.001) }));
     }
 }

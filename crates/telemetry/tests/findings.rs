@@ -115,7 +115,7 @@ fn no_velocity_is_used_where_one_of_the_log_is_late() {
                 text,
                 "{t:.6},{q:.9},{qd:.7},{tau:.6},{:.9},{:.7},{tau:.6}",
                 0.1 * q,
-                0.1 * qd + 0.1 * noise
+                0.1 * qd + 0.2 * noise
             );
         }
         std::fs::write(&path, text).expect("written");

@@ -56,6 +56,28 @@ fn strokes_have_a_constant_speed_most_of_their_time() {
 }
 
 #[test]
+fn joints_that_stick_creep_below_what_their_encoders_show() {
+    check(Situation::Sticking, |case, log| {
+        let states: Vec<[f64; 3]> =
+            (0..20_000).map(|k| case.motions[0].state(0, 0.001 * f64::from(k))).collect();
+        for three in states.windows(3).skip(1000) {
+            assert!((three[1][1] - (three[2][0] - three[0][0]) / 0.002).abs() < 1e-3, "{three:?}");
+            assert!((three[1][2] - (three[2][1] - three[0][1]) / 0.002).abs() < 0.1, "{three:?}");
+        }
+        let rms = mean(states.iter().map(|[_, v, _]| v * v)).sqrt();
+        let mut stuck = 0;
+        for slow in states.chunk_by(|[_, a, _], [_, b, _]| (a.abs() < 0.02 * rms) == (b.abs() < 0.02 * rms)) {
+            let turns = slow[0][1] * slow[slow.len() - 1][1] < 0.0;
+            let step = case.sensors.quantum[0];
+            let way = slow.iter().map(|[q, ..]| (q - slow[0][0]).abs()).fold(0.0, f64::max);
+            stuck += usize::from(turns && slow.len() >= 100 && way < 2.0 * step);
+        }
+        assert!(stuck >= 2, "sticks {stuck} times");
+        assert!(column(log, "q.joint_1").windows(50).any(|rows| rows.iter().all(|row| *row == rows[0])));
+    });
+}
+
+#[test]
 fn in_turn_one_joint_moves_at_a_time() {
     check(Situation::InTurn, |case, log| {
         let stamps = column(log, "t");

@@ -20,6 +20,11 @@ const OUTLIERS: [f64; 2] = [0.02, 8.0];
 /// direction. Degrees are refused as such.
 const WRONG_UNITS: [f64; 2] = [9.549_296_6, -1.0];
 
+/// Fewest bits of the encoders whose steps hide how late a difference is.
+const COARSE_BITS: i32 = 12;
+/// How many times coarser the encoders of slides are where joints stick.
+const COARSER_SLIDES: f64 = 100.0;
+
 /// The shape of the noise's innovations, all of unit variance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -133,7 +138,7 @@ impl Logging {
     ) -> Self {
         use Situation::{
             Colour, DeadBand, DriveFilter as Filter, HeavyTails, LateFilter, LateVelocity, LongColour, Mixed,
-            NoiseJoints, NoisyPositions, Quantised, ShortColour, White,
+            NoiseJoints, NoisyPositions, Quantised, ShortColour, Sticking, White,
         };
         let joints = torque.len();
         sensors.correlation_time = match situation {
@@ -169,13 +174,13 @@ impl Logging {
             let steps = rng.log_uniform(0.5, 4.0);
             torque_step = sensors.torque_noise.iter().map(|noise| noise * steps).collect();
         }
-        if situation == Quantised {
-            let bits = 11 + rng.index(3) as i32;
-            for (joint, quantum) in sensors.quantum.iter_mut().enumerate() {
-                if tree.joint(joint).joint_type != JointType::Prismatic {
-                    *quantum = TAU / f64::from(bits).exp2();
-                }
-            }
+        if matches!(situation, Quantised | Sticking) {
+            let fewest_bits = if situation == Quantised { 11 } else { 13 };
+            sensors.set_encoder_bits(tree, fewest_bits + rng.index(3) as i32);
+        }
+        if situation == Sticking {
+            let slides = (0..joints).filter(|&joint| tree.joint(joint).joint_type == JointType::Prismatic);
+            slides.for_each(|joint| sensors.quantum[joint] *= COARSER_SLIDES);
         }
         let mut velocity = matches!(situation, LateVelocity | Mixed).then(|| VelocityColumn {
             lag: rng.log_uniform(0.02, 0.2),
@@ -241,6 +246,9 @@ impl Logging {
         }
         let differenced = (situation == Situation::DifferencedVelocity)
             .then(|| DifferencedVelocity { corner: rng.chance(0.5).then(|| rng.log_uniform(20.0, 80.0)) });
+        if differenced.is_some() && rng.chance(0.5) {
+            sensors.set_encoder_bits(tree, COARSE_BITS + rng.index(3) as i32);
+        }
         let pushes = if situation == Situation::Pushes { Push::draw(rng) } else { Vec::new() };
         Logging {
             tails,

@@ -72,6 +72,15 @@ impl Sensors {
         Sensors { rate, torque_noise, correlation_time, quantum, angle_noise, clock, logging: None }
     }
 
+    /// Gives the encoders of all turning joints so many bits.
+    pub fn set_encoder_bits(&mut self, tree: &Tree, bits: i32) {
+        for (joint, quantum) in self.quantum.iter_mut().enumerate() {
+            if tree.joint(joint).joint_type != JointType::Prismatic {
+                *quantum = TAU / f64::from(bits).exp2();
+            }
+        }
+    }
+
     /// True times of the samples and the stamps on them, from `start` on.
     pub fn times(&self, start: f64, duration: f64, rng: &mut CaseRng) -> [Vec<f64>; 2] {
         let period = 1.0 / self.rate;

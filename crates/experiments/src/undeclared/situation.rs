@@ -73,13 +73,16 @@ pub enum Situation {
     /// 20 ms, and turns in a straight line over a speed of its own for each joint.
     SoftConstraint,
     /// A velocity column that the logger makes of the positions it reads: their difference to the row before,
-    /// low-passed at 20 to 80 Hz in half of the cases.
+    /// low-passed at 20 to 80 Hz in half of the cases, of coarse encoders in half of them.
     DifferencedVelocity,
+    /// Joints stick where they reverse: for a tenth of a second or more they creep by less than their coarse
+    /// encoders show, while the dry friction goes from one end to the other.
+    Sticking,
 }
 
 impl Situation {
     /// All situations.
-    pub const ALL: [Situation; 30] = [
+    pub const ALL: [Situation; 31] = [
         Situation::White,
         Situation::ShortColour,
         Situation::Colour,
@@ -110,11 +113,12 @@ impl Situation {
         Situation::SoftBristles,
         Situation::SoftConstraint,
         Situation::DifferencedVelocity,
+        Situation::Sticking,
     ];
     /// Those of the first cases of each suite: so many there were when these were drawn first.
     pub const FIRST: usize = Situation::BLOCKS[0].1;
     /// Situations that came together: the index of their first case, and how many they are.
-    const BLOCKS: [(usize, usize); 9] = [
+    const BLOCKS: [(usize, usize); 10] = [
         (0, 15),
         (50_000, 7),
         (60_000, 1),
@@ -124,6 +128,7 @@ impl Situation {
         (95_000, 1),
         (97_000, 1),
         (98_000, 1),
+        (99_000, 1),
     ];
 
     /// The situation of the case of this index: those of its block in turn.

@@ -20,6 +20,9 @@ const LONGEST_MOVE: f64 = 12.0;
 /// quarters of the highest of a minimum-jerk move that takes as long; longer ramps would need more.
 const RAMPS: [f64; 2] = [0.1, 0.3];
 
+/// Step at which sticking motions are kept \[s\].
+const GRID: f64 = 1e-3;
+
 /// Position, velocity, acceleration of one joint.
 pub type JointState = [f64; 3];
 
@@ -232,6 +235,18 @@ impl Trajectory {
         Trajectory { start, duration, joints, excess: None }
     }
 
+    /// A motion whose joints are slower where they were slower than `share` of their RMS speed, and linger
+    /// about zero where they reverse; as wide as before, or less.
+    pub fn stick(&mut self, share: f64) {
+        let samples = (self.duration / GRID).ceil() as usize + 1;
+        let duration = self.duration;
+        for joint in &mut self.joints {
+            let states: Vec<JointState> =
+                (0..samples).map(|k| joint.state((k as f64 * GRID).min(duration), duration)).collect();
+            *joint = JointMotion::Simulated { step: GRID, states: sticking(&states, share) };
+        }
+    }
+
     /// The same motion `factor` times as slow: as much of it as there is time for.
     pub fn slow_down(&mut self, factor: f64) {
         let slowed = |motion: &JointMotion| JointMotion::Slowed { motion: Box::new(motion.clone()), factor };
@@ -298,6 +313,29 @@ impl JointMotion {
             JointMotion::Simulated { step, states } => hermite(states, time / step, *step),
         }
     }
+}
+
+/// The speeds v of a motion on the grid turned into v⁵/(v² + s²)², where s is a share of their RMS.
+fn sticking(states: &[JointState], share: f64) -> Vec<JointState> {
+    let square = states.iter().map(|[_, v, _]| v * v).sum::<f64>() / states.len().max(1) as f64;
+    let soft = (share * share * square).max(f64::MIN_POSITIVE);
+    let mut slower: Vec<JointState> = Vec::with_capacity(states.len());
+    for &[q, v, a] in states {
+        let sum = v * v + soft;
+        let kept = (v * v / sum).powi(2);
+        let speed = kept * v;
+        let position = slower.last().map_or(q, |[q, before, _]| q + 0.5 * GRID * (before + speed));
+        slower.push([position, speed, kept * a * (v * v + 5.0 * soft) / sum]);
+    }
+    let range = |states: &[JointState]| {
+        let ends = |[low, high]: [f64; 2], [q, ..]: &JointState| [low.min(*q), high.max(*q)];
+        states.iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends)
+    };
+    let ([low, high], [own_low, own_high]) = (range(states), range(&slower));
+    let factor = ((high - low) / (own_high - own_low).max(f64::MIN_POSITIVE)).min(1.0);
+    let (middle, own_middle) = (0.5 * (low + high), 0.5 * (own_low + own_high));
+    let placed = |[q, v, a]: JointState| [middle + factor * (q - own_middle), factor * v, factor * a];
+    slower.into_iter().map(placed).collect()
 }
 
 /// Where a joint may go, and how fast.

@@ -35,6 +35,8 @@ const FASTER: [f64; 2] = [3.0, 5.0];
 
 /// Shortest and longest of short logs \[s\].
 const SHORT: [f64; 2] = [4.0, 8.0];
+/// Speed below which joints begin to stick, over their RMS speed.
+const STICKING: [f64; 2] = [0.5, 2.0];
 /// Moves of each joint in a log, fewest and most, where joints move in turn.
 const MOVES_IN_TURN: [usize; 2] = [2, 4];
 
@@ -155,6 +157,12 @@ fn motions(
                 tamed(robot, Trajectory::with_rests(tree, rng, start, DURATION, reach, together), reach)
             };
             STARTS.into_iter().map(draw).collect()
+        }
+        Situation::Sticking => {
+            let mut motions = draw_motions(robot, reach, false, rng);
+            let share = rng.log_uniform(STICKING[0], STICKING[1]);
+            motions.iter_mut().for_each(|motion| motion.stick(share));
+            motions
         }
         Situation::Strokes => {
             let draw = |start| tamed(robot, Trajectory::strokes(tree, rng, start, DURATION, reach), reach);

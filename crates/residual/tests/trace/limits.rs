@@ -81,7 +81,7 @@ fn a_drive_whose_command_winds_up_is_at_its_limit() {
             let expected = ("actuator_saturation".to_owned(), vec!["elbow".to_owned()]);
             assert!(named(&tracing).contains(&expected), "{limit}: {:?}", named(&tracing));
             let found = limit_of(&tracing).unwrap();
-            assert!((found / limit - 1.0).abs() < 0.08, "{limit}: {found}");
+            assert!((found / limit - 1.0).abs() < 0.1, "{limit}: {found}");
             assert_eq!(tracing.verdict, Verdict::Explained);
             assert!(tracing.model.held_out.relative < 0.01, "{limit}: {}", tracing.model.held_out.relative);
         }

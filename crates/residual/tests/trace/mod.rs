@@ -7,5 +7,6 @@ mod leading_friction;
 mod limits;
 mod missing_effects;
 mod robot;
+mod sticking;
 mod structure;
 mod torque_factors;

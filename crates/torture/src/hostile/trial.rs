@@ -269,8 +269,8 @@ impl Trial {
 
 /// The most resident memory that a child process has had \[bytes\], 0 where that cannot be read.
 ///
-/// `spawn` returns when the child is about to leave the memory that it shares with us (`vfork`), and what is read
-/// before it has left is our own peak. Its program is ours for as long.
+/// `spawn` returns when the child is about to leave the memory that it shares with us (`vfork`), and what is
+/// read before it has left is our own peak. Its program is ours for as long.
 fn peak_of(process: u32) -> u64 {
     let program = |process: &str| std::fs::read_link(format!("/proc/{process}/exe"));
     // The program is read first: a child never comes back.
