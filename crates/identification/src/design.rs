@@ -4,6 +4,7 @@ use crate::effect::{Effect, EffectParameter, Evaluator};
 use crate::model::with_masses;
 use crate::pairs::PairsOfBlock;
 use crate::reference::ReferenceModel;
+use crate::rests::moves;
 use crate::sample::{BlockReference, Needs, Sample};
 use phiw_dynamics::check::check_size;
 use phiw_dynamics::inertia::PARAMETERS_PER_BODY;
@@ -39,16 +40,6 @@ impl RowLayout {
     pub fn measured_torque(&self, evaluation: &[f64]) -> f64 {
         evaluation[self.range.end - 1]
     }
-}
-
-/// Share of a filter's window in which a joint must move for the row to count. What a joint that sticks
-/// carries comes before its motion: with half of a window at rest, such joints had a delay for a name
-/// (`cargo xtask undeclared --suite wide_right --situation sticking`).
-const LEAST_MOVING: f64 = 0.9;
-
-/// Whether a joint moves, given the filtered share of samples in which it does.
-pub(crate) fn moves(share: f64) -> bool {
-    share >= LEAST_MOVING
 }
 
 /// A robot's rigid body plus effects, as columns.

@@ -2,7 +2,8 @@
 //! to be evaluated once.
 
 use crate::block_source::try_for_each_batch;
-use crate::design::{DesignScratch, moves};
+use crate::design::DesignScratch;
+use crate::rests::moves;
 use crate::{BlockSource, Design, IdentificationError};
 use phiw_dynamics::DimensionError;
 use phiw_telemetry::Block;

@@ -41,6 +41,7 @@ mod prediction_errors;
 mod rates;
 mod reference;
 pub mod reproduction;
+mod rests;
 mod rivals;
 mod robot_findings;
 mod sample;

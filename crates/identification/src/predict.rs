@@ -103,7 +103,7 @@ impl Prediction<'_> {
 
     /// Whether the torque `row` counts in the fit: its joint moves (see [`Design::with_rest_speeds`]).
     pub fn counts(&self, row: usize) -> bool {
-        crate::design::moves(self.moves[row])
+        crate::rests::moves(self.moves[row])
     }
 }
 

@@ -8,9 +8,8 @@ use crate::alignment::Alignment;
 pub struct CheckSettings {
     /// A lag over its standard error, from which on it is one, however little of the velocity's power it
     /// costs: a slow joint's velocity is as late as that of a quick one, and steps of a coarse encoder hide
-    /// it. The error is that of white noise; noise of a few samples' correlation makes it twice as large.
-    /// `cargo xtask undeclared --suite wide_right --situation differenced_velocity,late_velocity` holds it
-    /// against velocities that are late.
+    /// it. The error is that of white noise, and others are told worse. `cargo xtask undeclared --suite
+    /// wide_right --situation differenced_velocity` (and `late_velocity`) holds it against late velocities.
     pub lag_significance: f64,
     /// The shortest lag that is one \[s\]: simulators write velocities that are late by half of their step,
     /// which is no error of a torque; 1 ms is one of 2 % at 3 Hz.

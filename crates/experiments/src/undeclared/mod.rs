@@ -8,9 +8,10 @@
 //! with one that the catalogue does not have (`outside`). Noise, jitter, quantisation and the declared
 //! effects are drawn as well. The wide suites have robots as they come: frictions on all joints, of which
 //! mostly nothing is declared, and up to thirteen effects more (`wide_effects`), right models
-//! (`wide_right`), effects that no catalogue has beside others (`wide_outside`), each in 23 situations,
-//! from white noise to joints that are mostly noise, filters in drives, late velocities, dead bands, logs
-//! of a few seconds, rough clocks, and held-out motion that is faster than all that was trained on.
+//! (`wide_right`), effects that no catalogue has beside others (`wide_outside`), each in all situations of
+//! `situation.rs`, from white noise to joints that are mostly noise, filters in drives, late velocities, dead
+//! bands, logs of a few seconds, rough clocks, and held-out motion that is faster than all that was trained
+//! on.
 //! `new_kinds` has the kinds that came to the catalogue last, so that the cases of the other suites stay
 //! what they were, and `large_gains` torques that are logged at a third to three times what they are. A case
 //! follows from its seed alone. Seeds for developing the tracer and seeds for reporting are disjoint.
