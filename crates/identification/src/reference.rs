@@ -52,6 +52,8 @@ impl ReferenceModel {
         }
         if needs.torque || needs.total_torque || needs.rates {
             self.torque(block, &mut out.torque)?;
+        }
+        if needs.total_torque || needs.rates {
             out.total_torque.clone_from(&out.torque);
             self.add_effects(block, &mut out.total_torque);
         }
