@@ -3,6 +3,7 @@
 mod arrays;
 mod content_hash;
 mod csv;
+mod decoded_once;
 mod error;
 mod guarded;
 #[cfg(feature = "hdf5")]
@@ -16,6 +17,7 @@ mod table;
 mod text_stream;
 
 pub use arrays::NumberArray;
+pub use decoded_once::DecodedOnce;
 pub use error::FormatError;
 pub use guarded::is_guarded;
 pub use open::{OpenOptions, looks_like, open};

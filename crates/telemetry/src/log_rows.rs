@@ -44,12 +44,12 @@ pub(crate) fn open_log_of(
     joints: &[String],
     torque: (TorqueColumns, Signal),
 ) -> Result<LogRows, LogError> {
-    let LogSource { path, map, part, columns: in_memory, disturbed, .. } = source;
+    let LogSource { path, map, part, columns: in_memory, disturbed, decoded, .. } = source;
     let map = map.as_deref();
     let options = OpenOptions { topic: map.and_then(|map| map.topic()).map(str::to_owned) };
     let mut table = match in_memory {
         Some(columns) => columns.table(),
-        None => phiw_log_formats::open(path, &options)?,
+        None => decoded.open(path, &options)?,
     };
     let mut columns = Columns::find(path, table.as_ref(), map, joints, torque)?;
     // A column is read once, whatever it is used for.

@@ -2,6 +2,7 @@
 
 use crate::NamedColumns;
 use crate::map::{LogFacts, LogMap, LogPart};
+use phiw_log_formats::DecodedOnce;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -21,6 +22,8 @@ pub struct LogSource {
     pub disturbed: Vec<[f64; 2]>,
     /// What the map calls it, where that is not the name it has now.
     pub name_in_map: Option<PathBuf>,
+    /// The numbers of a long file, once it has been read.
+    pub decoded: DecodedOnce,
 }
 
 impl LogSource {
@@ -38,13 +41,14 @@ impl LogSource {
             columns: None,
             disturbed: Vec::new(),
             name_in_map: None,
+            decoded: DecodedOnce::default(),
         }
     }
 
     /// The same log at another place, of which the map says what it says of this one.
     pub fn moved_to(self, path: &Path) -> Self {
         let name_in_map = Some(self.name_in_map.unwrap_or(self.path));
-        LogSource { path: path.to_owned(), name_in_map, ..self }
+        LogSource { path: path.to_owned(), name_in_map, decoded: DecodedOnce::default(), ..self }
     }
 
     /// What the map says of it; nothing without a map.

@@ -6,7 +6,7 @@ use super::design_effect::effective_rows;
 use super::fit::Fit;
 use super::problem::{Member, Problem};
 use super::screening::{screen, unidentifiable};
-use super::wald::{certainty, squares_of};
+use super::wald::{FoldScores, certainty_by, squares_of};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -380,11 +380,13 @@ impl<'a> Search<'a> {
     /// Leaves out what is not sure, the least sure first.
     fn doubt(&mut self) {
         loop {
+            let scores = FoldScores::new(self.problem, &self.model.fit);
+            let tail_of =
+                |member: &Member| certainty_by(&scores, self.problem, &self.model.fit, *member).tail;
             let tails = self.model.members.par_iter().enumerate();
             let tails = tails.filter(|(_, member)| !self.is_declared(member) && !self.is_required(member));
-            let worst = tails
-                .map(|(place, member)| (certainty(self.problem, &self.model.fit, *member).tail, place))
-                .max_by(|a, b| a.0.total_cmp(&b.0));
+            let worst =
+                tails.map(|(place, member)| (tail_of(member), place)).max_by(|a, b| a.0.total_cmp(&b.0));
             let Some((tail, place)) = worst else { return };
             if tail <= self.policy.keep_tail {
                 return;

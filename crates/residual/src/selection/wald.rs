@@ -2,7 +2,9 @@
 
 use super::distribution::fisher_tail;
 use super::fit::{Fit, dot, solve_block};
-use super::problem::{Member, Problem};
+use super::problem::{Member, Problem, Torque};
+use super::products::Products;
+use rayon::prelude::*;
 
 /// How sure a member of a model is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,6 +22,11 @@ pub(crate) struct Certainty {
 /// more folds than there are, it tests the scale of the fitted combination. The other takes the residual's
 /// variance with the effective rows that are in the weights, with Fisher's distribution of all columns.
 pub(crate) fn certainty(problem: &Problem, fit: &Fit, member: Member) -> Certainty {
+    certainty_by(&FoldScores::new(problem, fit), problem, fit, member)
+}
+
+/// [`certainty`], with the fit's scores.
+pub(super) fn certainty_by(scores: &FoldScores, problem: &Problem, fit: &Fit, member: Member) -> Certainty {
     let nothing = Certainty { significance: 0.0, tail: 1.0 };
     let (own, inverse, values) = block(problem, fit, member);
     if own.is_empty() {
@@ -33,7 +40,7 @@ pub(crate) fn certainty(problem: &Problem, fit: &Fit, member: Member) -> Certain
     let influence: Vec<f64> = (0..fit.active.len())
         .map(|place| inverse.iter().zip(&direction).map(|(column, weight)| weight * column[place]).sum())
         .collect();
-    let folds = fold_scores(problem, fit, &influence);
+    let folds = scores.along(fit, &influence);
     let clusters = folds.iter().filter(|score| **score != 0.0).count() as f64;
     if clusters < 3.0 {
         return Certainty { significance: squares.sqrt(), tail: model_tail };
@@ -82,24 +89,35 @@ fn weights_of_scale(own: &[usize], inverse: &[Vec<f64>], values: &[f64]) -> Vec<
     solved.iter().map(|value| if total > 0.0 { value / total } else { 0.0 }).collect()
 }
 
-/// For each fold the weighted scores of all active columns times `influence`.
-fn fold_scores(problem: &Problem, fit: &Fit, influence: &[f64]) -> Vec<f64> {
-    let count = problem.torques.first().map_or(0, |torque| torque.folds.len());
-    let mut scores = vec![0.0; count];
-    for (torque, rows) in problem.torques.iter().enumerate() {
-        let values = fit.columns(torque);
-        let active: Vec<(usize, f64)> = fit.own[torque]
-            .iter()
-            .map(|&(column, place)| (column, influence[place]))
-            .filter(|(_, influence)| *influence != 0.0)
-            .collect();
-        for (score, fold) in scores.iter_mut().zip(&rows.folds) {
-            let of_fold: f64 =
-                active.iter().map(|&(column, influence)| influence * fold.score(column, &values)).sum();
-            *score += fit.weights[torque] * of_fold;
-        }
+/// What each fold says of each active column of each torque: Φᵀ(f − Φw). The same for all members of a fit.
+pub(super) struct FoldScores {
+    /// For each torque and fold, in the order of [`Fit::own`].
+    of_torques: Vec<Vec<Vec<f64>>>,
+}
+
+impl FoldScores {
+    pub fn new(problem: &Problem, fit: &Fit) -> Self {
+        let of_torque = |(torque, rows): (usize, &Torque)| {
+            let values = fit.columns(torque);
+            let score = |fold: &Products| {
+                fit.own[torque].iter().map(|&(column, _)| fold.score(column, &values)).collect()
+            };
+            rows.folds.iter().map(score).collect()
+        };
+        FoldScores { of_torques: problem.torques.par_iter().enumerate().map(of_torque).collect() }
     }
-    scores
+
+    /// For each fold the weighted scores of all active columns times `influence`.
+    fn along(&self, fit: &Fit, influence: &[f64]) -> Vec<f64> {
+        let mut sums = vec![0.0; self.of_torques.first().map_or(0, Vec::len)];
+        for ((folds, own), weight) in self.of_torques.iter().zip(&fit.own).zip(&fit.weights) {
+            for (sum, scores) in sums.iter_mut().zip(folds) {
+                let along = own.iter().zip(scores).map(|(&(_, place), score)| influence[place] * score);
+                *sum += weight * along.sum::<f64>();
+            }
+        }
+        sums
+    }
 }
 
 /// Effective rows less the parameters.
