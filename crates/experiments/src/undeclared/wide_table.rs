@@ -172,9 +172,12 @@ pub fn reliability(cases: &[Scored], text: &mut String) {
         .filter_map(|case| case.score.as_ref().ok())
         .flat_map(|score| score.judged.iter().copied())
         .collect();
-    text.push_str(
-        "## What confidence is worth\n\n| confidence | names | mean confidence | true |\n|---|--:|--:|--:|\n",
-    );
+    text.push_str("## What confidence is worth\n\n");
+    if judged.is_empty() {
+        text.push_str("no names\n\n");
+        return;
+    }
+    text.push_str("| confidence | names | mean confidence | true |\n|---|--:|--:|--:|\n");
     for bounds in BINS.windows(2) {
         let last = bounds[1] == 1.0;
         let inside = |confidence: f64| {
@@ -182,7 +185,10 @@ pub fn reliability(cases: &[Scored], text: &mut String) {
         };
         let bin: Vec<(f64, bool)> =
             judged.iter().copied().filter(|(confidence, _)| inside(*confidence)).collect();
-        let mean = bin.iter().map(|(confidence, _)| confidence).sum::<f64>() / bin.len().max(1) as f64;
+        if bin.is_empty() {
+            continue;
+        }
+        let mean = bin.iter().map(|(confidence, _)| confidence).sum::<f64>() / bin.len() as f64;
         let right = bin.iter().filter(|(_, right)| *right).count();
         let _ = writeln!(
             text,

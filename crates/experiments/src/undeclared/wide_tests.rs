@@ -6,12 +6,15 @@ use super::logging::{DriveFilter, Logging, Tails, VelocityColumn};
 use super::plant::{Record, States, record};
 use super::rng::{CaseRng, Stream};
 use super::robot::{Robot, robots};
+use super::run::Scored;
+use super::score::Score;
 use super::secret::Secret;
 use super::situation::Situation;
 use super::suite::{Seeds, Spec, Suite};
 use super::trajectory::Trajectory;
 use super::truth::Truth;
 use super::wide::speed;
+use super::wide_table::reliability;
 
 pub(super) fn models() -> Vec<Robot> {
     robots().expect("the models read")
@@ -326,6 +329,39 @@ fn the_same_wide_seed_gives_the_same_bytes() {
         let [first, second] = [0; 2].map(|_| draw(Suite::WideRight, index, &robots[..3]).logs());
         assert_eq!(first, second);
     }
+}
+
+/// A confidence that no name has was printed as true in 0 % of no names, with a mean of -0.
+#[test]
+fn confidence_is_told_of_names_only() {
+    let robots = models();
+    let truth = Truth::of(&small(Situation::White, 0, &robots));
+    let scored = |judged: Vec<(f64, bool)>| {
+        let score = Score {
+            outcomes: Vec::new(),
+            false_names: Vec::new(),
+            named: Vec::new(),
+            verdict: "sufficient".to_owned(),
+            closed: None,
+            closed_pooled: None,
+            judged,
+            left: None,
+            floor: None,
+        };
+        Scored { truth: truth.clone(), score: Ok(score), seconds: 1.0 }
+    };
+    let text = |judged| {
+        let mut text = String::new();
+        reliability(&[scored(judged)], &mut text);
+        text
+    };
+    assert!(text(Vec::new()).ends_with("no names\n\n"));
+    let table = text(vec![(0.6, true), (0.96, true), (0.97, false)]);
+    assert!(
+        table.contains("| 0.5 to 0.7 | 1 | 0.600 | 100.0 % |\n| 0.95 to 0.99 | 2 | 0.965 | 50.0 % |\n"),
+        "{table}"
+    );
+    assert!(!table.contains("0.7 to 0.8"), "{table}");
 }
 
 /// The old suites are a yardstick of years: their logs are what they were before there were wide ones.
