@@ -6,7 +6,8 @@ use crate::table::{Column, Step, Table};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, LazyLock, OnceLock};
 
 /// Bytes of a number, and of a row's place.
 const WORD: usize = size_of::<u64>();
@@ -21,25 +22,56 @@ const CHUNK_BYTES: usize = 1 << 18;
 #[derive(Clone, Debug)]
 pub struct DecodedOnce {
     least_bytes: u64,
-    most_bytes: u64,
+    room: Arc<Room>,
     numbers: Arc<OnceLock<Numbers>>,
+}
+
+/// Bytes that temporary files may still take.
+#[derive(Debug)]
+struct Room(AtomicU64);
+
+/// The room that one file has taken, given back when it goes.
+#[derive(Debug)]
+struct Taken {
+    room: Arc<Room>,
+    bytes: u64,
+}
+
+impl Taken {
+    /// Takes as much more; `false` where there is no room for it.
+    fn grow(&mut self, bytes: u64) -> bool {
+        let left = |free: u64| free.checked_sub(bytes);
+        let is_taken = self.room.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, left).is_ok();
+        self.bytes += if is_taken { bytes } else { 0 };
+        is_taken
+    }
+}
+
+impl Drop for Taken {
+    fn drop(&mut self) {
+        self.room.0.fetch_add(self.bytes, Ordering::Relaxed);
+    }
 }
 
 impl Default for DecodedOnce {
     fn default() -> Self {
-        DecodedOnce::within(Self::LEAST_BYTES, Self::MOST_BYTES)
+        static ROOM: LazyLock<Arc<Room>> =
+            LazyLock::new(|| Arc::new(Room(AtomicU64::new(DecodedOnce::MOST_BYTES))));
+        DecodedOnce { room: Arc::clone(&ROOM), ..DecodedOnce::within(Self::LEAST_BYTES, 0) }
     }
 }
 
 impl DecodedOnce {
     /// Shorter logs are decoded again: it takes no time.
     pub const LEAST_BYTES: u64 = 16 << 20;
-    /// Longer temporary files are given up.
+    /// The temporary files of all logs together take no more: what there is no room for is decoded again.
     pub const MOST_BYTES: u64 = 2 << 30;
 
-    /// Of logs of at least `least_bytes`, in temporary files of at most `most_bytes`.
+    /// Of a log of at least `least_bytes`, in a temporary file of at most `most_bytes`, whatever other logs
+    /// take.
     pub fn within(least_bytes: u64, most_bytes: u64) -> Self {
-        DecodedOnce { least_bytes, most_bytes, numbers: Arc::default() }
+        let room = Arc::new(Room(AtomicU64::new(most_bytes)));
+        DecodedOnce { least_bytes, room, numbers: Arc::default() }
     }
 
     /// Whether the numbers are at hand.
@@ -76,6 +108,7 @@ struct Asked {
 struct Numbers {
     asked: Asked,
     file: File,
+    _taken: Taken,
     rows: u64,
     /// The place of a last row that is cut short.
     truncated: Option<u64>,
@@ -103,6 +136,7 @@ enum Rows {
 
 struct WrittenDown {
     file: BufWriter<File>,
+    taken: Taken,
     rows: u64,
     truncated: Option<u64>,
 }
@@ -132,8 +166,10 @@ impl DecodedOnceTable {
                 false => Rows::Decoded,
             };
         }
-        let writer =
-            |file| Rows::WrittenDown(WrittenDown { file: BufWriter::new(file), rows: 0, truncated: None });
+        let taken = Taken { room: Arc::clone(&self.of.room), bytes: 0 };
+        let writer = |file| {
+            Rows::WrittenDown(WrittenDown { file: BufWriter::new(file), taken, rows: 0, truncated: None })
+        };
         tempfile::tempfile().map_or(Rows::Decoded, writer)
     }
 
@@ -145,7 +181,7 @@ impl DecodedOnceTable {
 impl WrittenDown {
     fn put(&mut self, place: u64, values: &[f64]) -> io::Result<()> {
         self.file.write_all(&place.to_le_bytes())?;
-        values.iter().try_for_each(|value| self.file.write_all(&value.to_bits().to_le_bytes()))?;
+        values.iter().try_for_each(|value| self.file.write_all(&value.to_le_bytes()))?;
         self.rows += 1;
         Ok(())
     }
@@ -191,7 +227,10 @@ impl Table for DecodedOnceTable {
         }
         let row_bytes = self.row_bytes();
         if let Rows::Again(again) = &mut self.rows {
-            let unreadable = |source| FormatError::reading(&self.asked.path, source);
+            let unreadable = |source: io::Error| {
+                let told = format!("its numbers, in a temporary file: {source}");
+                FormatError::reading(&self.asked.path, io::Error::new(source.kind(), told))
+            };
             return again.next(row_bytes, values).map_err(unreadable);
         }
         let step = self.table.next(values)?;
@@ -200,8 +239,7 @@ impl Table for DecodedOnceTable {
         };
         match step {
             Step::Row { place } => {
-                let has_room = (written.rows + 1) * row_bytes as u64 <= self.of.most_bytes;
-                if has_room && written.put(place, values).is_ok() {
+                if written.taken.grow(row_bytes as u64) && written.put(place, values).is_ok() {
                     self.rows = Rows::WrittenDown(written);
                 }
             }
@@ -210,13 +248,18 @@ impl Table for DecodedOnceTable {
                 self.rows = Rows::WrittenDown(written);
             }
             Step::End => {
-                let WrittenDown { file, rows, truncated } = written;
+                let WrittenDown { file, taken, rows, truncated } = written;
                 if let Ok(file) = file.into_inner() {
-                    let (content_hash, notes) = (self.table.content_hash(), self.table.notes());
-                    let asked = self.asked.clone();
                     // Where two readings come to the end, what the first has left stays.
-                    let _ =
-                        self.of.numbers.set(Numbers { asked, file, rows, truncated, content_hash, notes });
+                    let _ = self.of.numbers.set(Numbers {
+                        asked: self.asked.clone(),
+                        file,
+                        _taken: taken,
+                        rows,
+                        truncated,
+                        content_hash: self.table.content_hash(),
+                        notes: self.table.notes(),
+                    });
                 }
             }
         }
@@ -224,12 +267,14 @@ impl Table for DecodedOnceTable {
     }
 
     fn progress(&self) -> (u64, u64) {
-        match &self.rows {
-            Rows::Again(again) => {
-                let total = again.numbers.get().map_or(0, |numbers| numbers.rows);
-                (again.rows, total)
+        let (done, total) = self.table.progress();
+        match (&self.rows, self.of.numbers.get()) {
+            // In what the log itself counts.
+            (Rows::Again(again), Some(numbers)) => {
+                let share = again.rows as f64 / numbers.rows.max(1) as f64;
+                ((share * total as f64) as u64, total)
             }
-            _ => self.table.progress(),
+            _ => (done, total),
         }
     }
 
@@ -343,12 +388,39 @@ mod tests {
         table.next(&mut [0.0; 2]).unwrap();
         drop(table);
         assert!(!once.is_decoded());
-        let little = DecodedOnce::within(0, 99 * 24);
+        // A hundred rows of a place and two numbers take 2400 bytes.
+        let little = DecodedOnce::within(0, 2399);
         let expected = reading(&once, file.path(), &[0, 1]);
         for _ in 0..2 {
             assert_eq!(reading(&little, file.path(), &[0, 1]), expected);
             assert!(!little.is_decoded());
         }
+    }
+
+    /// Twenty logs of a session would have filled a disk, or the memory that stands for one.
+    #[test]
+    fn logs_share_the_room_and_give_it_back() {
+        let file = log(&vec![vec![Some(1.5), None]; 100], 2, false);
+        let first = DecodedOnce::within(0, 3000);
+        let second = DecodedOnce { room: Arc::clone(&first.room), ..DecodedOnce::within(0, 0) };
+        let expected = reading(&first, file.path(), &[0, 1]);
+        assert!(first.is_decoded());
+        assert_eq!(reading(&second, file.path(), &[0, 1]), expected);
+        assert!(!second.is_decoded());
+        drop(first);
+        assert_eq!(reading(&second, file.path(), &[0, 1]), expected);
+        assert!(second.is_decoded());
+    }
+
+    #[test]
+    fn progress_counts_what_the_log_counts() {
+        let file = log(&vec![vec![Some(1.5), Some(2.5)]; 100], 2, false);
+        let bytes = file.path().metadata().unwrap().len();
+        let once = DecodedOnce::within(0, u64::MAX);
+        reading(&once, file.path(), &[0, 1]);
+        let mut table = once.open(file.path(), &OpenOptions::default()).unwrap();
+        (0..50).for_each(|_| assert_ne!(table.next(&mut [0.0; 2]).unwrap(), Step::End));
+        assert_eq!(table.progress(), (bytes / 2, bytes));
     }
 
     /// The file is not asked again: what stands in its place would be another log.

@@ -275,6 +275,56 @@ fn the_model_says_what_is_measured() {
     }
 }
 
+/// What an engine's steps leave on the base that the true model does not explain: the table of Rapier's
+/// iterations in docs/results/curriculum.md. `cargo test --release -p phiw-simulated-robot --test integration
+/// -- --ignored --nocapture smaller_steps` prints it.
+#[test]
+#[ignore = "three minutes"]
+fn smaller_steps_leave_less_on_the_base() {
+    let humanoid = Humanoid::new();
+    let motion = humanoid.motion(1.5, 0.5);
+    let robot = Robot::with_base(
+        humanoid.chain.clone(),
+        humanoid.base(),
+        [0.0; 10],
+        Vec::new(),
+        Catalogue::default(),
+    )
+    .unwrap();
+    let truth = robot.truth(&[]).unwrap();
+    let design = robot.design_of(&truth).unwrap();
+    let parameters = truth.parameters(&robot).unwrap();
+    let unexplained = |name: &str, build: Box<BuildBackend>| {
+        let mut experiment = humanoid.experiment(build);
+        experiment.plant.actuator_noise = 0.02;
+        let log =
+            experiment.perform(&robot, &truth, &motion, &mut ChaCha8Rng::seed_from_u64(1)).unwrap().measured;
+        let mut evidence = Evidence::none(&design, RowsAt::Periods).unwrap();
+        evidence.add(&design, &log).unwrap();
+        let [force, moment] = [0..3, 3..6].map(|rows| {
+            let weights: Vec<f64> =
+                (0..log.joints).map(|row| f64::from(u8::from(rows.contains(&row)))).collect();
+            let factor = evidence.factor().combine(&weights).unwrap();
+            (factor.residual_sum_of_squares(&parameters).unwrap() / factor.rows() as f64).sqrt()
+        });
+        println!("{name}: {force:.3} N, {moment:.3} N·m, still {:.1} %", 100.0 * log.still_share());
+        force
+    };
+    let mut before = f64::INFINITY;
+    for iterations in [1, 4, 16, 64] {
+        let build = move |tree: &Tree, world: &World| -> Result<Box<dyn SimulationBackend>, BackendError> {
+            let backend = phiw_sim_rapier::RapierBackend::new(tree, world)?;
+            Ok(Box::new(backend.with_solver_iterations(iterations)?))
+        };
+        let left = unexplained(&format!("rapier, {iterations} iterations"), Box::new(build));
+        assert!(left < 0.7 * before, "{iterations}: {left} after {before}");
+        before = left;
+    }
+    if phiw_sim_mujoco::find_library().is_ok() {
+        assert!(unexplained("mujoco", Box::new(mujoco)) < before);
+    }
+}
+
 /// Engines' steps are semi-implicit: Δq/T followed the noise of a period by three quarters of what it did to
 /// the velocity and not by half. The likelihood took the difference for friction: −1.6 N·m·s/rad in a waist
 /// that has 1.3.

@@ -33,6 +33,7 @@ mod reader;
 mod recording;
 mod repeated;
 mod samples;
+mod session;
 mod signal_shape;
 mod spectrum;
 mod spike;
@@ -59,8 +60,9 @@ pub use phiw_log_formats::{FormatError, is_guarded, looks_like};
 pub use plan::LogPlan;
 pub use recording::Recording;
 pub use samples::{Sample, samples};
+pub use session::{Session, arrange_session};
 pub use stream::{StreamSummary, stream};
-pub use survey::{Session, Survey, arrange_session, survey};
+pub use survey::{Survey, survey};
 pub use writer::{LogColumns, LogWriter};
 pub use zero_rows::ZeroRows;
 

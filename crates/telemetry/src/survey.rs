@@ -16,6 +16,7 @@ use crate::reader::Rows;
 use crate::repeated::RepetitionFinder;
 use crate::segments::{GapCount, Segment};
 use crate::segments::{RowCounts, SegmentSink, SpikeCount, split};
+use crate::session::Session;
 use crate::spectrum::Spectrum;
 use crate::spectrum::SpectrumEstimator;
 use crate::spike::{SpikeFinder, WithoutSpikes};
@@ -40,7 +41,7 @@ pub struct Survey {
     pub rows_are: RowsAre,
     /// How the rows came about, where the log does not say it plainly.
     pub notes: Vec<String>,
-    /// Place in the session, see [`arrange_session`].
+    /// Place in the session, see [`arrange_session`](crate::arrange_session).
     pub session: Session,
     /// What was asked for when it was surveyed.
     pub torque: TorqueColumns,
@@ -113,16 +114,6 @@ fn known_rows<'de, D: Deserializer<'de>>(deserializer: D) -> Result<&'static str
     known.ok_or_else(|| D::Error::custom(format!("rows are `{written}`; known are {}", ROWS_ARE.join(", "))))
 }
 
-/// Where a log lies in its session.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Session {
-    /// Which log it is, counted from 0.
-    pub log: usize,
-    /// What to add to the log's stamps to get the session's time, in seconds.
-    #[serde(with = "crate::any_number")]
-    pub offset: f64,
-}
-
 impl Survey {
     /// Rows from which on a stretch is listed in [`segments`](Survey::segments); no filter can use a shorter
     /// one.
@@ -158,26 +149,6 @@ impl Survey {
     /// Time covered by the segments, in seconds.
     pub fn duration(&self) -> f64 {
         self.segments.iter().map(|segment| segment.t_end - segment.t_start).sum()
-    }
-}
-
-/// Numbers the logs of a session and puts them on one time axis.
-///
-/// Stamps that overlap nowhere are taken to count from one origin and are kept. Where any two logs overlap,
-/// each log is put behind the one before it in the order given.
-pub fn arrange_session(surveys: &mut [Survey]) {
-    let mut ranges: Vec<_> = surveys.iter().map(Survey::time_range).collect();
-    ranges.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let overlap = ranges.windows(2).any(|pair| pair[1].0 <= pair[0].1);
-    let mut end = None;
-    for (log, survey) in surveys.iter_mut().enumerate() {
-        let (first, last) = survey.time_range();
-        let offset = match end {
-            Some(end) if overlap => end + survey.period - first,
-            _ => 0.0,
-        };
-        survey.session = Session { log, offset };
-        end = Some(last + offset);
     }
 }
 

@@ -252,9 +252,12 @@ pub fn csv(cases: &[Scored]) -> String {
     text
 }
 
-/// A share in per cent.
+/// A share in per cent; of nothing there is none.
 pub fn percent(part: usize, whole: usize) -> String {
-    format!("{:.1} %", 100.0 * part as f64 / whole.max(1) as f64)
+    if whole == 0 {
+        return "–".to_owned();
+    }
+    format!("{:.1} %", 100.0 * part as f64 / whole as f64)
 }
 
 fn median(values: Vec<f64>) -> String {

@@ -63,7 +63,10 @@ fn situations<'a>(cases: &[&'a Scored]) -> Vec<(String, Vec<&'a Scored>)> {
 }
 
 fn right(cases: &[&Scored], text: &mut String) {
-    text.push_str("| right models | n | with a false name | | sufficient | | explained | partly | unexplained | tracer failed | floor over noise, median of lowest and of highest joint |\n");
+    text.push_str(
+        "| right models | n | with a false name | | sufficient | | explained | partly | unexplained | \
+         tracer failed | floor over noise, median of lowest and of highest joint |\n",
+    );
     text.push_str("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
     for (name, cases) in situations(cases) {
         let n = cases.len();
@@ -90,7 +93,10 @@ fn right(cases: &[&Scored], text: &mut String) {
 }
 
 fn by_verdict(cases: &[&Scored], text: &mut String) {
-    text.push_str("| outside the catalogue | n | unexplained | partly | sufficient | explained | said to be explained with more than noise left | left over noise, median | tracer failed |\n");
+    text.push_str(
+        "| outside the catalogue | n | unexplained | partly | sufficient | explained | \
+         said to be explained with more than noise left | left over noise, median | tracer failed |\n",
+    );
     text.push_str("|---|--:|--:|--:|--:|--:|--:|--:|--:|\n");
     for (name, cases) in situations(cases) {
         let count = |test: &dyn Fn(&Score) -> bool| scores(&cases).filter(|score| test(score)).count();
@@ -131,8 +137,8 @@ pub fn material_outcomes(cases: &[&Scored]) -> BTreeMap<Option<Outcome>, usize> 
 fn effects(title: &str, key: &dyn Fn(&Scored) -> String, cases: &[&Scored], text: &mut String) {
     let _ = writeln!(
         text,
-        "| {title} | n | material effects | right | | rival | refined | wrong joints | wrong kind | missed | tracer failed | cases with a false name | | \
-         held-out error over noise, median | seconds, median |"
+        "| {title} | n | material effects | right | | rival | refined | wrong joints | wrong kind | \
+         missed | tracer failed | cases with a false name | | held-out error over noise, median | seconds, median |"
     );
     text.push_str("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
     for (name, cases) in grouped(key, cases) {
