@@ -1,9 +1,9 @@
 //! The dynamics algorithms on a random robot of 18 joints, one sample and four lanes at a time.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use phiw_dynamics::Workspace;
 use phiw_dynamics::random_tree::{RandomNumbers, RandomTreeOptions, random_state, random_tree};
 use phiw_dynamics::scalar::{Lanes, Scalar};
+use phiw_dynamics::{DerivativesWorkspace, ForceDerivatives, Workspace};
 use std::hint::black_box;
 
 fn algorithms<T: Scalar>(criterion: &mut Criterion, scalar: &str, convert: fn(f64) -> T) {
@@ -17,6 +17,12 @@ fn algorithms<T: Scalar>(criterion: &mut Criterion, scalar: &str, convert: fn(f6
     let mut group = criterion.benchmark_group(scalar);
     group.bench_function("inverse_dynamics", |bencher| {
         bencher.iter(|| tree.inverse_dynamics(black_box(&q), &v, &a, &mut workspace, &mut vector));
+    });
+    let (mut scratch, mut derivatives) = (DerivativesWorkspace::new(&tree), ForceDerivatives::new(&tree));
+    group.bench_function("inverse_dynamics_derivatives", |bencher| {
+        bencher.iter(|| {
+            tree.inverse_dynamics_derivatives(black_box(&q), &v, &a, &mut scratch, &mut derivatives)
+        });
     });
     group.bench_function("mass_matrix", |bencher| {
         bencher.iter(|| tree.mass_matrix(black_box(&q), &mut workspace, &mut matrix));

@@ -13,6 +13,12 @@ pub enum DimensionError {
         /// The length that it must have.
         expected: usize,
     },
+    /// Something that is known for a robot on a fixed base only.
+    #[error("{what} are those of a robot on a fixed base, but this base floats")]
+    FloatingBase {
+        /// What was asked for, in the plural.
+        what: &'static str,
+    },
     /// An index of something that the robot has not.
     #[error(transparent)]
     Index(#[from] IndexError),

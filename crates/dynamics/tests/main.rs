@@ -3,6 +3,7 @@
 mod analytic_backend;
 mod arbitrary;
 mod closed_forms;
+mod derivatives;
 mod dynamics;
 mod kinematics;
 mod robots;

@@ -4,8 +4,8 @@
 use crate::Effect;
 use crate::rates::{LocalRates, WindowsByWidth, interpolate};
 use crate::sample::{BlockReference, Needs, Sample};
-use phiw_dynamics::scalar::{Dual, Lanes, Scalar};
-use phiw_dynamics::{DimensionError, Tree, Workspace};
+use phiw_dynamics::scalar::Lanes;
+use phiw_dynamics::{DerivativesWorkspace, DimensionError, ForceDerivatives, Tree, Workspace};
 use phiw_telemetry::Block;
 use std::sync::Arc;
 
@@ -75,16 +75,12 @@ impl ReferenceModel {
         let (joints, samples) = (block.joints, block.t.len());
         torque.resize(samples * joints, 0.0);
         let mut workspace = Workspace::new(&self.tree);
-        let mut state = [const { Vec::new() }; 3];
+        let mut state = LanesOfMotion::default();
         let mut of_samples = vec![Lanes([0.0; SAMPLES]); joints];
         for first in (0..samples).step_by(SAMPLES) {
-            for (lanes, values) in state.iter_mut().zip([&block.q, &block.qd, &block.qdd]) {
-                lanes.clear();
-                // Lanes beyond the last sample repeat it.
-                let at = |joint: usize, lane: usize| values[(first + lane).min(samples - 1) * joints + joint];
-                lanes.extend((0..joints).map(|joint| Lanes(std::array::from_fn(|lane| at(joint, lane)))));
-            }
-            let [q, v, a] = &state;
+            // Lanes beyond the last sample repeat it.
+            state.set(block, |lane| (first + lane).min(samples - 1));
+            let LanesOfMotion { q, v, a } = &state;
             pulp::Arch::new().dispatch(
                 #[inline(always)]
                 || self.tree.inverse_dynamics(q, v, a, &mut workspace, &mut of_samples),
@@ -170,38 +166,35 @@ impl ReferenceModel {
         let period =
             if samples > 1 { (block.t[samples - 1] - block.t[0]) / (samples - 1) as f64 } else { 1.0 };
         let stride = ((DERIVATIVE_PERIOD / period) as usize).max(1);
-        let (mut workspace, mut of_numbers) = (Workspace::new(&self.tree), Workspace::new(&self.tree));
-        let mut state = DualState::new(joints);
-        let mut before = None;
-        let mut sample = 0;
-        loop {
-            state.set(block, sample);
-            let at = sample * size..(sample + 1) * size;
-            state.derivatives(
-                &self.tree,
-                &mut workspace,
-                Along::Position,
-                &mut out.by_position[at.clone()],
+        let at: Vec<usize> = (0..samples - 1).step_by(stride).chain([samples - 1]).collect();
+        let mut workspace = DerivativesWorkspace::new(&self.tree);
+        let mut found = ForceDerivatives::new(&self.tree);
+        let mut state = LanesOfMotion::default();
+        for several in at.chunks(SAMPLES) {
+            // Lanes beyond the last sample repeat it.
+            state.set(block, |lane| several[lane.min(several.len() - 1)]);
+            let LanesOfMotion { q, v, a } = &state;
+            pulp::Arch::new().dispatch(
+                #[inline(always)]
+                || self.tree.inverse_dynamics_derivatives(q, v, a, &mut workspace, &mut found),
             )?;
-            state.derivatives(
-                &self.tree,
-                &mut workspace,
-                Along::Velocity,
-                &mut out.by_velocity[at.clone()],
-            )?;
-            let q = &block.q[block.row(sample)];
-            self.tree.mass_matrix(q, &mut of_numbers, &mut out.by_acceleration[at])?;
-            if let Some(first) = before {
-                for values in [&mut out.by_position, &mut out.by_velocity, &mut out.by_acceleration] {
-                    interpolate(values, size, first, sample);
+            for (values, found) in [
+                (&mut out.by_position, &found.by_position),
+                (&mut out.by_velocity, &found.by_velocity),
+                (&mut out.by_acceleration, &found.by_acceleration),
+            ] {
+                for (lane, &sample) in several.iter().enumerate() {
+                    let row = &mut values[sample * size..(sample + 1) * size];
+                    row.iter_mut().zip(found).for_each(|(value, lanes)| *value = lanes.0[lane]);
                 }
             }
-            if sample == samples - 1 {
-                return Ok(());
-            }
-            before = Some(sample);
-            sample = (sample + stride).min(samples - 1);
         }
+        for pair in at.windows(2) {
+            for values in [&mut out.by_position, &mut out.by_velocity, &mut out.by_acceleration] {
+                interpolate(values, size, pair[0], pair[1]);
+            }
+        }
+        Ok(())
     }
 
     fn gravity(&self, block: &Block, out: &mut BlockReference) -> Result<(), DimensionError> {
@@ -232,73 +225,26 @@ const RATE_BAND: f64 = 2.5;
 /// Time between two evaluations of the derivatives \[s\].
 const DERIVATIVE_PERIOD: f64 = 0.02;
 
-/// Samples at which torques are computed at a time.
+/// Samples at which torques, and their derivatives, are computed at a time.
 const SAMPLES: usize = 8;
 
-/// What a torque is differentiated by.
-#[derive(Clone, Copy)]
-enum Along {
-    Position,
-    Velocity,
+/// The motion at several samples, side by side.
+#[derive(Default)]
+struct LanesOfMotion {
+    q: Vec<Lanes<SAMPLES>>,
+    v: Vec<Lanes<SAMPLES>>,
+    a: Vec<Lanes<SAMPLES>>,
 }
 
-/// Joints along which is differentiated at a time.
-const DIRECTIONS: usize = 8;
-
-type Derivatives = Dual<Lanes<DIRECTIONS>>;
-
-/// A state that carries derivatives.
-struct DualState {
-    q: Vec<Derivatives>,
-    v: Vec<Derivatives>,
-    a: Vec<Derivatives>,
-    torque: Vec<Derivatives>,
-}
-
-impl DualState {
-    fn new(joints: usize) -> Self {
-        let zero = vec![Derivatives::zero(); joints];
-        DualState { q: zero.clone(), v: zero.clone(), a: zero.clone(), torque: zero }
-    }
-
-    fn set(&mut self, block: &Block, sample: usize) {
-        let row = block.row(sample);
-        for (dual, values) in [(&mut self.q, &block.q), (&mut self.v, &block.qd), (&mut self.a, &block.qdd)] {
-            for (dual, value) in dual.iter_mut().zip(&values[row.clone()]) {
-                *dual = Derivatives::constant(*value);
-            }
-        }
-    }
-
-    /// ∂τ/∂(q or q̇), row-major, a row for each torque.
-    fn derivatives(
-        &mut self,
-        tree: &Tree,
-        workspace: &mut Workspace<Derivatives>,
-        along: Along,
-        out: &mut [f64],
-    ) -> Result<(), DimensionError> {
-        let joints = self.q.len();
-        for first in (0..joints).step_by(DIRECTIONS) {
-            let some = first..(first + DIRECTIONS).min(joints);
-            some.clone().for_each(|joint| self.variable(along, joint).derivative.0[joint - first] = 1.0);
-            pulp::Arch::new().dispatch(
-                #[inline(always)]
-                || tree.inverse_dynamics(&self.q, &self.v, &self.a, workspace, &mut self.torque),
-            )?;
-            some.clone().for_each(|joint| self.variable(along, joint).derivative = Lanes::zero());
-            for (row, torque) in self.torque.iter().enumerate() {
-                let along = &torque.derivative.0[..some.len()];
-                out[row * joints..][some.clone()].copy_from_slice(along);
-            }
-        }
-        Ok(())
-    }
-
-    fn variable(&mut self, along: Along, joint: usize) -> &mut Derivatives {
-        match along {
-            Along::Position => &mut self.q[joint],
-            Along::Velocity => &mut self.v[joint],
+impl LanesOfMotion {
+    /// Takes for each lane the sample that `of_lane` says.
+    fn set(&mut self, block: &Block, of_lane: impl Fn(usize) -> usize) {
+        let joints = block.joints;
+        for (lanes, values) in [(&mut self.q, &block.q), (&mut self.v, &block.qd), (&mut self.a, &block.qdd)]
+        {
+            let at = |joint: usize, lane: usize| values[of_lane(lane) * joints + joint];
+            lanes.clear();
+            lanes.extend((0..joints).map(|joint| Lanes(std::array::from_fn(|lane| at(joint, lane)))));
         }
     }
 }

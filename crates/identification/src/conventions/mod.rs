@@ -21,7 +21,7 @@ use phiw_dynamics::Tree;
 use phiw_regressor::{BaseParameters, BaseParametersOptions};
 use rayon::prelude::*;
 use reading::{Reading, alternatives};
-use rough_fit::{Left, left};
+use rough_fit::{Fitted, Left, fitted};
 use samples::Samples;
 
 /// A difference between a log and the URDF.
@@ -47,7 +47,11 @@ struct Log<'a> {
 
 impl Log<'_> {
     fn left_if(&self, reading: &Reading) -> Result<Left, IdentificationError> {
-        left(self.tree, &self.base, &self.samples, reading)
+        Ok(self.fitted_if(reading)?.left)
+    }
+
+    fn fitted_if(&self, reading: &Reading) -> Result<Fitted, IdentificationError> {
+        fitted(self.tree, &self.base, &self.samples, reading)
     }
 
     fn joints(&self) -> usize {
@@ -117,7 +121,7 @@ pub fn conventions(
             })
             .collect::<Result<_, IdentificationError>>()?;
         if !is_good {
-            tried.extend(scales::of_one(&log, &reading, &present)?);
+            tried.extend(scales::of_one(&log, &reading)?);
             tried.extend(scales::of_each(&log, &reading)?);
             tried.extend(mounting::mounted(&log, &reading)?);
         }

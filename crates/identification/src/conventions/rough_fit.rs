@@ -27,8 +27,6 @@ pub(super) const LEAST_LEFT: f64 = 1e-3;
 /// What is left of each torque, RMS over its own.
 pub(super) struct Left {
     pub relative: Vec<f64>,
-    /// For each torque the factor by which it would suit the others best; none where they do not tell.
-    pub scales: Vec<Option<f64>>,
     /// The base parameters of the fit.
     pub parameters: Vec<f64>,
 }
@@ -40,6 +38,15 @@ impl Left {
     }
 }
 
+/// A fit, and what it was made of.
+pub(super) struct Fitted {
+    pub left: Left,
+    /// For each torque the products of what is fitted to it.
+    own: Vec<Products>,
+    /// 1/squares of each torque.
+    weights: Vec<f64>,
+}
+
 /// Products of a torque's columns: base parameters, then those of its own that are free, then the torque.
 pub(super) struct Products {
     matrix: Mat<f64>,
@@ -49,12 +56,12 @@ pub(super) struct Products {
 /// Fits base parameters and every joint's own columns to the samples as they are read, and says what is left.
 ///
 /// A friction that would drive its joint is left out: friction takes power, whatever the signs in a log.
-pub(super) fn left(
+pub(super) fn fitted(
     tree: &Tree,
     base: &BaseParameters,
     samples: &Samples,
     reading: &Reading,
-) -> Result<Left, IdentificationError> {
+) -> Result<Fitted, IdentificationError> {
     let products = products(tree, base, samples, reading)?;
     let count = base.count();
     let torque: Vec<f64> = products.iter().map(|own| own.torque_squares().max(f64::MIN_POSITIVE)).collect();
@@ -78,11 +85,13 @@ pub(super) fn left(
             weights[joint] = 1.0 / squares.max(LEAST_LEFT * LEAST_LEFT * torque[joint]);
         }
     }
-    let all: Vec<&Products> = (0..products.len()).map(|joint| of(joint, &drives)).collect();
-    let relative = (0..all.len()).map(|joint| (all[joint].squares(&parameters) / torque[joint]).sqrt());
+    let relative =
+        (0..products.len()).map(|joint| (of(joint, &drives).squares(&parameters) / torque[joint]).sqrt());
+    let left = Left { relative: relative.collect(), parameters };
+    let own = frictionless.into_iter().zip(free).zip(drives);
+    let own = own.map(|((frictionless, free), drives)| if drives { frictionless } else { free });
     // A torque of another scale may have turned the weights against those that it disturbs.
-    let scales = (0..all.len()).map(|joint| scale(&all, &first_weights, count, joint));
-    Ok(Left { relative: relative.collect(), scales: scales.collect(), parameters })
+    Ok(Fitted { left, own: own.collect(), weights: first_weights })
 }
 
 /// Products beside each joint's own columns: offset, rotor inertia and friction are fitted.
@@ -143,6 +152,30 @@ fn products(
     }
     let product = |columns: &Mat<f64>| Products { matrix: columns.transpose() * columns, base: base.count() };
     Ok(columns.iter().map(product).collect())
+}
+
+impl Fitted {
+    /// The factor on a torque with which the others foretell it best: its square is fitted with the base
+    /// parameters, as one more unknown. None where they do not tell.
+    pub fn scale(&self, joint: usize) -> Option<f64> {
+        let Fitted { left, own: all, weights } = self;
+        let own = &all[joint];
+        let square = own.torque_squares();
+        if square <= 0.0 {
+            return None;
+        }
+        let count = left.parameters.len();
+        let matrix = Mat::from_fn(count, count, |row, column| {
+            let sum: f64 =
+                all.iter().zip(weights).map(|(other, weight)| weight * other.at(row, column)).sum();
+            sum - weights[joint] * own.share(row) * own.share(column) / square
+        });
+        let others = || all.iter().zip(weights).enumerate().filter(|(other, _)| *other != joint);
+        let parameters =
+            solved(&matrix, |row| others().map(|(_, (other, weight))| weight * other.share(row)).sum());
+        let along: f64 = parameters.iter().enumerate().map(|(row, value)| own.share(row) * value).sum();
+        Some(along / square).filter(|scale| scale.is_finite() && *scale != 0.0)
+    }
 }
 
 impl Products {
@@ -248,25 +281,6 @@ fn fit(all: &[&Products], weights: &[f64], count: usize) -> Vec<f64> {
     solved(&Mat::from_fn(count, count, sum), |row| {
         all.iter().zip(weights).map(|(own, weight)| weight * own.share(row)).sum()
     })
-}
-
-/// The factor on a torque with which the others foretell it best: its square is fitted with the base
-/// parameters, as one more unknown.
-fn scale(all: &[&Products], weights: &[f64], count: usize, joint: usize) -> Option<f64> {
-    let own = all[joint];
-    let square = own.torque_squares();
-    if square <= 0.0 {
-        return None;
-    }
-    let matrix = Mat::from_fn(count, count, |row, column| {
-        let sum: f64 = all.iter().zip(weights).map(|(other, weight)| weight * other.at(row, column)).sum();
-        sum - weights[joint] * own.share(row) * own.share(column) / square
-    });
-    let others = || all.iter().zip(weights).enumerate().filter(|(other, _)| *other != joint);
-    let parameters =
-        solved(&matrix, |row| others().map(|(_, (other, weight))| weight * other.share(row)).sum());
-    let along: f64 = parameters.iter().enumerate().map(|(row, value)| own.share(row) * value).sum();
-    Some(along / square).filter(|scale| scale.is_finite() && *scale != 0.0)
 }
 
 /// The solution of normal equations, columns scaled to norm one; zeros where it has none.

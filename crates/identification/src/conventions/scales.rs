@@ -16,13 +16,10 @@ const NEGLIGIBLE: f64 = 1e-3;
 const WEIGHT_OF_URDF: f64 = 0.03;
 
 /// Each torque in another unit while the others are as they are.
-pub(super) fn of_one(
-    log: &Log<'_>,
-    reading: &Reading,
-    present: &Left,
-) -> Result<Vec<Candidate>, IdentificationError> {
-    let scales = present.scales.iter().enumerate().filter_map(|(joint, scale)| {
-        let scale = (*scale)?.recip();
+pub(super) fn of_one(log: &Log<'_>, reading: &Reading) -> Result<Vec<Candidate>, IdentificationError> {
+    let present = log.fitted_if(reading)?;
+    let scales = (0..log.joints()).into_par_iter().filter_map(|joint| {
+        let scale = present.scale(joint)?.recip();
         (scale > 0.0 && scale.ln().abs() > log.settings.least_scale.ln()).then_some((joint, scale))
     });
     let scales: Vec<(usize, f64)> = scales.collect();
@@ -37,23 +34,21 @@ fn in_steps(
     joint: usize,
     first: f64,
 ) -> Result<Candidate, IdentificationError> {
-    let with = |scale: f64| {
-        let kind = ConventionKind::TorqueScale(scale);
-        let left = log.left_if(&reading.with(&kind, &[joint]))?;
-        Ok::<_, IdentificationError>(Candidate { kind, joints: vec![joint], left })
-    };
-    let mut best = with(first)?;
+    let kind = |scale: f64| ConventionKind::TorqueScale(scale);
+    let with = |scale: f64| log.fitted_if(&reading.with(&kind(scale), &[joint]));
+    let mut best = (first, with(first)?);
     let mut scale = first;
     for _ in 1..SCALE_STEPS {
-        let Some(factor) = best.left.scales[joint].filter(|factor| *factor > 0.0) else { break };
+        let Some(factor) = best.1.scale(joint).filter(|factor| *factor > 0.0) else { break };
         scale /= factor;
         let next = with(scale)?;
-        if next.left.total() >= best.left.total() {
+        if next.left.total() >= best.1.left.total() {
             break;
         }
-        best = next;
+        best = (scale, next);
     }
-    Ok(best)
+    let (scale, fitted) = best;
+    Ok(Candidate { kind: kind(scale), joints: vec![joint], left: fitted.left })
 }
 
 /// Every torque in a unit of its own: the base parameters w and the torques' factors r at which Φw − τ·r is

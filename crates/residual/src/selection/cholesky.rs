@@ -102,6 +102,72 @@ impl pulp::NullaryFnOnce for Substitution<'_> {
     }
 }
 
+/// Right-hand sides that are worked on together.
+pub(super) const TOGETHER: usize = 8;
+
+/// [`substitute`] for several right-hand sides: `sides` has those of one row beside each other, and becomes
+/// the solutions. Numbers of the triangle that are read serve all of them.
+pub(super) fn substitute_together(triangle: &[f64], determined: &[bool], sides: &mut [[f64; TOGETHER]]) {
+    pulp::Arch::new().dispatch(Together { triangle, determined, sides });
+}
+
+struct Together<'a> {
+    triangle: &'a [f64],
+    determined: &'a [bool],
+    sides: &'a mut [[f64; TOGETHER]],
+}
+
+impl pulp::NullaryFnOnce for Together<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Together { triangle, determined, sides } = self;
+        let size = determined.len();
+        let first = sides.iter().take(size).take_while(|side| **side == [0.0; TOGETHER]).count();
+        let mut row = first;
+        while row < size {
+            let count = TILE.min(size - row);
+            let (known, rest) = sides.split_at_mut(row);
+            // Rows beyond the last repeat it: a tile's sums fit into the registers.
+            let own: [&[f64]; TILE] = std::array::from_fn(|place| {
+                let row = (row + place).min(size - 1);
+                &triangle[row * size..row * size + row + 1]
+            });
+            let sums = products(&known[first..], own.map(|own| &own[first..row]));
+            for place in 0..count {
+                let (before, left) = rest.split_at_mut(place);
+                let (own, left) = (&own[place][row..], &mut left[0]);
+                if !determined[row + place] {
+                    *left = [0.0; TOGETHER];
+                    continue;
+                }
+                for lane in 0..TOGETHER {
+                    let within: f64 = before.iter().zip(own).map(|(before, own)| own * before[lane]).sum();
+                    left[lane] = (left[lane] - sums[place][lane] - within) / own[place];
+                }
+            }
+            row += count;
+        }
+    }
+}
+
+/// For each of a tile's rows its product with what is known of every right-hand side.
+#[inline(always)]
+fn products(known: &[[f64; TOGETHER]], rows: [&[f64]; TILE]) -> [[f64; TOGETHER]; TILE] {
+    let [a, b, c, d] = rows.map(|row| &row[..known.len()]);
+    let [mut of_a, mut of_b, mut of_c, mut of_d] = [[0.0; TOGETHER]; TILE];
+    for (at, known) in known.iter().enumerate() {
+        for lane in 0..TOGETHER {
+            of_a[lane] += a[at] * known[lane];
+            of_b[lane] += b[at] * known[lane];
+            of_c[lane] += c[at] * known[lane];
+            of_d[lane] += d[at] * known[lane];
+        }
+    }
+    [of_a, of_b, of_c, of_d]
+}
+
 /// Columns `first` to `first + TILE` of a panel of rows, all columns before them being done.
 #[inline(always)]
 fn tile(before: &[f64], panel: &mut [f64], size: usize, first: usize, determined: &[bool]) {
@@ -145,6 +211,41 @@ fn tile(before: &[f64], panel: &mut [f64], size: usize, first: usize, determined
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    /// A triangle with some columns that say nothing, and right-hand sides that begin with zeros.
+    #[test]
+    fn solutions_that_are_found_together_are_those_that_are_found_alone() {
+        for size in [1, 3, 4, 7, 8, 21] {
+            let number = |row: usize, column: usize| ((row * 37 + column * 11) as f64).sin();
+            let determined: Vec<bool> = (0..size).map(|row| row % 5 != 3).collect();
+            let mut triangle = vec![0.0; size * size];
+            for row in 0..size {
+                for column in (0..row).filter(|&column| determined[row] && determined[column]) {
+                    triangle[row * size + column] = number(row, column);
+                }
+                triangle[row * size + row] = if determined[row] { 2.0 + number(row, row) } else { 1.0 };
+            }
+            for zeros in [0, 1, 5].into_iter().filter(|&zeros| zeros < size) {
+                let side = |row: usize, lane: usize| {
+                    if row < zeros + lane { 0.0 } else { number(row, 100 + lane) }
+                };
+                let mut together: Vec<[f64; TOGETHER]> =
+                    (0..size).map(|row| std::array::from_fn(|lane| side(row, lane))).collect();
+                substitute_together(&triangle, &determined, &mut together);
+                for lane in 0..TOGETHER {
+                    let x: Vec<f64> = (0..size).map(|row| side(row, lane)).collect();
+                    let mut alone = vec![0.0; size];
+                    substitute(&triangle, &determined, &x, &mut alone);
+                    for (together, alone) in together.iter().zip(&alone) {
+                        assert!(
+                            (together[lane] - alone).abs() <= 1e-12 * (1.0 + alone.abs()),
+                            "{size} {zeros}"
+                        );
+                    }
+                }
+            }
+        }
+    }
 
     /// LLᵀ of the rows that count.
     fn product(l: &[f64], size: usize, determined: &[bool]) -> Vec<f64> {

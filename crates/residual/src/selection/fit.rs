@@ -1,6 +1,6 @@
 //! A weighted fit of some parameters, from products.
 
-use super::cholesky::{factor_rows, substitute};
+use super::cholesky::{TOGETHER, factor_rows, substitute, substitute_together};
 use super::problem::{Problem, Torque};
 
 /// A column of the model with less than this share of its squared norm left beside those before it is
@@ -302,6 +302,23 @@ impl Fit {
         let mut y = vec![0.0; self.active.len()];
         substitute(&self.triangle, &self.determined, x, &mut y);
         y
+    }
+
+    /// L⁻¹·x for several x.
+    pub fn forward_all(&self, all: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let together = |several: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            // Of two the numbers are not worth putting side by side.
+            if several.len() <= 2 {
+                return several.iter().map(|x| self.forward(x)).collect();
+            }
+            let mut sides = vec![[0.0; TOGETHER]; self.active.len()];
+            for (lane, x) in several.iter().enumerate() {
+                sides.iter_mut().zip(x).for_each(|(side, x)| side[lane] = *x);
+            }
+            substitute_together(&self.triangle, &self.determined, &mut sides);
+            (0..several.len()).map(|lane| sides.iter().map(|side| side[lane]).collect()).collect()
+        };
+        all.chunks(TOGETHER).flat_map(together).collect()
     }
 
     /// L⁻ᵀ·y.

@@ -25,28 +25,44 @@ pub(super) struct Beside {
 
 impl Beside {
     pub fn new(problem: &Problem, fit: &Fit, parameters: &[usize], torques: &[usize]) -> Self {
-        let count = parameters.len();
-        let mut products = vec![0.0; fit.active.len()];
-        let (mut parts, mut right, mut gram) = (Vec::new(), Vec::new(), vec![0.0; count * count]);
-        for (place, &parameter) in parameters.iter().enumerate() {
-            let (own, value) = fit.products(problem, parameter, torques, &mut products);
-            parts.push(fit.forward(&products));
+        Beside::each(problem, fit, &[parameters], torques).swap_remove(0)
+    }
+
+    /// Of several sets of columns, each by itself: as many as there are sets.
+    pub fn each(problem: &Problem, fit: &Fit, sets: &[&[usize]], torques: &[usize]) -> Vec<Self> {
+        let mut products = Vec::new();
+        let (mut squares, mut right) = (Vec::new(), Vec::new());
+        for &parameter in sets.iter().copied().flatten() {
+            let mut own_products = vec![0.0; fit.active.len()];
+            let (own, value) = fit.products(problem, parameter, torques, &mut own_products);
+            products.push(own_products);
+            squares.push(own);
             // What is there in the signals already is in the residual as less of it.
             right.push(value - own * problem.absent[parameter]);
-            gram[place * count + place] = own;
-            for (other_place, &other) in parameters.iter().enumerate().take(place) {
-                let mut sum = 0.0;
-                for &torque in torques {
-                    let rows = &problem.torques[torque];
-                    if let (Some(a), Some(b)) = (rows.column(parameter), rows.column(other)) {
-                        sum += fit.weights[torque] * rows.whole.column(a)[b];
-                    }
-                }
-                gram[place * count + other_place] = sum;
-                gram[other_place * count + place] = sum;
-            }
         }
-        Beside { parts, gram, right }
+        let mut parts = fit.forward_all(&products).into_iter();
+        let (mut squares, mut right) = (squares.into_iter(), right.into_iter());
+        let of_set = |parameters: &&[usize]| {
+            let count = parameters.len();
+            let mut gram = vec![0.0; count * count];
+            for (place, &parameter) in parameters.iter().enumerate() {
+                gram[place * count + place] = squares.next().unwrap_or_default();
+                for (other_place, &other) in parameters.iter().enumerate().take(place) {
+                    let mut sum = 0.0;
+                    for &torque in torques {
+                        let rows = &problem.torques[torque];
+                        if let (Some(a), Some(b)) = (rows.column(parameter), rows.column(other)) {
+                            sum += fit.weights[torque] * rows.whole.column(a)[b];
+                        }
+                    }
+                    gram[place * count + other_place] = sum;
+                    gram[other_place * count + place] = sum;
+                }
+            }
+            let parts = parts.by_ref().take(count).collect();
+            Beside { parts, gram, right: right.by_ref().take(count).collect() }
+        };
+        sets.iter().map(of_set).collect()
     }
 
     /// What is left of two columns beside the model.
@@ -128,9 +144,8 @@ pub(super) fn screen(problem: &Problem, fit: &Fit, rows: &[f64], open: &[usize])
         // Which variant is the best is asked before what is as good as none is taken off, and where what is
         // left of its torques would be negative to first order, by the squares: that many are good enough is
         // no reason to take any of them.
-        let of_variant = |variant: usize| -> Option<([f64; 2], Screened)> {
+        let of_variant = |(variant, beside): (usize, &Beside)| -> Option<([f64; 2], Screened)> {
             let member = Member { hypothesis, variant };
-            let beside = Beside::new(problem, fit, &own.variants[variant].parameters, &own.torques);
             let (squares, values) = beside.solve(fit);
             let bounds = own.variants[variant].bounds.iter();
             let within = values
@@ -143,7 +158,9 @@ pub(super) fn screen(problem: &Problem, fit: &Fit, rows: &[f64], open: &[usize])
             let gains = within && values.iter().any(Option::is_some) && gain > 0.0;
             gains.then_some(([whole - price, squares], Screened { member, gain }))
         };
-        let variants = (0..own.variants.len()).filter_map(of_variant);
+        let sets: Vec<&[usize]> = own.variants.iter().map(|variant| variant.parameters.as_slice()).collect();
+        let beside = Beside::each(problem, fit, &sets, &own.torques);
+        let variants = beside.iter().enumerate().filter_map(of_variant);
         let better = |a: &[f64; 2], b: &[f64; 2]| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]));
         variants.max_by(|a, b| better(&a.0, &b.0)).map(|(_, screened)| screened)
     };
