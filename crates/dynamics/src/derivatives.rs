@@ -21,12 +21,12 @@ pub struct ForceDerivatives<T> {
 /// sample.
 #[derive(Clone, Debug)]
 pub struct DerivativesWorkspace<T> {
-    bodies: Vec<OnTheWay<T>>,
+    bodies: Vec<BodyInWorld<T>>,
 }
 
 /// A body and its joint, all in the world's frame.
 #[derive(Clone, Copy, Debug)]
-struct OnTheWay<T> {
+struct BodyInWorld<T> {
     placement: Placement<T>,
     axis: Spatial<T>,
     velocity: Spatial<T>,
@@ -36,7 +36,8 @@ struct OnTheWay<T> {
     axis_rate: Spatial<T>,
     /// a × S + v × (v × S), the parent's acceleration and velocity.
     axis_second_rate: Spatial<T>,
-    /// Of the body and all that it carries: inertia, force, and how the force changes with the velocity.
+    /// Of the body and all that it carries: inertia I, force, and the columns of 2B, which say how the force
+    /// changes with the velocity.
     inertia: Inertia<T>,
     force: Spatial<T>,
     by_velocity: [Spatial<T>; 6],
@@ -54,7 +55,7 @@ impl<T: Scalar> DerivativesWorkspace<T> {
     /// Scratch for `tree`.
     pub fn new(tree: &Tree) -> Self {
         let zero = Spatial::zero();
-        let body = OnTheWay {
+        let body = BodyInWorld {
             placement: Placement::identity(),
             axis: zero,
             velocity: zero,
@@ -106,28 +107,32 @@ impl Tree {
         for index in (0..bodies.len()).rev() {
             let own = bodies[index];
             let row = self.bodies[index].velocity_index;
-            // What the joint's own motion does to the forces of all that it carries.
-            let carried = own.inertia.times(own.axis);
-            let with_rate = times(&own.by_velocity, own.axis_rate) + own.inertia.times(own.axis_second_rate);
-            let turned = with_rate + own.axis.cross_force(own.force);
             let two = T::constant(2.0);
-            let faster = times(&own.by_velocity, own.axis) + own.inertia.times(own.axis_rate).scale(two);
-            // And what the motion of a joint before it does to this joint's force.
-            let before = transposed_times(&own.by_velocity, own.axis);
-            by_position[row * size + row] += own.axis.dot(with_rate);
-            by_velocity[row * size + row] += own.axis.dot(faster);
-            by_acceleration[row * size + row] += own.axis.dot(carried);
+            // The force on all that the joint carries, as the joint accelerates (I S), goes faster
+            // (2B S + 2I v×S), and moves (2B v×S + I a×S + I v×v×S); the last for joints before it, whose
+            // axes stay where they are while this force turns.
+            let by_own_acceleration = own.inertia.times(own.axis);
+            let by_own_velocity =
+                times(&own.by_velocity, own.axis) + own.inertia.times(own.axis_rate).scale(two);
+            let by_own_position =
+                times(&own.by_velocity, own.axis_rate) + own.inertia.times(own.axis_second_rate);
+            let with_turn = by_own_position + own.axis.cross_force(own.force);
+            // This joint's force, by the velocity of all that it carries (2Bᵀ S).
+            let own_by_velocity = transposed_times(&own.by_velocity, own.axis);
+            by_position[row * size + row] += own.axis.dot(by_own_position);
+            by_velocity[row * size + row] += own.axis.dot(by_own_velocity);
+            by_acceleration[row * size + row] += own.axis.dot(by_own_acceleration);
             let mut ancestor = self.bodies[index].parent;
             while let Some(outer) = ancestor {
                 let other = &bodies[outer];
                 let column = self.bodies[outer].velocity_index;
                 by_position[row * size + column] +=
-                    before.dot(other.axis_rate) + carried.dot(other.axis_second_rate);
+                    own_by_velocity.dot(other.axis_rate) + by_own_acceleration.dot(other.axis_second_rate);
                 by_velocity[row * size + column] +=
-                    before.dot(other.axis) + carried.dot(other.axis_rate) * two;
-                by_position[column * size + row] += other.axis.dot(turned);
-                by_velocity[column * size + row] += other.axis.dot(faster);
-                let coupling = other.axis.dot(carried);
+                    own_by_velocity.dot(other.axis) + by_own_acceleration.dot(other.axis_rate) * two;
+                by_position[column * size + row] += other.axis.dot(with_turn);
+                by_velocity[column * size + row] += other.axis.dot(by_own_velocity);
+                let coupling = other.axis.dot(by_own_acceleration);
                 by_acceleration[row * size + column] += coupling;
                 by_acceleration[column * size + row] += coupling;
                 ancestor = self.bodies[outer].parent;
@@ -146,7 +151,7 @@ impl Tree {
 
     /// Motions and forces of the single bodies.
     #[inline(always)]
-    fn outward<T: Scalar>(&self, q: &[T], v: &[T], a: &[T], bodies: &mut [OnTheWay<T>]) {
+    fn outward<T: Scalar>(&self, q: &[T], v: &[T], a: &[T], bodies: &mut [BodyInWorld<T>]) {
         let [x, y, z] = self.gravity;
         let gravity = Spatial { linear: Vec3::constant([-x, -y, -z]), angular: Vec3::zero() };
         for (index, body) in self.bodies.iter().enumerate() {
@@ -165,7 +170,7 @@ impl Tree {
             let acceleration = acceleration + axis.scale(a[body.velocity_index]) + axis_rate.scale(speed);
             let inertia = Inertia::from_parameters(&body.inertial).moved(placement);
             let momentum = inertia.times(velocity);
-            bodies[index] = OnTheWay {
+            bodies[index] = BodyInWorld {
                 placement,
                 axis,
                 velocity,
@@ -180,7 +185,7 @@ impl Tree {
     }
 }
 
-/// The columns of u ↦ v ×* (I u) − I (v × u) + u ×* (I v).
+/// The columns of 2B: u ↦ v ×* (I u) − I (v × u) + u ×* (I v).
 #[inline(always)]
 fn by_velocity<T: Scalar>(
     inertia: Inertia<T>,

@@ -168,7 +168,8 @@ fn results_knowing(
     if arguments.model.is_none() {
         analysis = analysis.with_logs_compared()?;
         // Logs that are too short to say what differs say nothing of it.
-        let differs = analysis.odd_log.and_then(|odd| what_differs(arguments, odd).ok().flatten());
+        let differs =
+            analysis.odd_log.and_then(|odd| what_differs(arguments, odd, &tracing.effects).ok().flatten());
         analysis.warnings.extend(differs);
     }
     if let Some(odd) = &known.odd_log {

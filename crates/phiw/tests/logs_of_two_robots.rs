@@ -18,6 +18,16 @@ fn explained(training: usize, tool: f64) -> Results {
 
 /// The same logs, each changed by `change`, which is told its number.
 fn explained_after(training: usize, tool: f64, change: impl Fn(usize, &mut Recording)) -> Results {
+    explained_from(&["viscous_friction"], training, tool, change)
+}
+
+/// The same from what is `declared`.
+fn explained_from(
+    declared: &[&str],
+    training: usize,
+    tool: f64,
+    change: impl Fn(usize, &mut Recording),
+) -> Results {
     let folder = TempDir::new().unwrap();
     let path = |index: usize| folder.path().join(format!("log_{index}.csv"));
     fs::write(folder.path().join("robot.urdf"), synthetic::URDF).unwrap();
@@ -34,7 +44,7 @@ fn explained_after(training: usize, tool: f64, change: impl Fn(usize, &mut Recor
         fs::write(path(index), synthetic::csv(&log)).unwrap();
     }
     let logs = [(0..training).map(path).collect(), vec![path(training)]];
-    let arguments = synthetic::explain_arguments(folder.path(), logs, &["viscous_friction"]);
+    let arguments = synthetic::explain_arguments(folder.path(), logs, declared);
     results(&arguments, &Console::silent()).unwrap()
 }
 
@@ -61,6 +71,18 @@ fn logs_that_differ_are_said_and_leave_structure() {
     assert!(matches!(verdict, Verdict::Unexplained | Verdict::PartlyExplained), "{verdict:?}");
     let remaining = &found.report.remaining;
     assert!(remaining.structured, "{remaining:?}");
+}
+
+/// A log differed by the frictions of all joints, which all logs have: the model of the others had what was
+/// declared, and not what was found.
+#[test]
+fn what_all_logs_have_and_nobody_declared_is_no_difference() {
+    let found = explained_from(&[], 2, 2.0, |_, _| ());
+    let friction = found.report.effects.iter().find(|effect| effect.kind == "viscous_friction");
+    assert!(friction.is_some(), "{:?}", found.report.effects);
+    let mut warnings = found.warnings.iter();
+    let differs = warnings.find(|warning| warning.contains("differs from the other training logs")).unwrap();
+    assert!(differs.contains("payload of joint_3") && !differs.contains("friction"), "{differs}");
 }
 
 #[test]
