@@ -9,11 +9,11 @@ use crate::{DimensionError, Placement, Spatial, Tree, Vec3};
 /// `velocity_size`, row by row: a row for each force, a column for each coordinate.
 #[derive(Clone, Debug)]
 pub struct ForceDerivatives<T> {
-    /// ∂τ/∂q \[N·m/rad; N for each m or rad as the joints ask\].
+    /// ∂τ/∂q \[N·m/rad; with N and m of joints that slide\].
     pub by_position: Vec<T>,
-    /// ∂τ/∂q̇ \[N·m·s/rad\].
+    /// ∂τ/∂q̇ \[N·m·s/rad; with N and m of joints that slide\].
     pub by_velocity: Vec<T>,
-    /// ∂τ/∂q̈, the mass matrix \[kg·m²\].
+    /// ∂τ/∂q̈, the mass matrix \[kg·m²; kg of joints that slide\].
     pub by_acceleration: Vec<T>,
 }
 

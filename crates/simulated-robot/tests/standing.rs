@@ -26,6 +26,12 @@ struct Humanoid {
 }
 
 impl Humanoid {
+    /// What is known of it before it is identified: no effect, no noise.
+    fn robot(&self) -> Robot {
+        Robot::with_base(self.chain.clone(), self.base(), [0.0; 10], Vec::new(), Catalogue::default())
+            .unwrap()
+    }
+
     /// With bent knees, the ankles 2 cm behind the hips.
     fn new() -> Self {
         let floating =
@@ -223,20 +229,20 @@ fn feet_carry_the_base() {
     assert!(force[knee].abs() > 5.0);
 }
 
+/// The factor of some torques alone.
+fn factor_of_rows(evidence: &Evidence, rows: std::ops::Range<usize>) -> phiw_regressor::factor::Factor {
+    let all = evidence.factor();
+    let weight = |row: usize| f64::from(u8::from(rows.contains(&row)));
+    all.combine(&(0..all.groups().len()).map(weight).collect::<Vec<f64>>()).unwrap()
+}
+
 /// Φ·w is what is measured: the commands, and the wrenches under the feet through the feet's Jacobian. In
 /// both engines, on a robot that stands by itself.
 #[test]
 fn the_model_says_what_is_measured() {
     let humanoid = Humanoid::new();
     let motion = humanoid.motion(1.5, 1.0);
-    let robot = Robot::with_base(
-        humanoid.chain.clone(),
-        humanoid.base(),
-        [0.0; 10],
-        Vec::new(),
-        Catalogue::default(),
-    )
-    .unwrap();
+    let robot = humanoid.robot();
     let truth = robot.truth(&[]).unwrap();
     let design = robot.design_of(&truth).unwrap();
     let parameters = truth.parameters(&robot).unwrap();
@@ -262,9 +268,7 @@ fn the_model_says_what_is_measured() {
         evidence.add(&design, log).unwrap();
         // [base, legs, upper body]: RMS of what the model does not explain, and of what is measured.
         for (rows, share) in [(0..6, 0.005), (6..18, 0.05), (18..36, 0.002)] {
-            let weights: Vec<f64> =
-                (0..log.joints).map(|row| f64::from(u8::from(rows.contains(&row)))).collect();
-            let factor = evidence.factor().combine(&weights).unwrap();
+            let factor = factor_of_rows(&evidence, rows.clone());
             let none = vec![0.0; parameters.len()];
             let error = (factor.residual_sum_of_squares(&parameters).unwrap()
                 / factor.residual_sum_of_squares(&none).unwrap())
@@ -283,14 +287,7 @@ fn the_model_says_what_is_measured() {
 fn smaller_steps_leave_less_on_the_base() {
     let humanoid = Humanoid::new();
     let motion = humanoid.motion(1.5, 0.5);
-    let robot = Robot::with_base(
-        humanoid.chain.clone(),
-        humanoid.base(),
-        [0.0; 10],
-        Vec::new(),
-        Catalogue::default(),
-    )
-    .unwrap();
+    let robot = humanoid.robot();
     let truth = robot.truth(&[]).unwrap();
     let design = robot.design_of(&truth).unwrap();
     let parameters = truth.parameters(&robot).unwrap();
@@ -302,9 +299,7 @@ fn smaller_steps_leave_less_on_the_base() {
         let mut evidence = Evidence::none(&design, RowsAt::Periods).unwrap();
         evidence.add(&design, &log).unwrap();
         let [force, moment] = [0..3, 3..6].map(|rows| {
-            let weights: Vec<f64> =
-                (0..log.joints).map(|row| f64::from(u8::from(rows.contains(&row)))).collect();
-            let factor = evidence.factor().combine(&weights).unwrap();
+            let factor = factor_of_rows(&evidence, rows.clone());
             (factor.residual_sum_of_squares(&parameters).unwrap() / factor.rows() as f64).sqrt()
         });
         println!("{name}: {force:.3} N, {moment:.3} N·m, still {:.1} %", 100.0 * log.still_share());
@@ -332,14 +327,7 @@ fn smaller_steps_leave_less_on_the_base() {
 fn positions_and_velocities_are_of_one_instant() {
     let humanoid = Humanoid::new();
     let motion = humanoid.motion(0.2, 0.2);
-    let robot = Robot::with_base(
-        humanoid.chain.clone(),
-        humanoid.base(),
-        [0.0; 10],
-        Vec::new(),
-        Catalogue::default(),
-    )
-    .unwrap();
+    let robot = humanoid.robot();
     let truth = robot.truth(&[]).unwrap();
     for (name, build) in [("mujoco", mujoco as fn(&Tree, &World) -> _), ("rapier", rapier)] {
         if name == "mujoco" && phiw_sim_mujoco::find_library().is_err() {

@@ -12,7 +12,7 @@ use serde::Serialize;
 pub enum Engine {
     /// MuJoCo, with its Runge-Kutta integrator.
     Mujoco,
-    /// Rapier, with four sub-iterations a step.
+    /// Rapier, with four sub-iterations a step (a whole body on its feet has more).
     Rapier,
     /// The workspace's own algorithms.
     Analytic,
