@@ -5,6 +5,7 @@ use super::friction::Friction;
 use super::kind::{Kind, Stranger};
 use super::load::{HeldBody, WorldForce};
 use super::mechanism::Mechanism;
+use super::pull::{Carried, Pull};
 use super::rng::CaseRng;
 use super::secret::Form;
 use super::trajectory::Reach;
@@ -242,6 +243,19 @@ pub fn outside(
             mechanism(Mechanism::FrictionJump { when: survey.spans.iter().map(after).collect() })
         }
         Stranger::ClockDrift => Some(((0..joints).collect(), Form::ClockDrift, 1.0)),
+        Stranger::Hose | Stranger::SwingingLoad => {
+            let point = [0; 3].map(|_| rng.uniform(-0.1, 0.1));
+            let carried = match stranger {
+                Stranger::Hose => Carried::Hose {
+                    anchor: [0; 3].map(|_| rng.uniform(-0.6, 0.6)),
+                    slack: rng.uniform(0.0, 0.3),
+                },
+                _ => {
+                    Carried::Load { omega: TAU * rng.log_uniform(0.7, 3.0), damping: rng.uniform(0.01, 0.1) }
+                }
+            };
+            Some((vec![joint], Form::Pull(Pull { body: joint, point, carried }), 1.0))
+        }
     }
 }
 

@@ -74,6 +74,11 @@ pub enum Stranger {
     /// Torques whose clock is not that of the positions: a delay that grows over each log. The catalogue has
     /// had a kind of this name since.
     ClockDrift,
+    /// A cable or a hose that is stretched between a fixed point and a link: its pull depends on where the
+    /// link is.
+    Hose,
+    /// A load that swings on a link: a liquid, a cable that hangs, a tool on rubber.
+    SwingingLoad,
 }
 
 impl Stranger {
@@ -87,10 +92,15 @@ impl Stranger {
         Stranger::ClockDrift,
     ];
 
+    /// Those that came after these, in a suite of their own again.
+    pub const LATER: [Stranger; 2] = [Stranger::Hose, Stranger::SwingingLoad];
+
     /// All others.
     pub fn of_other_suites() -> Vec<Stranger> {
         let all = <Stranger as clap::ValueEnum>::value_variants().iter();
-        all.copied().filter(|stranger| !Stranger::NEW.contains(stranger)).collect()
+        all.copied()
+            .filter(|stranger| !Self::NEW.contains(stranger) && !Self::LATER.contains(stranger))
+            .collect()
     }
 }
 

@@ -61,6 +61,7 @@ mod logging;
 mod mechanism;
 mod plant;
 mod profile;
+mod pull;
 mod push;
 pub(crate) mod report_file;
 mod rng;
@@ -101,7 +102,7 @@ pub struct Arguments {
     #[arg(long)]
     all: bool,
     /// Suites, separated by commas: one, two, three, control, outside (together: old), wide_right,
-    /// wide_effects, wide_outside (together: wide), new_kinds, large_gains, new_strangers.
+    /// wide_effects, wide_outside (together: wide), new_kinds, large_gains, new_strangers, later_strangers.
     #[arg(long, value_name = "SUITE", default_value = "old", value_parser = suites)]
     suite: std::sync::Arc<Suites>,
     /// Only cases in this situation (wide suites).
@@ -174,7 +175,7 @@ fn suites(text: &str) -> Result<std::sync::Arc<Suites>, String> {
                 format!(
                     "no suite {name:?}; there are old and wide, or single ones of them: one, two, \
                      three, control, outside, wide_right, wide_effects, wide_outside, new_kinds, \
-                     large_gains, new_strangers"
+                     large_gains, new_strangers, later_strangers"
                 )
             })?),
         }

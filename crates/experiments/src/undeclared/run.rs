@@ -112,7 +112,8 @@ fn run_one(spec: &Spec, robots: &[Robot], tracer: &Tracer, options: &Options) ->
         | Suite::WideOutside
         | Suite::NewKinds
         | Suite::LargeGains
-        | Suite::NewStrangers => tracer
+        | Suite::NewStrangers
+        | Suite::LaterStrangers => tracer
             .remainder(&case.without_secrets(), &temporary.path().join("twin"))
             .inspect_err(|error| eprintln!("{}: no noise floor: {error:#}", spec.seed))
             .ok(),

@@ -77,7 +77,7 @@ impl Score {
             Suite::WideRight => {
                 self.false_names.is_empty() && (!self.named.is_empty() || self.is_sufficient())
             }
-            Suite::WideOutside | Suite::NewStrangers => !self.is_explained_away(),
+            Suite::WideOutside | Suite::NewStrangers | Suite::LaterStrangers => !self.is_explained_away(),
             Suite::WideEffects => {
                 let found = |(secret, outcome): (&TrueSecret, &Outcome)| {
                     *outcome == Outcome::Right || !secret.is_material()

@@ -8,6 +8,7 @@ use super::kind::Name;
 use super::load::{HeldBody, WorldForce};
 use super::mechanism::Mechanism;
 use super::plant::{Ordinary, Scene, record};
+use super::pull::Pull;
 use super::trajectory::Trajectory;
 use phiw_dynamics::Tree;
 
@@ -22,6 +23,8 @@ pub enum Form {
     Mechanism(Mechanism),
     /// A force on a link \[N\].
     Force(WorldForce),
+    /// What pulls at a link and moves with it \[N/m, kg\].
+    Pull(Pull),
     /// A body held at a link \[kg\].
     Payload(HeldBody),
     /// Gravity turned about a horizontal axis \[rad\].
@@ -78,6 +81,7 @@ impl Form {
             Form::Gain => [0.02, 0.4],
             Form::ClockDrift => [1e-4, 1e-2],
             Form::Payload(_) | Form::LoadStep { .. } => [1e-3, 30.0],
+            Form::Pull(_) => [1e-3, 1e5],
             // Its softest depends on what it carries: see [`super::elasticity::softest`].
             Form::Elasticity => [1e-7, 0.2],
             _ => [1e-9, 1e9],
@@ -113,6 +117,7 @@ impl Secret {
                 }
             }
             Form::Force(force) => force.add_torque(scene, self.scale, torque),
+            Form::Pull(pull) => pull.add_torque(scene, self.scale, torque),
             _ => {}
         }
     }

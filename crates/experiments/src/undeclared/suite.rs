@@ -34,6 +34,8 @@ pub enum Suite {
     LargeGains,
     /// One of [`Stranger::NEW`], effects that are not in the catalogue and were found last.
     NewStrangers,
+    /// One of [`Stranger::LATER`].
+    LaterStrangers,
 }
 
 /// Development seeds are for looking at; reporting seeds only for reporting.
@@ -48,7 +50,7 @@ pub enum Seeds {
 
 impl Suite {
     /// All suites.
-    pub const ALL: [Suite; 11] = [
+    pub const ALL: [Suite; 12] = [
         Suite::One,
         Suite::Two,
         Suite::Three,
@@ -60,6 +62,7 @@ impl Suite {
         Suite::NewKinds,
         Suite::LargeGains,
         Suite::NewStrangers,
+        Suite::LaterStrangers,
     ];
     /// One to three effects on an otherwise right model, well excited.
     pub const OLD: [Suite; 5] = [Suite::One, Suite::Two, Suite::Three, Suite::Control, Suite::Outside];
@@ -85,6 +88,7 @@ impl Suite {
             Suite::NewKinds => 120,
             Suite::LargeGains => 120,
             Suite::NewStrangers => 120,
+            Suite::LaterStrangers => 40,
         }
     }
 
@@ -162,10 +166,8 @@ impl Spec {
                 let strangers = Stranger::of_other_suites();
                 spec.secrets = vec![Name::Outside(strangers[index % strangers.len()])];
             }
-            Suite::NewStrangers => {
-                spec.robot = index / Stranger::NEW.len() % robots;
-                spec.secrets = vec![Name::Outside(Stranger::NEW[index % Stranger::NEW.len()])];
-            }
+            Suite::NewStrangers => spec.draw_stranger(&Stranger::NEW, index, robots),
+            Suite::LaterStrangers => spec.draw_stranger(&Stranger::LATER, index, robots),
             Suite::WideRight | Suite::WideEffects | Suite::WideOutside => spec.draw_wide(index, robots, rng),
             Suite::NewKinds => {
                 let turns = Kind::NEW.len();
@@ -219,6 +221,12 @@ impl Spec {
             let kind = choices.swap_remove(rng.index(choices.len()));
             self.secrets.push(Name::Catalogue(kind));
         }
+    }
+
+    /// One after the other, on one robot after the other.
+    fn draw_stranger(&mut self, strangers: &[Stranger], index: usize, robots: usize) {
+        self.robot = index / strangers.len() % robots;
+        self.secrets = vec![Name::Outside(strangers[index % strangers.len()])];
     }
 
     /// One effect, with another beside it in every third turn.

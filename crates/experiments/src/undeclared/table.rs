@@ -19,7 +19,7 @@ pub fn markdown(cases: &[Scored]) -> String {
         let _ = writeln!(text, "## {suite:?}: {} cases\n", cases.len());
         match suite {
             Suite::Control => control(&cases, &mut text),
-            Suite::Outside | Suite::NewStrangers => outside(&cases, &mut text),
+            Suite::Outside | Suite::NewStrangers | Suite::LaterStrangers => outside(&cases, &mut text),
             suite if suite.is_wide() => super::wide_table::suite(suite, &cases, &mut text),
             _ => {
                 kinds(&cases, &mut text);

@@ -77,6 +77,7 @@ fn every_kind_is_drawn_in_its_size() {
     check(Suite::NewKinds, 0..4);
     check(Suite::LargeGains, 0..4);
     check(Suite::NewStrangers, 0..6);
+    check(Suite::LaterStrangers, 0..4);
 }
 
 /// Small gains are drawn in the other suites; what is linear about one is not about a half or two.
