@@ -1,6 +1,7 @@
 //! Friction that changes with time or temperature.
 
-use crate::columns::{OwnTorque, ParameterKind};
+use crate::bristles::{Bristles, DEFLECTION, bristles_near, with_bristles};
+use crate::columns::{Formula, OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Refinement, Signal, SignalRanges, around, constant, values};
 use crate::sign::Sign;
@@ -40,7 +41,11 @@ impl EffectKind for ThermalDrift {
         let longest = LONGEST * (ranges.session.1 - ranges.session.0);
         let time = |constants: &Constants| constant(constants, TIME_CONSTANT, SHORTEST_S);
         near.retain(|constants| (SHORTEST_S..=longest).contains(&time(constants)));
+        near.extend(bristles_near(found, step));
         near
+    }
+    fn turned_over_a_way(&self, found: &Constants, way: Option<f64>) -> Option<Constants> {
+        Some(with_bristles(found, way))
     }
     fn telling_motion(&self) -> &'static str {
         "the same motion cold and warm"
@@ -61,26 +66,42 @@ impl EffectKind for ThermalDrift {
         let joint = site[0];
         let time_constant = constant(constants, TIME_CONSTANT, 60.0);
         let sign = Sign::of(constants);
-        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
-            let factor = if time_constant > 0.0 {
-                (-sample.time() / time_constant).exp()
-            } else {
-                let temperature = sample.temperature().get(joint).copied().unwrap_or(f64::NAN);
-                if temperature.is_finite() {
-                    (ROOM_TEMPERATURE - temperature) / TEMPERATURE_SPAN
-                } else {
-                    0.0
-                }
-            };
-            let velocity = sample.qd()[joint];
-            out[0] = factor * velocity;
-            out[1] = factor * sign.of_joint(sample, joint);
+        let falling = move |sample: &Sample<'_>| {
+            if time_constant > 0.0 {
+                return (-sample.time() / time_constant).exp();
+            }
+            let temperature = sample.temperature().get(joint).copied().unwrap_or(f64::NAN);
+            let cold = (ROOM_TEMPERATURE - temperature) / TEMPERATURE_SPAN;
+            if cold.is_finite() { cold } else { 0.0 }
         };
+        let steady = move |sample: &Sample<'_>| falling(sample) * sign.of_joint(sample, joint);
+        let dry = Bristles { joint, deflection: constant(constants, DEFLECTION, 0.0), steady };
+        let viscous = move |sample: &Sample<'_>| falling(sample) * sample.qd()[joint];
+        let columns = FallingFriction { viscous, dry };
         let parameters = [
             ("fv_cold", ParameterKind::PerVelocity, f64::NEG_INFINITY),
             ("fc_cold", ParameterKind::Torque, f64::NEG_INFINITY),
         ];
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+    }
+}
+
+/// A viscous and a dry friction, each in a column of its own.
+struct FallingFriction<V, D> {
+    viscous: V,
+    dry: Bristles<D>,
+}
+
+impl<V, D> Formula for FallingFriction<V, D>
+where
+    V: Fn(&Sample<'_>) -> f64 + Send + Sync,
+    D: Fn(&Sample<'_>) -> f64 + Send + Sync,
+{
+    type Memory = <Bristles<D> as Formula>::Memory;
+
+    fn columns(&self, memory: &mut Self::Memory, sample: &Sample<'_>, columns: &mut [f64]) {
+        columns[0] = (self.viscous)(sample);
+        self.dry.columns(memory, sample, &mut columns[1..]);
     }
 }
 

@@ -10,6 +10,9 @@ const DEPENDENT: f64 = 1e-10;
 pub(super) const ABSORBED: f64 = 4e-6;
 /// Share of all rows that say what is in the model in any case, where stretches are left out.
 const KNOWN: f64 = 0.01;
+/// Share of all rows that draws what was found to where it is absent, where folds are left out: so little
+/// that what the others tell stays, but for a thousandth of it.
+const DRAWN: f64 = 1e-3;
 /// Share of a variance that must be left beside others' for the constraint's Schur complement to be exact:
 /// below it is rounding.
 const TOLD_APART: f64 = 1e-9;
@@ -134,6 +137,9 @@ impl Fit {
     /// What is in the model in any case, the rigid body and what is declared, is known beside these rows as
     /// if a small share of all rows had said what it is: a joint that moves in few stretches moves in none of
     /// the others, and what these make of its body would hide what is to be judged.
+    ///
+    /// Everything else is drawn to where it is absent as if a smaller share of all rows had said so: the end of
+    /// an arc that is reached in one stretch only is not known from the others.
     pub fn without(&self, problem: &Problem, folds: &[usize]) -> Self {
         let mut fit = self.clone();
         fit.determined.fill(true);
@@ -258,6 +264,10 @@ impl Fit {
                             fewer[other] += known;
                             right[place] += weight * known * self.values[self.active[at]];
                         }
+                    } else {
+                        let drawn = DRAWN * whole[column];
+                        fewer[column] += drawn;
+                        right[place] += weight * drawn * problem.absent[self.active[place]];
                     }
                     products = &fewer;
                 }

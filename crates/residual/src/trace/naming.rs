@@ -297,16 +297,21 @@ impl Search<'_> {
             let simpler: Vec<(usize, f64)> =
                 simpler.flat_map(|&other| trial.values_of(other, torque)).collect();
             let of_simpler = trial.torque(torque).size_of(&simpler);
-            // Noise cannot be taken away, and what is left is known no better than errors are told apart.
-            let noise = trial.torque(torque).rows() * self.input.noise_floor[torque].powi(2);
-            let unknown = (self.options.thresholds.same_error.powi(2) - 1.0) * noise;
             let [left_without, left_with] =
-                [without, with].map(|squares| (squares - noise).max(unknown).max(f64::MIN_POSITIVE));
+                [without, with].map(|squares| self.beyond_noise(trial, torque, squares));
             !self.is_as_it_was(torque, (without / trial.torque(torque).rows().max(1.0)).sqrt())
                 && taken >= self.options.thresholds.least_share_of_kin * left_without
                 && taken * left_without >= self.options.thresholds.least_of_others * of_simpler * left_with
                 && (taken / whole).sqrt() >= self.options.thresholds.least_size
         })
+    }
+
+    /// What of the squares left of a torque is no noise. Noise cannot be taken away, and what is left is known
+    /// no better than errors are told apart.
+    fn beyond_noise(&self, trial: &Trial, torque: usize, squares: f64) -> f64 {
+        let noise = trial.torque(torque).rows() * self.input.noise_floor[torque].powi(2);
+        let unknown = (self.options.thresholds.same_error.powi(2) - 1.0) * noise;
+        (squares - noise).max(unknown).max(f64::MIN_POSITIVE)
     }
 
     /// The same beside all other forms: where two of them are there, neither takes most of what the simpler
@@ -333,8 +338,8 @@ impl Search<'_> {
 
     /// Whether what an effect takes away where it is foretold is worth a name.
     ///
-    /// It must take away a share of the residual of a torque that it acts on, and be a share of that torque.
-    /// Where the other parameters have taken up most of it, it is to be seen on any torque, and must be a
+    /// It must take away a share of the residual of a torque that it acts on, be a share of that torque, and be
+    /// large beside what others took or leave next to nothing but noise. Where the other parameters have taken up most of it, it is to be seen on any torque, and must be a
     /// share of its torque by itself.
     pub(super) fn is_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
         let others = self.interchangeable(trial, member);
@@ -373,7 +378,8 @@ impl Search<'_> {
             seen |= hypothesis.torques.contains(&torque)
                 && together >= thresholds.least_size
                 && share >= thresholds.least_share
-                && taken >= thresholds.least_of_others * by_others
+                && taken * self.beyond_noise(trial, torque, before)
+                    >= thresholds.least_of_others * by_others * self.beyond_noise(trial, torque, after)
                 && (taken / whole).sqrt() >= thresholds.least_size;
             size = size.max((own(torque) / whole).sqrt());
         }
