@@ -53,6 +53,7 @@ impl Search<'_> {
     /// What does harm is left out.
     pub(super) fn name(&mut self, harm: Harm) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
         let trial = loop {
+            self.call_by_the_frictions_name()?;
             let trial = self.trial()?;
             let mut harmful = self.harmful(&trial, harm);
             if harmful.is_empty() {

@@ -25,9 +25,9 @@ impl Search<'_> {
                 continue;
             }
             let way = catalogue.kind(&self.specs[place].kind)?.way_of_turning(&self.specs[place].constants);
-            let mut branch = self.clone();
+            let mut together = self.clone();
             for other in 0..self.specs.len() {
-                let spec = &mut branch.specs[other];
+                let spec = &mut together.specs[other];
                 let is_open = spec.joints == joints && !self.is_held(other);
                 if let Some(turned) = catalogue.kind(&spec.kind)?.turned_over_a_way(&spec.constants, way)
                     && is_open
@@ -35,27 +35,33 @@ impl Search<'_> {
                     spec.constants = turned;
                 }
             }
-            let simpler = self.simpler_that_turns(place, way)?;
-            // A form of a friction gives way to the friction, if that does about as much.
-            let mut may_lose = 0.0;
-            if let Some(simpler) = simpler {
-                branch.replace(place, simpler)?;
+            let (mut branches, mut may_lose) = (vec![together], 0.0);
+            if let Some(simpler) = self.simpler_that_turns(place, way)? {
+                // A form of a friction gives way to the friction, if that does about as much; the others of the
+                // joint turn over the same way, or as they did.
+                branches.push(self.clone());
                 may_lose = A_FORM_IS_WORTH;
-            } else if branch.specs != self.specs {
-                branch.remove(place)?;
+                for branch in &mut branches {
+                    branch.replace(place, simpler.clone())?;
+                }
+            } else if branches[0].specs != self.specs {
+                branches[0].remove(place)?;
             } else {
                 continue;
             }
-            branch.refine()?;
-            let value = branch.value(&branch.chosen.rows)?;
-            let present = match own {
-                Some(own) => own,
-                None => *own.insert(self.value(&self.chosen.rows)?),
-            };
-            if value < present + may_lose {
-                *self = branch;
-                own = Some(value);
-                any = true;
+            for mut branch in branches {
+                branch.refine()?;
+                let value = branch.value(&branch.chosen.rows)?;
+                let present = match own {
+                    Some(own) => own,
+                    None => *own.insert(self.value(&self.chosen.rows)?),
+                };
+                if value < present + may_lose {
+                    *self = branch;
+                    own = Some(value);
+                    any = true;
+                    break;
+                }
             }
         }
         Ok(any)
@@ -114,6 +120,22 @@ impl Search<'_> {
             }
         }
         Ok(best.map(|(_, branch)| branch))
+    }
+
+    /// Calls a form of a friction that turns over a way as short as that of bristles by the friction's name,
+    /// where the joint has lost that: the two have the same torque.
+    pub(super) fn call_by_the_frictions_name(&mut self) -> Result<(), IdentificationError> {
+        for place in self.declared..self.specs.len() {
+            let own = &self.specs[place];
+            let way = self.fixed.catalogue.kind(&own.kind)?.way_of_turning(&own.constants);
+            let way = way.filter(|way| *way <= LONGEST_BRISTLES);
+            if way.is_some()
+                && let Some(simpler) = self.simpler_that_turns(place, way)?
+            {
+                self.specs[place] = simpler;
+            }
+        }
+        Ok(())
     }
 
     /// Whether an effect is no more than how a friction of its joint turns, over a way as short as that of
