@@ -4,3 +4,4 @@ mod declarations;
 mod formulas;
 mod mechanisms;
 mod sentences;
+mod turning;

@@ -75,7 +75,6 @@ fn known_to_follow(signals: &[String]) -> Option<&'static str> {
         ["tau", "q"] | ["q", "tau"] => "a ripple of teeth or of a commutation that grows with the load",
         ["q", "qd"] => "a friction that changes around the turn",
         ["t", "qd"] => "a friction that has changed in the course of the logs",
-        ["tau", "t"] => "an oscillation that the torque excites (a base that gives way, a load that swings)",
         ["q", other] if other.starts_with("q.") => "a cable that pulls at a link",
         ["t", "tau"] => "a clock of the torques that is not that of the positions",
         [other] if other.starts_with("tau.") => "a torque sensor that feels another joint's torque",
@@ -106,11 +105,6 @@ mod tests {
                 &["q", "q.wrist"][..],
                 "elbow follows its position and the position of wrist together (62.1 % of its variance), as a \
                  cable that pulls at a link does.",
-            ),
-            (
-                &["tau", "t"][..],
-                "elbow follows its torque and the time together (62.1 % of its variance), as an oscillation \
-                 that the torque excites (a base that gives way, a load that swings) does.",
             ),
             (
                 &["tau.wrist"][..],

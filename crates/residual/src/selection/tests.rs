@@ -153,6 +153,25 @@ fn what_foretells_nothing_does_not_bar_what_does() {
     }
 }
 
+/// The end of an arc that one stretch reaches had a torque of 13 N·m there by what noise made of it elsewhere:
+/// a map that left noise only foretold less than none, and gave way to nothing.
+#[test]
+fn what_one_stretch_alone_tells_is_next_to_nothing_where_the_others_foretell_it() {
+    let row = std::cell::Cell::new(0_usize);
+    let change = |columns: &mut [f64]| {
+        let in_fourth = row.replace(row.get() + 1) / 40 == 3;
+        columns[0] *= if in_fourth { 1.0 } else { 1e-4 };
+    };
+    let problem = problem_with(&mut RandomNumbers::new(3), 1, 2, &[(0, 1, 0.8)], 0.0, change);
+    let members: Vec<Member> = [0, 1].map(|hypothesis| Member { hypothesis, variant: 0 }).to_vec();
+    let whole = Fit::new(&problem, problem.active(&members), &[400.0], None);
+    let others = whole.without(&problem, &[3]);
+    assert!(others.values[1].abs() < 0.3, "{:?}", others.values);
+    for place in [0, 2] {
+        assert!((others.values[place] - whole.values[place]).abs() < 0.1, "{:?}", others.values);
+    }
+}
+
 /// A variant of more parameters explains one stretch by what it foretells wrongly elsewhere: knots of a map
 /// that one stretch alone reaches. It took the place of the variant that foretells, and left the model with
 /// all that the map explained.

@@ -102,7 +102,7 @@ impl<'a> Search<'a> {
                 }
             };
             let needs = Needs::default();
-            nameless_columns(self.fixed, torque, 2 * limits.len(), needs, columns)
+            nameless_columns(self.fixed, torque, 2 * limits.len(), needs, Box::new(columns))
         });
         let reference = self.fixed.reference(&self.specs, &self.parameters)?;
         let (_, folds) = self.fixed.factors(&self.specs, columns.collect(), reference, &self.folds)?;
@@ -125,7 +125,7 @@ impl<'a> Search<'a> {
         let columns = limits.iter().map(|(&torque, &limit)| -> Box<dyn Effect> {
             let column =
                 move |sample: &Sample<'_>, out: &mut [f64]| out[0] = beyond_limit(sample, torque, limit);
-            nameless_columns(self.fixed, torque, 1, Needs::default(), column)
+            nameless_columns(self.fixed, torque, 1, Needs::default(), Box::new(column))
         });
         let reference = self.fixed.reference(&self.specs, &self.parameters)?;
         let (design, folds) = self.fixed.factors(&self.specs, columns.collect(), reference, &self.folds)?;

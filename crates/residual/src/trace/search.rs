@@ -142,11 +142,20 @@ impl Search<'_> {
 
     /// Chooses and refines until nothing changes.
     pub(super) fn settle(&mut self) -> Result<(), IdentificationError> {
+        let mut uncontested: Option<Self> = None;
         for round in 1..=ROUNDS {
             let before = self.names();
             self.choose()?;
             self.refine()?;
             self.leave_out_what_is_not_realised()?;
+            // What won a contest may lead the next choice astray.
+            if let Some(uncontested) = uncontested.take() {
+                let rows = uncontested.chosen.rows.clone();
+                if self.value(&rows)? >= uncontested.value(&rows)? {
+                    *self = uncontested;
+                    break;
+                }
+            }
             let is_settled = self.names() == before;
             // What has not settled is not chosen again, and its frictions may still turn over a way.
             if is_settled || round == ROUNDS {
@@ -155,8 +164,11 @@ impl Search<'_> {
                     continue;
                 }
             }
-            if is_settled && (!self.grows || !self.contest()?) {
-                break;
+            if is_settled {
+                uncontested = Some(self.clone());
+                if !self.grows || !self.contest()? {
+                    break;
+                }
             }
         }
         Ok(())

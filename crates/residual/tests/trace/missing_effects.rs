@@ -45,6 +45,19 @@ fn stribeck_friction_is_named() {
     check(stribeck, &[("stribeck_friction", &["elbow"])]);
 }
 
+/// Beside frictions that were found, too, an effect of a hundredth of their squares was a refinement, though
+/// all but noise was left without it.
+#[test]
+fn a_small_effect_that_leaves_noise_only_has_a_name_where_nothing_is_declared() {
+    let ripple = |state: &State<'_>, torque: &mut [f64]| {
+        torque[1] += 3.4 * (state.qd[1] / 0.01).tanh() + 0.2 * (7.0 * state.q[1]).sin();
+    };
+    let tracing = traced_on(folds().0, &[], 11, &ripple, false);
+    let names = named(&tracing);
+    assert!(names.contains(&("torque_ripple".to_owned(), vec!["elbow".to_owned()])), "{names:?}");
+    assert_eq!(tracing.verdict, Verdict::Explained);
+}
+
 /// Right models whose friction turned as an arctangent does were given a Stribeck friction: how slowly a sign
 /// turns is no effect of its own.
 #[test]

@@ -122,30 +122,3 @@ fn products_of_signals_that_no_effect_has_are_seen() {
         assert!(follows.iter().any(|follows| follows.signals == signals), "{what}: {follows:?}");
     }
 }
-
-/// A load that swings on the arm was called noise: 9.5 % of the torques of an arm were left, and all was said to
-/// be explained.
-#[test]
-fn an_oscillation_that_the_torque_excites_is_structure() {
-    let swing = RefCell::new([0.0_f64; 2]);
-    let load = |state: &State<'_>, torque: &mut [f64]| {
-        let swing = &mut *swing.borrow_mut();
-        if state.t == 0.0 {
-            *swing = [state.q[1], 0.0];
-        }
-        let (omega, damping) = (6.0, 0.03);
-        let pull = omega * omega * (state.q[1] - swing[0]) + 2.0 * damping * omega * (state.qd[1] - swing[1]);
-        swing[1] += pull / RATE;
-        swing[0] += swing[1] / RATE;
-        torque[1] += 0.05 * pull;
-    };
-    let tracing = traced(11, &load);
-    assert!(
-        matches!(tracing.verdict, Verdict::Unexplained | Verdict::PartlyExplained),
-        "{:?} {:?}",
-        tracing.verdict,
-        named(&tracing)
-    );
-    let follows = &tracing.remaining.depends_on;
-    assert!(follows.iter().any(|follows| follows.signals == ["tau", "t"]), "{follows:?}");
-}

@@ -1,7 +1,6 @@
 //! What a residual follows, without a name: shapes over each signal, fitted on some folds, judged on the
 //! others.
 
-mod oscillation;
 mod others;
 mod own;
 mod shape;
@@ -90,7 +89,6 @@ fn shapes(fit: Fit<'_>, row: usize, moving: &[usize]) -> Vec<Shape> {
     let mut shapes = own::single(&torque);
     shapes.extend(own::products(&torque));
     shapes.extend(swings::swings(&torque));
-    shapes.extend(oscillation::excited(&torque));
     shapes.extend(moving.iter().flat_map(|&other| others::motion_of(&torque, other)));
     let others = (0..fit.fixed.tree.joint_count()).filter(|&other| other != row);
     shapes.extend(others.map(|other| others::torque_of_joint(&torque, other)));

@@ -2,7 +2,7 @@
 
 use crate::trace::residuals::ResidualShape;
 use crate::trace::stage::Fixed;
-use phiw_effects::{Constants, Formula, OwnTorque, ParameterKind, SignalRanges, smooth_sign};
+use phiw_effects::{Constants, OwnTorque, ParameterKind, SignalRanges, smooth_sign};
 use phiw_identification::Effect;
 use phiw_identification::effect::{Needs, Sample};
 
@@ -56,15 +56,6 @@ impl Torque<'_> {
 
     /// `count` columns over some signals.
     pub fn shape(&self, signals: &[&str], count: usize, needs: Needs, columns: ShapeColumns) -> Shape {
-        let formula = move |sample: &Sample<'_>, out: &mut [f64]| columns(sample, out);
-        self.shape_with_memory(signals, count, needs, formula)
-    }
-
-    /// The same of columns that may depend on the samples before.
-    pub fn shape_with_memory<F>(&self, signals: &[&str], count: usize, needs: Needs, columns: F) -> Shape
-    where
-        F: Formula + 'static,
-    {
         let signals = signals.iter().map(|signal| (*signal).to_owned()).collect();
         let effect = nameless_columns(self.fixed, self.row, count, needs, columns);
         Shape { signals, effect, least_share: LEAST_SHARE }
@@ -82,7 +73,7 @@ pub(super) fn torque_of(sample: &Sample<'_>, joint: usize) -> f64 {
 }
 
 /// Writes the columns of one sample.
-pub(super) type ShapeColumns = Box<dyn Fn(&Sample<'_>, &mut [f64]) + Send + Sync>;
+pub(in crate::trace) type ShapeColumns = Box<dyn Fn(&Sample<'_>, &mut [f64]) + Send + Sync>;
 
 /// `count` columns in one joint's torque, as an effect without a name.
 pub(in crate::trace) fn nameless_columns(
@@ -90,10 +81,11 @@ pub(in crate::trace) fn nameless_columns(
     row: usize,
     count: usize,
     needs: Needs,
-    columns: impl Formula + 'static,
+    columns: ShapeColumns,
 ) -> Box<dyn Effect> {
     let parameters = vec![("height", ParameterKind::Torque, f64::NEG_INFINITY); count];
-    Box::new(OwnTorque::new("shape", fixed.tree, row, &Constants::new(), &parameters, columns).needing(needs))
+    let formula = move |sample: &Sample<'_>, out: &mut [f64]| columns(sample, out);
+    Box::new(OwnTorque::new("shape", fixed.tree, row, &Constants::new(), &parameters, formula).needing(needs))
 }
 
 /// Nodes of a broken line: each column is one at its node, and falls to nothing at the next ones.
