@@ -50,7 +50,7 @@ fn stribeck_friction_is_named() {
 #[test]
 fn a_small_effect_that_leaves_noise_only_has_a_name_where_nothing_is_declared() {
     let ripple = |state: &State<'_>, torque: &mut [f64]| {
-        torque[1] += 3.4 * (state.qd[1] / 0.01).tanh() + 0.2 * (7.0 * state.q[1]).sin();
+        torque[1] += 3.4 * (state.qd[1] / 0.01).tanh() + 0.1 * (7.0 * state.q[1]).sin();
     };
     let tracing = traced_on(folds().0, &[], 11, &ripple, false);
     let names = named(&tracing);
