@@ -340,8 +340,8 @@ impl Search<'_> {
     /// Whether what an effect takes away where it is foretold is worth a name.
     ///
     /// It must take away a share of the residual of a torque that it acts on, be a share of that torque, and be
-    /// large beside what others took or leave next to nothing but noise. Where the other parameters have taken up most of it, it is to be seen on any torque, and must be a
-    /// share of its torque by itself.
+    /// large beside what others took or leave next to nothing but noise. Where the other parameters have taken
+    /// up most of it, it is to be seen on any torque, and must be a share of its torque by itself.
     pub(super) fn is_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
         let others = self.interchangeable(trial, member);
         let own = |torque: usize| trial.size_beside(member, &others, torque);
