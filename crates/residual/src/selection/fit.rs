@@ -138,8 +138,9 @@ impl Fit {
     /// if a small share of all rows had said what it is: a joint that moves in few stretches moves in none of
     /// the others, and what these make of its body would hide what is to be judged.
     ///
-    /// Everything else is drawn to where it is absent as if a smaller share of all rows had said so: the end of
-    /// an arc that is reached in one stretch only is not known from the others.
+    /// Everything else is drawn to where it is absent as if a smaller share of all rows had said so, in every
+    /// direction by as much: the end of an arc that is reached in one stretch only is not known from the others,
+    /// and what is hard to tell from something else is known there as well as here.
     pub fn without(&self, problem: &Problem, folds: &[usize]) -> Self {
         let mut fit = self.clone();
         fit.determined.fill(true);
@@ -258,16 +259,14 @@ impl Fit {
                             .zip(rows.folds[fold].column(column))
                             .for_each(|(sum, own)| *sum -= own);
                     }
-                    if is_given(place) {
-                        for &(other, at) in self.own[torque].iter().filter(|(_, at)| is_given(*at)) {
-                            let known = KNOWN * whole[other];
-                            fewer[other] += known;
-                            right[place] += weight * known * self.values[self.active[at]];
-                        }
-                    } else {
-                        let drawn = DRAWN * whole[column];
-                        fewer[column] += drawn;
-                        right[place] += weight * drawn * problem.absent[self.active[place]];
+                    for &(other, at) in &self.own[torque] {
+                        let parameter = self.active[at];
+                        let share = if is_given(place) && is_given(at) { KNOWN } else { DRAWN };
+                        let value =
+                            if is_given(at) { self.values[parameter] } else { problem.absent[parameter] };
+                        let known = share * whole[other];
+                        fewer[other] += known;
+                        right[place] += weight * known * value;
                     }
                     products = &fewer;
                 }
