@@ -94,8 +94,8 @@ impl Load {
             pulls =
                 (end - self.mass).scale(omega * omega) + (moves - self.velocity).scale(2.0 * damping * omega);
             if number < steps as usize {
-                self.velocity = self.velocity + pulls.scale(step);
-                self.mass = self.mass + self.velocity.scale(step);
+                self.velocity += pulls.scale(step);
+                self.mass += self.velocity.scale(step);
             }
         }
         (self.point, self.time) = (point, time);

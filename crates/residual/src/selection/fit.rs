@@ -11,8 +11,8 @@ pub(super) const ABSORBED: f64 = 4e-6;
 /// Share of all rows that say what is in the model in any case, where stretches are left out.
 const KNOWN: f64 = 0.01;
 /// Share of all rows that draws what was found to where it is absent, where folds are left out: so little
-/// that what the others tell stays, but for a thousandth of it.
-const DRAWN: f64 = 1e-3;
+/// that what the others tell stays, but for a ten-thousandth of it.
+const DRAWN: f64 = 1e-4;
 /// Share of a variance that must be left beside others' for the constraint's Schur complement to be exact:
 /// below it is rounding.
 const TOLD_APART: f64 = 1e-9;

@@ -160,7 +160,7 @@ fn what_one_stretch_alone_tells_is_next_to_nothing_where_the_others_foretell_it(
     let row = std::cell::Cell::new(0_usize);
     let change = |columns: &mut [f64]| {
         let in_fourth = row.replace(row.get() + 1) / 40 == 3;
-        columns[0] *= if in_fourth { 1.0 } else { 1e-4 };
+        columns[0] *= if in_fourth { 1.0 } else { 1e-5 };
     };
     let problem = problem_with(&mut RandomNumbers::new(3), 1, 2, &[(0, 1, 0.8)], 0.0, change);
     let members: Vec<Member> = [0, 1].map(|hypothesis| Member { hypothesis, variant: 0 }).to_vec();
