@@ -139,8 +139,8 @@ impl Fit {
     /// the others, and what these make of its body would hide what is to be judged.
     ///
     /// Everything else is drawn to where it is absent as if a smaller share of all rows had said so, in every
-    /// direction by as much: the end of an arc that is reached in one stretch only is not known from the others,
-    /// and what is hard to tell from something else is known there as well as here.
+    /// direction by as much: the end of an arc that is reached in one stretch only is not known from the
+    /// others, and what is hard to tell from something else is known there as well as here.
     pub fn without(&self, problem: &Problem, folds: &[usize]) -> Self {
         let mut fit = self.clone();
         fit.determined.fill(true);

@@ -153,8 +153,8 @@ fn what_foretells_nothing_does_not_bar_what_does() {
     }
 }
 
-/// The end of an arc that one stretch reaches had a torque of 13 N·m there by what noise made of it elsewhere:
-/// a map that left noise only foretold less than none, and gave way to nothing.
+/// The end of an arc that one stretch reaches had a torque of 13 N·m there by what noise made of it
+/// elsewhere: a map that left noise only foretold less than none, and gave way to nothing.
 #[test]
 fn what_one_stretch_alone_tells_is_next_to_nothing_where_the_others_foretell_it() {
     let row = std::cell::Cell::new(0_usize);

@@ -307,8 +307,8 @@ impl Search<'_> {
         })
     }
 
-    /// What of the squares left of a torque is no noise. Noise cannot be taken away, and what is left is known
-    /// no better than errors are told apart.
+    /// What of the squares left of a torque is no noise. Noise cannot be taken away, and what is left is
+    /// known no better than errors are told apart.
     fn beyond_noise(&self, trial: &Trial, torque: usize, squares: f64) -> f64 {
         let noise = trial.torque(torque).rows() * self.input.noise_floor[torque].powi(2);
         let unknown = (self.options.thresholds.same_error.powi(2) - 1.0) * noise;
@@ -339,9 +339,9 @@ impl Search<'_> {
 
     /// Whether what an effect takes away where it is foretold is worth a name.
     ///
-    /// It must take away a share of the residual of a torque that it acts on, be a share of that torque, and be
-    /// large beside what others took or leave next to nothing but noise. Where the other parameters have taken
-    /// up most of it, it is to be seen on any torque, and must be a share of its torque by itself.
+    /// It must take away a share of the residual of a torque that it acts on, be a share of that torque, and
+    /// be large beside what others took or leave next to nothing but noise. Where the other parameters have
+    /// taken up most of it, it is to be seen on any torque, and must be a share of its torque by itself.
     pub(super) fn is_material(&self, trial: &Trial, member: Member, squares: &Squares) -> bool {
         let others = self.interchangeable(trial, member);
         let own = |torque: usize| trial.size_beside(member, &others, torque);

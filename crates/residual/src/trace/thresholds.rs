@@ -28,8 +28,8 @@ pub struct Thresholds {
     pub least_share_of_kin: f64,
     /// Share of what is already explained of the same torque (of what the other effects took; for a form of
     /// something simpler, of the simpler's squares) that an effect must take, times what is left beyond noise
-    /// without it over what is left with it: one that leaves noise only may be small. How exactly a sign turns
-    /// is no effect of its own.
+    /// without it over what is left with it: one that leaves noise only may be small. How exactly a sign
+    /// turns is no effect of its own.
     pub least_of_others: f64,
     /// RMS of what an effect takes over the RMS of its torque, at least, to have a name. Half of it is as
     /// good as nothing ([`Self::negligible_share`]).

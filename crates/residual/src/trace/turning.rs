@@ -37,8 +37,8 @@ impl Search<'_> {
             }
             let (mut branches, mut may_lose) = (vec![together], 0.0);
             if let Some(simpler) = self.simpler_that_turns(place, way)? {
-                // A form of a friction gives way to the friction, if that does about as much; the others of the
-                // joint turn over the same way, or as they did.
+                // A form of a friction gives way to the friction, if that does about as much; the others of
+                // the joint turn over the same way, or as they did.
                 branches.push(self.clone());
                 may_lose = A_FORM_IS_WORTH;
                 for branch in &mut branches {
