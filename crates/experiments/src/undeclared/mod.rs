@@ -13,8 +13,9 @@
 //! bands, logs of a few seconds, rough clocks, and held-out motion that is faster than all that was trained
 //! on.
 //! `new_kinds` has the kinds that came to the catalogue last, so that the cases of the other suites stay
-//! what they were, and `large_gains` torques that are logged at a third to three times what they are. A case
-//! follows from its seed alone. Seeds for developing the tracer and seeds for reporting are disjoint.
+//! what they were, and `large_gains` torques that are logged at a third to three times what they are.
+//! `new_strangers` and `later_strangers` have what no catalogue has and came last. A case follows from its
+//! seed alone. Seeds for developing the tracer and seeds for reporting are disjoint.
 //!
 //! The tracer is a separate program that sees files only. What is true stays here, or in a `truth.json`
 //! beside the folder that it sees. All forms of effects are written from the literature and not from the
@@ -42,9 +43,9 @@
 //! `--resume` goes on from. `--keep DIR` keeps the files of each case.
 
 // Three groups of files know each other. A `Secret` (secret.rs) is one of the forms in elasticity.rs,
-// family.rs, friction.rs, load.rs and mechanism.rs, each of which computes its torque over a `Scene` of
-// plant.rs, and plant.rs adds the secret's torque up. case.rs calls the two special ways to draw a case,
-// saturation.rs and wide.rs, which use its numbers. logging.rs and sensors.rs, and table.rs and
+// family.rs, friction.rs, load.rs, mechanism.rs and pull.rs, each of which computes its torque over a
+// `Scene` of plant.rs, and plant.rs adds the secret's torque up. case.rs calls the two special ways to draw a
+// case, saturation.rs and wide.rs, which use its numbers. logging.rs and sensors.rs, and table.rs and
 // wide_table.rs, are each one subject in two files: the ordinary part, and what the wide suites add to it.
 mod case;
 mod certainty;

@@ -123,7 +123,7 @@ impl Search<'_> {
     }
 
     /// Calls a form of a friction that turns over a way as short as that of bristles by the friction's name,
-    /// where the joint has lost that: the two have the same torque.
+    /// where the joint has lost that: the two have the same torque, but where a log begins.
     pub(super) fn call_by_the_frictions_name(&mut self) -> Result<(), IdentificationError> {
         for place in self.declared..self.specs.len() {
             let own = &self.specs[place];
