@@ -3,37 +3,46 @@
 use super::search::Search;
 use super::trial::{Squares, Trial};
 use crate::selection::Member;
+use phiw_effects::Constants;
 use phiw_identification::{EffectSpec, IdentificationError};
 
 impl Search<'_> {
-    /// Chooses again without each general form that was found, and takes what is found in its place where
-    /// that has no more numbers, and the general form is not worth a name beside it: a stop that is not
-    /// quite a spring is still a stop.
+    /// Chooses again without each general form that was found, among what acts on its torques, and takes what
+    /// is found in its place where the criterion is smaller with it; or where the general form is not worth a
+    /// name beside it and has as many numbers or more: a stop that is not quite a spring is still a stop.
     ///
     /// Several in its place must make the criterion no larger: with enough of them any curve is drawn but for
-    /// what is not worth a name.
+    /// what is not worth a name. Where any gave way, what is missing beside its successor is sought.
     pub(super) fn prefer_simpler_forms(&mut self) -> Result<(), IdentificationError> {
         let mut asked: Vec<EffectSpec> = Vec::new();
         let mut options = self.options.clone();
+        let mut gave_way = Vec::new();
         while let Some(place) = self.general_form(&asked)? {
             let spec = self.specs[place].clone();
             asked.push(spec.clone());
-            options.excluded.push(spec);
+            let own = self.fixed.build(std::slice::from_ref(&spec))?;
+            options.torques = Some(own.iter().flat_map(|own| own.entries()).map(|entry| entry.row).collect());
+            options.excluded.push(spec.clone());
             let mut without = Search { options: &options, ..self.clone() };
             without.remove(place)?;
+            // What the others can do of its work is not to be seen in the residual.
+            without.refine()?;
             without.choose()?;
             without.refine()?;
             let in_its_place = without.specs.iter().filter(|spec| !self.has(spec)).count();
             let rows = &self.chosen.rows;
-            if without.numbers()? <= self.numbers()?
-                && self.is_done_by(place, &without)?
-                && (in_its_place <= 1 || without.value(rows)? <= self.value(rows)?)
-            {
+            let is_no_more = in_its_place <= 1 && without.numbers()? <= self.numbers()?;
+            if without.value(rows)? <= self.value(rows)? || is_no_more && self.is_done_by(place, &without)? {
                 let Search { specs, parameters, chosen, .. } = without;
                 (self.specs, self.parameters, self.chosen) = (specs, parameters, chosen);
+                gave_way.push(EffectSpec { constants: Constants::new(), ..spec });
             } else {
                 options.excluded.pop();
             }
+        }
+        if !gave_way.is_empty() {
+            self.refuted.extend(gave_way);
+            self.settle()?;
         }
         Ok(())
     }

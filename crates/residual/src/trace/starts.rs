@@ -16,24 +16,31 @@ impl Search<'_> {
     /// - Where the torques agree better once one of them is a multiple of what is logged, and still do in the
     ///   end, another start has that in force, too: to first order a factor of two is no factor, and other
     ///   effects would stand for it.
+    /// - Where the end leaves structure, another search from the same start seeks at once what makes frictions
+    ///   vary (`variation.rs`): many effects together had stood for that, and left it no work. Whether there
+    ///   is structure is asked of all logs, which end is the better one of the training logs alone.
     pub(super) fn run(self) -> Result<Tracing, IdentificationError> {
         let start = if self.fixed.prior.is_none() { self.textbook_start()? } else { None };
-        let mut best = match &start {
-            Some(start) => self.with_declared(start.clone().searched()?)?,
-            None => self.clone().searched()?,
+        let end_of = |search: Self| match &start {
+            Some(_) => self.with_declared(search.searched()?),
+            None => search.searched(),
         };
-        let is_from_textbook = start.is_some();
-        let start = start.as_ref().unwrap_or(&self);
-        if let Some(with_multiples) = start.with_multiples()?
-            && best.still_asks_for(&with_multiples.specs[start.specs.len()..])?
+        let beginning = start.as_ref().unwrap_or(&self);
+        let mut best = end_of(beginning.clone())?;
+        if let Some(with_multiples) = beginning.with_multiples()?
+            && best.still_asks_for(&with_multiples.specs[beginning.specs.len()..])?
         {
-            let other = with_multiples.searched()?;
-            let other = if is_from_textbook { self.with_declared(other)? } else { other };
+            let other = end_of(with_multiples)?;
             if other.is_better_than(&best)? {
                 best = other;
             }
         }
-        best.finish()
+        let tracing = best.clone().finish()?;
+        if tracing.remaining.joints.is_empty() || !beginning.may_vary() {
+            return Ok(tracing);
+        }
+        let other = end_of(Search { asks_of_variation: true, ..beginning.clone() })?;
+        if other.is_better_than(&best)? { other.finish() } else { Ok(tracing) }
     }
 
     /// The start that has what the textbook has of every joint and limits of drives, all of it declared by

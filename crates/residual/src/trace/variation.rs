@@ -7,8 +7,7 @@ impl Search<'_> {
     /// Seeks them beside the model, and chooses all anew where one was found: what had done its work badly
     /// leaves.
     pub(super) fn ask_of_variation(&mut self) -> Result<(), IdentificationError> {
-        let is_varied = |kind: &str| self.specs.iter().any(|spec| spec.kind == kind);
-        if !self.grows || !self.fixed.catalogue.kinds().filter_map(|kind| kind.varies()).any(is_varied) {
+        if !self.may_vary() {
             return Ok(());
         }
         // What is in the model stays as it is until one is found.
@@ -21,6 +20,12 @@ impl Search<'_> {
             *self = asked;
         }
         Ok(())
+    }
+
+    /// Whether the model has anything that such a kind makes vary, and may grow.
+    pub(super) fn may_vary(&self) -> bool {
+        let is_in_model = |kind: &str| self.specs.iter().any(|spec| spec.kind == kind);
+        self.grows && self.fixed.catalogue.kinds().filter_map(|kind| kind.varies()).any(is_in_model)
     }
 
     /// Whether an effect was found that makes the size of another vary.

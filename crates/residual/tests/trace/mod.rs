@@ -6,6 +6,7 @@ mod held_model;
 mod leading_friction;
 mod limits;
 mod missing_effects;
+mod moving_alike;
 mod robot;
 mod sticking;
 mod structure;

@@ -117,7 +117,7 @@ pub fn traced_recording(
     let identified = |log: &Recording, train: Vec<Fold>| {
         let blocks = log.blocks(&conditioning).unwrap();
         let sources: Vec<&dyn BlockSource> = vec![&blocks];
-        let data = Data { train, held_out: folds().1, sources, rest_speeds: vec![0.01; 2] };
+        let data = Data { train, held_out: folds().1, sources, rest_speeds: vec![0.01; tree.joint_count()] };
         let declared: Vec<Variants> =
             declared.iter().flat_map(|kind| catalogue.declare(kind, tree, &ranges).unwrap()).collect();
         identify(tree, declared, &data).unwrap()
@@ -135,7 +135,7 @@ pub fn traced_recording(
     let start = clean.unwrap_or_else(|| identified(log, train.clone()));
     let blocks = log.blocks(&conditioning).unwrap();
     let sources: Vec<&dyn BlockSource> = vec![&blocks];
-    let data = Data { train, held_out: folds().1, sources, rest_speeds: vec![0.01; 2] };
+    let data = Data { train, held_out: folds().1, sources, rest_speeds: vec![0.01; tree.joint_count()] };
     let plan = conditioning.plan(&surveys[0]).unwrap();
     let input = TraceInput {
         tree,
@@ -146,7 +146,14 @@ pub fn traced_recording(
         parameters: start.fit.parameters.clone(),
         residual_std: start.fit.residual_std.clone(),
         held,
-        noise_floor: noise_floor(tree, &[0.0; 2], &surveys, &conditioning, &data.sources).unwrap(),
+        noise_floor: noise_floor(
+            tree,
+            &vec![0.0; tree.joint_count()],
+            &surveys,
+            &conditioning,
+            &data.sources,
+        )
+        .unwrap(),
         rows_per_independent: plan.output_rate_hz() / (2.0 * conditioning.parallel_cutoff_hz),
     };
     trace(input, &TraceOptions::default()).unwrap()
