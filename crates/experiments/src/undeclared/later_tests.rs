@@ -78,6 +78,22 @@ fn joints_that_stick_creep_below_what_their_encoders_show() {
 }
 
 #[test]
+fn joints_that_move_alike_follow_one_motion() {
+    check(Situation::MovingAlike, |case, log| {
+        let stamps = column(log, "t");
+        let speeds: Vec<Vec<f64>> = (0..case.robot.joints())
+            .map(|joint| stamps.iter().map(|t| case.motions[0].state(joint, *t)[1]).collect())
+            .collect();
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        for other in &speeds[1..] {
+            let alike =
+                product(&speeds[0], other) / (product(&speeds[0], &speeds[0]) * product(other, other)).sqrt();
+            assert!(alike.abs() > 0.8 && alike.abs() < 1.0 - 1e-9, "{alike}");
+        }
+    });
+}
+
+#[test]
 fn in_turn_one_joint_moves_at_a_time() {
     check(Situation::InTurn, |case, log| {
         let stamps = column(log, "t");

@@ -47,6 +47,7 @@
 // `Scene` of plant.rs, and plant.rs adds the secret's torque up. case.rs calls the two special ways to draw a
 // case, saturation.rs and wide.rs, which use its numbers. logging.rs and sensors.rs, and table.rs and
 // wide_table.rs, are each one subject in two files: the ordinary part, and what the wide suites add to it.
+mod alike;
 mod case;
 mod certainty;
 mod distortion;

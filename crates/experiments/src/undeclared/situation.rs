@@ -78,11 +78,14 @@ pub enum Situation {
     /// Joints stick where they reverse: for a tenth of a second or more they creep by less than their coarse
     /// encoders show, while the dry friction goes from one end to the other.
     Sticking,
+    /// All joints go forth and back together, each with little of its own motion: much of what one torque has
+    /// could be of another joint's.
+    MovingAlike,
 }
 
 impl Situation {
     /// All situations.
-    pub const ALL: [Situation; 31] = [
+    pub const ALL: [Situation; 32] = [
         Situation::White,
         Situation::ShortColour,
         Situation::Colour,
@@ -114,11 +117,12 @@ impl Situation {
         Situation::SoftConstraint,
         Situation::DifferencedVelocity,
         Situation::Sticking,
+        Situation::MovingAlike,
     ];
     /// Those of the first cases of each suite: so many there were when these were drawn first.
     pub const FIRST: usize = Situation::BLOCKS[0].1;
     /// Situations that came together: the index of their first case, and how many they are.
-    const BLOCKS: [(usize, usize); 10] = [
+    const BLOCKS: [(usize, usize); 11] = [
         (0, 15),
         (50_000, 7),
         (60_000, 1),
@@ -129,6 +133,7 @@ impl Situation {
         (97_000, 1),
         (98_000, 1),
         (99_000, 1),
+        (99_500, 1),
     ];
 
     /// The situation of the case of this index: those of its block in turn.

@@ -339,7 +339,7 @@ fn sticking(states: &[JointState], share: f64) -> Vec<JointState> {
 }
 
 /// Where a joint may go, and how fast.
-struct Room {
+pub(super) struct Room {
     lower: f64,
     upper: f64,
     velocity: f64,
@@ -352,7 +352,7 @@ impl Room {
     }
 }
 
-fn room(tree: &Tree, joint: usize) -> Room {
+pub(super) fn room(tree: &Tree, joint: usize) -> Room {
     let limits = tree.joint(joint).limits;
     Room {
         lower: limits.lower.max(-UNLIMITED_REACH),
@@ -372,7 +372,7 @@ fn fourier_joint(
     let harmonics = (highest / fundamental) as usize;
     let decay = rng.uniform(0.7, 1.3);
     let count = 6 + rng.index(5);
-    let mut terms: Vec<[f64; 3]> = (0..count)
+    let terms: Vec<[f64; 3]> = (0..count)
         .map(|number| {
             // Spread evenly in the logarithm, lowest and highest always among them.
             let position = (number as f64 + rng.uniform(-0.4, 0.4)) / (count - 1) as f64;
@@ -384,6 +384,17 @@ fn fourier_joint(
             ]
         })
         .collect();
+    placed(terms, room, rng, duration, reach)
+}
+
+/// A finite Fourier series as wide and as fast as a joint may be, or less, and where it may be.
+pub(super) fn placed(
+    mut terms: Vec<[f64; 3]>,
+    room: Room,
+    rng: &mut CaseRng,
+    duration: f64,
+    reach: Option<Reach>,
+) -> JointMotion {
     let unscaled = JointMotion::Fourier { center: 0.0, terms: terms.clone() };
     let mut extent = [0.0_f64, 0.0];
     let mut fastest = 0.0_f64;

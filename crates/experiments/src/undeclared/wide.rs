@@ -168,6 +168,10 @@ fn motions(
             let draw = |start| tamed(robot, Trajectory::strokes(tree, rng, start, DURATION, reach), reach);
             STARTS.into_iter().map(draw).collect()
         }
+        Situation::MovingAlike => {
+            let draw = |start| tamed(robot, Trajectory::alike(tree, rng, start, DURATION, reach), reach);
+            STARTS.into_iter().map(draw).collect()
+        }
         Situation::InTurn => {
             let moves = MOVES_IN_TURN[0] + rng.index(MOVES_IN_TURN[1] - MOVES_IN_TURN[0] + 1);
             let mut start = 0.0;
