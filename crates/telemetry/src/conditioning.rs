@@ -22,7 +22,8 @@ pub struct ConditioningOptions {
     /// Whether the columns `qd.<joint>`, `qdd.<joint>` are used where there are plausible ones, instead of
     /// differentiating.
     pub use_measured_derivatives: bool,
-    /// Leading samples of a block that no output covers, in seconds.
+    /// Leading samples of a block that no output covers, in seconds: effects with memory run over them first,
+    /// so that they do not begin anew in each block.
     #[serde(with = "crate::any_number")]
     pub warm_up: f64,
     /// About how many samples a block has.
@@ -37,7 +38,7 @@ impl Default for ConditioningOptions {
             decimation: None,
             clock: ClockChoice::Auto,
             use_measured_derivatives: true,
-            warm_up: 0.0,
+            warm_up: 2.0,
             block_samples: 1 << 13,
         }
     }

@@ -5,6 +5,7 @@ mod declared;
 mod held_model;
 mod leading_friction;
 mod limits;
+mod memory;
 mod missing_effects;
 mod moving_alike;
 mod robot;
