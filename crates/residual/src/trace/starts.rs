@@ -16,9 +16,9 @@ impl Search<'_> {
     /// - Where the torques agree better once one of them is a multiple of what is logged, and still do in the
     ///   end, another start has that in force, too: to first order a factor of two is no factor, and other
     ///   effects would stand for it.
-    /// - Where the end leaves structure, another search from the same start seeks at once what makes frictions
-    ///   vary (`variation.rs`): many effects together had stood for that, and left it no work. Whether there
-    ///   is structure is asked of all logs, which end is the better one of the training logs alone.
+    /// - Where the end leaves structure, another search from the same start seeks what makes frictions vary
+    ///   at once (`variation.rs`): many effects together had stood for that, and left it no work. Whether
+    ///   there is structure is asked of all logs, which end is the better one of the training logs alone.
     pub(super) fn run(self) -> Result<Tracing, IdentificationError> {
         let start = if self.fixed.prior.is_none() { self.textbook_start()? } else { None };
         let end_of = |search: Self| match &start {

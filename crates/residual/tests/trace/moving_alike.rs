@@ -27,8 +27,8 @@ const FRICTION: [(f64, f64); 3] = [(0.06, 0.5), (0.07, 0.3), (0.1, 0.3)];
 /// What the hip cogs with \[N·m\].
 const COGGING: f64 = 0.08;
 
-/// All joints follow the same rounded triangle, each with a little of its own. The dry friction of the calf is
-/// `(1 + slope·x)` times as large at a share x of its stroke, from −1 to 1, and the hip cogs.
+/// All joints follow the same rounded triangle, each with a little of its own. The dry friction of the calf
+/// is `(1 + slope·x)` times as large at a share x of its stroke, from −1 to 1, and the hip cogs.
 fn leg(seed: u64, slope: f64) -> Recording {
     let tree = read_urdf(URDF, &UrdfOptions::default()).unwrap().tree;
     let mut random = RandomNumbers::new(seed);
@@ -87,8 +87,8 @@ fn leg(seed: u64, slope: f64) -> Recording {
     recording
 }
 
-/// Friction that varies was sought once all that is simpler had been. By then a friction of the load stood for
-/// this one and for the Coulomb friction, and three times as much was left.
+/// Friction that varies was sought once all that is simpler had been. By then a friction of the load stood
+/// for this one and for the Coulomb friction, and three times as much was left.
 #[test]
 fn a_friction_that_others_stand_for_is_found_from_another_start() {
     let tree = read_urdf(URDF, &UrdfOptions::default()).unwrap().tree;
