@@ -1,7 +1,8 @@
 //! Kinds that make the size of others vary: sought once all that is simpler has been.
 
 use super::search::Search;
-use phiw_identification::IdentificationError;
+use phiw_effects::EffectKind;
+use phiw_identification::{EffectSpec, IdentificationError};
 
 impl Search<'_> {
     /// Seeks them beside the model, and chooses all anew where one was found: what had done its work badly
@@ -22,10 +23,17 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Whether the model has anything that such a kind makes vary, and may grow.
+    /// Whether the model has anything that such a kind may make vary, and may grow.
     pub(super) fn may_vary(&self) -> bool {
-        let is_in_model = |kind: &str| self.specs.iter().any(|spec| spec.kind == kind);
-        self.grows && self.fixed.catalogue.kinds().filter_map(|kind| kind.varies()).any(is_in_model)
+        let may_vary = |kind: &dyn EffectKind| {
+            let is_excluded = |varied: &EffectSpec| {
+                let mut excluded = self.options.excluded.iter();
+                excluded.any(|own| own.kind == kind.name() && own.joints == varied.joints)
+            };
+            let mut varied = self.specs.iter().filter(|spec| Some(spec.kind.as_str()) == kind.varies());
+            varied.any(|varied| !is_excluded(varied))
+        };
+        self.grows && self.fixed.catalogue.kinds().any(may_vary)
     }
 
     /// Whether an effect was found that makes the size of another vary.
