@@ -106,7 +106,8 @@ pub(super) struct Search<'a> {
     pub asks_of_logs: bool,
     /// Whether kinds that make the size of others vary are sought, too.
     pub asks_of_variation: bool,
-    /// Effects that promised more to first order than they held in force: they are not sought again.
+    /// Effects that are not sought again: they promised more to first order than they held in force, or gave
+    /// way to simpler forms.
     pub refuted: Vec<EffectSpec>,
     /// Kinds and joints of which no parameter is certain once their constants are free: they have no name.
     pub uncertain: Vec<(String, Vec<String>)>,

@@ -1,4 +1,5 @@
-//! Kinds that make the size of others vary: sought once all that is simpler has been.
+//! Kinds that make the size of others vary: sought once all that is simpler has been, and at once in another
+//! search where that leaves structure (`starts.rs`).
 
 use super::search::Search;
 use phiw_effects::EffectKind;
