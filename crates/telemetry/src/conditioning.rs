@@ -30,6 +30,10 @@ pub struct ConditioningOptions {
     pub block_samples: usize,
 }
 
+/// Samples before a stretch that effects with memory run over first, in seconds: long against what a joint's
+/// friction takes to forget.
+pub const WARM_UP_S: f64 = 2.0;
+
 impl Default for ConditioningOptions {
     fn default() -> Self {
         ConditioningOptions {
@@ -38,7 +42,7 @@ impl Default for ConditioningOptions {
             decimation: None,
             clock: ClockChoice::Auto,
             use_measured_derivatives: true,
-            warm_up: 2.0,
+            warm_up: WARM_UP_S,
             block_samples: 1 << 13,
         }
     }

@@ -49,7 +49,7 @@ mod zero_rows;
 
 pub use block::{Block, Signals};
 pub use columns::TorqueColumns;
-pub use conditioning::{Conditioning, ConditioningOptions};
+pub use conditioning::{Conditioning, ConditioningOptions, WARM_UP_S};
 pub use contents::LogContents;
 pub use controller_signal::ControllerSignal;
 pub use error::LogError;

@@ -2,14 +2,12 @@
 //! measure by all.
 
 use phiw_identification::{BlockSource, Data, Fold, IdentificationError, KeptBlocks};
-use phiw_telemetry::Block;
+use phiw_telemetry::{Block, WARM_UP_S};
 
 /// Samples that the search looks at, at most: a minute or two of motion.
 const SEARCHED_SAMPLES: f64 = 30_000.0;
 /// Length of a piece \[s\]: long against a residual's correlation and against the filters' reach.
 const PIECE_S: f64 = 5.0;
-/// What comes before a piece, for effects with memory \[s\].
-const WARM_UP_S: f64 = 2.0;
 /// Blocks that short logs are cut into, at least, so that every processor has one; none is shorter than what
 /// comes before it.
 const LEAST_BLOCKS: usize = 4;

@@ -9,12 +9,27 @@ use phiw_telemetry::Recording;
 use std::f64::consts::TAU;
 
 const URDF: &str = r#"<robot name="leg"><link name="base"/>
-  <link name="upper"><inertial><origin xyz="0 0.02 0"/><mass value="0.7"/><inertia ixx="0.0008" iyy="0.0008" izz="0.0003" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <link name="middle"><inertial><origin xyz="0 0 -0.03"/><mass value="1.2"/><inertia ixx="0.006" iyy="0.006" izz="0.002" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <link name="lower"><inertial><origin xyz="0 0 -0.09"/><mass value="0.25"/><inertia ixx="0.002" iyy="0.002" izz="0.0007" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="hip" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="20" velocity="20"/></joint>
-  <joint name="thigh" type="revolute"><parent link="upper"/><child link="middle"/><origin xyz="0 0.1 0"/><axis xyz="0 1 0"/><limit lower="-1" upper="3" effort="20" velocity="20"/></joint>
-  <joint name="calf" type="revolute"><parent link="middle"/><child link="lower"/><origin xyz="0 0 -0.21"/><axis xyz="0 1 0"/><limit lower="-3" upper="0" effort="20" velocity="20"/></joint>
+  <link name="upper">
+    <inertial><origin xyz="0 0.02 0"/>
+    <mass value="0.7"/>
+    <inertia ixx="0.0008" iyy="0.0008" izz="0.0003" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="middle">
+    <inertial><origin xyz="0 0 -0.03"/>
+    <mass value="1.2"/>
+    <inertia ixx="0.006" iyy="0.006" izz="0.002" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="lower">
+    <inertial><origin xyz="0 0 -0.09"/>
+    <mass value="0.25"/>
+    <inertia ixx="0.002" iyy="0.002" izz="0.0007" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="hip" type="revolute">
+    <parent link="base"/><child link="upper"/>
+    <axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="20" velocity="20"/></joint>
+  <joint name="thigh" type="revolute">
+    <parent link="upper"/><child link="middle"/><origin xyz="0 0.1 0"/>
+    <axis xyz="0 1 0"/><limit lower="-1" upper="3" effort="20" velocity="20"/></joint>
+  <joint name="calf" type="revolute">
+    <parent link="middle"/><child link="lower"/><origin xyz="0 0 -0.21"/>
+    <axis xyz="0 1 0"/><limit lower="-3" upper="0" effort="20" velocity="20"/></joint>
 </robot>"#;
 
 /// Middle of each joint's motion, and how far it goes to either side \[rad\].
@@ -56,11 +71,11 @@ fn leg(seed: u64, slope: f64) -> Recording {
             let (sine, cosine) = (angle - lags[joint]).sin_cos();
             let left = 1.0 - (ROUNDED * sine).powi(2);
             let way = STROKES[joint].1 * 4.0 / TAU;
-            let slope = ROUNDED * cosine / left.sqrt();
+            let rise = ROUNDED * cosine / left.sqrt();
             let curvature = -ROUNDED * sine * (1.0 - ROUNDED * ROUNDED) / left.powf(1.5);
             q[joint] = STROKES[joint].0 + way * (ROUNDED * sine).asin();
-            qd[joint] = way * slope * speed;
-            qdd[joint] = way * (curvature * speed * speed + slope * gain);
+            qd[joint] = way * rise * speed;
+            qdd[joint] = way * (curvature * speed * speed + rise * gain);
         }
         for (index, [amplitude, frequency, phase]) in own.iter().enumerate() {
             let (sine, cosine) = (frequency * t + phase).sin_cos();
