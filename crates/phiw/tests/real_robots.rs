@@ -44,32 +44,44 @@ fn real_robots_end_the_same_whatever_was_declared() {
             &["viscous_friction", "coulomb_friction"],
             &["viscous_friction", "coulomb_friction", "torque_offset", "rotor_inertia"],
         ];
-        let errors = declared.map(|declared| {
-            let out = tempfile::tempdir().unwrap();
-            let session = SessionArguments {
-                urdf: logs.join(urdf),
-                train: train.iter().flat_map(|start| files(&logs, start)).collect(),
-                validate: files(&logs, validate),
-                declare: declared.iter().map(|&kind| kind.to_owned()).collect(),
-                out: out.path().to_path_buf(),
-                quiet: true,
-                ..SessionArguments::default()
-            };
-            let arguments = ExplainArguments {
-                session,
-                model: None,
-                draws: 0,
-                exclude: Vec::new(),
-                false_name_rate: None,
-                threshold: Vec::new(),
-            };
-            let report = phiw::explain::explain(&arguments, &Console::silent()).unwrap().report;
-            report.after.validate.relative.unwrap()
-        });
+        let errors = declared.map(|declared| held_out_error(&logs, (urdf, train, validate), declared));
         let best = errors.into_iter().fold(f64::INFINITY, f64::min);
-        // 5 % is what is asked. The KR300 does not keep it: 5.10, 4.80 and 5.46 %. Which of its ends is
-        // reached hangs on little things; none may be worse than from one start only (7.23 %).
-        let most = if robot == "kr300" { 0.0735 } else { 1.05 * best };
-        assert!(errors.iter().all(|error| *error < most), "{robot}: {errors:?}");
+        assert!(errors.iter().all(|error| *error < 1.05 * best), "{robot}: {errors:?}");
     }
+}
+
+/// From viscous and Coulomb friction and rotor inertia the KR300 ended at 6.7 %, with nothing named: after
+/// one of two dozen effects had left, the last step of the constants took a compliance of 3·10⁻⁶ rad/(N·m)
+/// to 0.04, and beside that nearly all others did harm. From nothing it ends at 4.97 %.
+#[test]
+fn a_compliance_goes_no_further_than_the_criterion_says() {
+    let Some(logs) = logs_of("kr300") else { return };
+    let files = ("kr300.urdf", &["traj_A", "traj_B"][..], "traj_C");
+    let error = held_out_error(&logs, files, &["viscous_friction", "coulomb_friction", "rotor_inertia"]);
+    assert!(error < 1.05 * 0.0497, "{error}");
+}
+
+/// The relative error held out that `explain` ends with: of a URDF, of the training logs whose names begin
+/// so, and of the validation logs.
+fn held_out_error(logs: &Path, (urdf, train, validate): (&str, &[&str], &str), declared: &[&str]) -> f64 {
+    let out = tempfile::tempdir().unwrap();
+    let session = SessionArguments {
+        urdf: logs.join(urdf),
+        train: train.iter().flat_map(|start| files(logs, start)).collect(),
+        validate: files(logs, validate),
+        declare: declared.iter().map(|&kind| kind.to_owned()).collect(),
+        out: out.path().to_path_buf(),
+        quiet: true,
+        ..SessionArguments::default()
+    };
+    let arguments = ExplainArguments {
+        session,
+        model: None,
+        draws: 0,
+        exclude: Vec::new(),
+        false_name_rate: None,
+        threshold: Vec::new(),
+    };
+    let report = phiw::explain::explain(&arguments, &Console::silent()).unwrap().report;
+    report.after.validate.relative.unwrap()
 }

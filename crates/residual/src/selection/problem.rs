@@ -132,6 +132,12 @@ impl Problem {
         &self.hypotheses[member.hypothesis].variants[member.variant]
     }
 
+    /// The rows of each torque over those that the conditioning alone makes one.
+    pub fn independent_rows(&self) -> Vec<f64> {
+        let of_torque = |torque: &Torque| (torque.whole.rows() / self.rows_per_independent).max(2.0);
+        self.torques.iter().map(of_torque).collect()
+    }
+
     /// For each parameter whether it is in every model, or a declared hypothesis's.
     pub fn given(&self) -> Vec<bool> {
         let mut given = vec![false; self.parameters];

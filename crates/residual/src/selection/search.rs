@@ -106,11 +106,7 @@ pub(crate) fn choose_variants(problem: &Problem, start: Vec<Member>, policy: Pol
 
 impl<'a> Search<'a> {
     fn new(problem: &'a Problem, start: Vec<Member>, policy: Policy) -> Self {
-        let rows: Vec<f64> = problem
-            .torques
-            .iter()
-            .map(|torque| (torque.whole.rows() / problem.rows_per_independent).max(2.0))
-            .collect();
+        let rows = problem.independent_rows();
         let fit = Fit::new(problem, problem.active(&start), &rows, None);
         let model = Model { members: start, fit, value: 0.0, settled: true };
         let mut search =

@@ -15,8 +15,7 @@ pub(crate) struct Judged {
 impl Judged {
     /// A model whose torques have these effective rows.
     pub fn new(problem: Problem, members: &[Member], rows: &[f64]) -> Self {
-        let fit = Fit::new(&problem, problem.active(members), rows, None);
-        let value = criterion(&problem, members, &fit, rows);
+        let (fit, value) = fitted(&problem, members, rows);
         Judged { problem, fit, value }
     }
 
@@ -55,6 +54,17 @@ impl Judged {
         }
         folds
     }
+}
+
+/// The criterion of a model whose torques have these effective rows.
+pub(crate) fn value_of(problem: &Problem, members: &[Member], rows: &[f64]) -> f64 {
+    fitted(problem, members, rows).1
+}
+
+fn fitted(problem: &Problem, members: &[Member], rows: &[f64]) -> (Fit, f64) {
+    let fit = Fit::new(problem, problem.active(members), rows, None);
+    let value = criterion(problem, members, &fit, rows);
+    (fit, value)
 }
 
 /// P(t > `total` over its standard deviation), with the spread of the folds' parts of it.
