@@ -22,7 +22,20 @@ impl EffectKind for Payload {
         "the same motion with and without the payload"
     }
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
-        format!("The link behind {} carries {} more than the model knows.", found.joints(), found.quantity(0))
+        let joint = found.joints();
+        if found.value(0) != 0.0 {
+            return format!(
+                "The link behind {joint} carries {} more than the model knows.",
+                found.quantity(0)
+            );
+        }
+        match largest(found, 1..4).or_else(|| largest(found, 4..PARAMETERS_PER_BODY)) {
+            Some((name, value)) => format!(
+                "The link behind {joint} carries something that the model does not know: {name} of {value}; its \
+                 mass the logs do not tell."
+            ),
+            None => found.plainly(),
+        }
     }
     fn seen_against(&self) -> Signal {
         Signal::Position
@@ -55,6 +68,15 @@ impl EffectKind for Payload {
     }
 }
 
+/// The largest of some parameters of the same effect, by its name and with its unit; `None` where the logs
+/// tell none of them.
+fn largest<'a>(found: &FittedEffect<'a>, places: std::ops::Range<usize>) -> Option<(&'a str, String)> {
+    let size = |place: &usize| found.value(*place).abs();
+    let place = places.filter(|place| size(place) > 0.0).max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let (name, value) = found.named_values().nth(place)?;
+    Some((name, found.in_unit_of(place, value.abs())))
+}
+
 /// A constant force in the world's frame on a link, at a point fixed in the link: F and the nine products of
 /// F with the point.
 ///
@@ -70,8 +92,25 @@ impl EffectKind for ExternalForce {
         "rests in many poses, with and without what pulls"
     }
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
-        let (joint, force) = (found.joints(), found.quantity(0));
-        format!("Something pulls at the link behind {joint} (a hose, a cable): {force} along x.")
+        let start = format!("Something pulls at the link behind {} (a hose, a cable)", found.joints());
+        let (told, untold): (Vec<usize>, Vec<usize>) = (0..3).partition(|&axis| found.value(axis) != 0.0);
+        let axes =
+            |places: &[usize]| -> Vec<&str> { places.iter().map(|&axis| ["x", "y", "z"][axis]).collect() };
+        let force: Vec<String> = (told.iter().zip(axes(&told)))
+            .map(|(&axis, name)| format!("{} along {name}", found.quantity(axis)))
+            .collect();
+        match (force.is_empty(), untold.is_empty(), largest(found, 3..found.values().len())) {
+            (false, true, _) => format!("{start}: {} of the world.", force.join(", ")),
+            (false, false, _) => format!(
+                "{start}: {} of the world; along {} the logs do not tell it.",
+                force.join(", "),
+                axes(&untold).join(" and ")
+            ),
+            (true, _, Some((_, moment))) => {
+                format!("{start}: its moment is up to {moment}; the force itself the logs do not tell.")
+            }
+            (true, _, None) => found.plainly(),
+        }
     }
     fn seen_against(&self) -> Signal {
         Signal::Position

@@ -252,6 +252,9 @@ impl EffectKind for Stribeck {
     fn dissipates(&self) -> bool {
         true
     }
+    fn is_beyond(&self) -> &'static [&'static str] {
+        &["coulomb_friction"]
+    }
     fn form_of(&self) -> &'static [&'static str] {
         &["viscous_friction", "coulomb_friction"]
     }

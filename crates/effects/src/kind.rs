@@ -100,6 +100,11 @@ pub trait EffectKind: Send + Sync {
         &[]
     }
 
+    /// Names of the kinds that a joint has which has this one: it is what is beyond them.
+    fn is_beyond(&self) -> &'static [&'static str] {
+        &[]
+    }
+
     /// Names of the simpler kinds whose form it polishes: it enters a model with these on the same joint, and
     /// has a name of its own only where it does what they cannot.
     fn form_of(&self) -> &'static [&'static str] {

@@ -56,7 +56,10 @@ const SENTENCES: &[(&str, &str)] = &[
     ("joint_elasticity", "The transmission of shoulder gives: 5.000e-1 rad/(N·m)."),
     ("gravity_tilt", "The base is not level: gravity leans by 3.27 degrees."),
     ("payload", "The link behind shoulder carries 0.500 kg more than the model knows."),
-    ("external_force", "Something pulls at the link behind shoulder (a hose, a cable): 0.500 N along x."),
+    (
+        "external_force",
+        "Something pulls at the link behind shoulder (a hose, a cable): 0.500 N along x, 0.250 N along y, 0.125 N along z of the world.",
+    ),
     (
         "drive_efficiency",
         "The transmission of shoulder has an efficiency of 0.67 where it drives its load and 0.75 where its load drives it.",
@@ -161,6 +164,34 @@ fn a_torque_that_is_logged_before_it_acts_is_said_to_be() {
     let effect = catalogue.kind("time_delay").unwrap().build(&tree, &[0], &Constants::new());
     let words = catalogue.sentence(&effect.spec(), &effect.parameters(), &[-0.00924]);
     assert_eq!(words, "The torque of shoulder acts 9.24 ms after it is logged.");
+}
+
+/// A force was said by its x only, and "0 N along x" where the logs told none of it, or only its moments; a
+/// payload of which they told no mass "carried 0 kg more".
+#[test]
+fn what_the_logs_do_not_tell_of_a_force_or_a_payload_is_not_said_to_be_nothing() {
+    let tree = read_urdf(ARM, &UrdfOptions::default()).unwrap().tree;
+    let catalogue = Catalogue::default();
+    let said = |kind: &str, told: &[(usize, f64)]| {
+        let effect = catalogue.kind(kind).unwrap().build(&tree, &[0], &Constants::new());
+        let mut values = vec![0.0; effect.parameters().len()];
+        told.iter().for_each(|&(place, value)| values[place] = value);
+        catalogue.sentence(&effect.spec(), &effect.parameters(), &values)
+    };
+    let pulls = "Something pulls at the link behind shoulder (a hose, a cable)";
+    assert_eq!(
+        said("external_force", &[(0, 0.03), (1, -2.0), (4, 0.5)]),
+        format!("{pulls}: 0.0300 N along x, -2.00 N along y of the world; along z the logs do not tell it.")
+    );
+    assert_eq!(
+        said("external_force", &[(3, -0.322), (4, -0.887)]),
+        format!("{pulls}: its moment is up to 0.887 N·m; the force itself the logs do not tell.")
+    );
+    assert_eq!(
+        said("payload", &[(2, -0.3), (9, 0.7)]),
+        "The link behind shoulder carries something that the model does not know: mcy of 0.300 kg·m; its mass \
+         the logs do not tell."
+    );
 }
 
 #[test]

@@ -3,6 +3,7 @@
 
 use super::case::Case;
 use super::family::Shape;
+use super::friction::Friction;
 use super::kind::{Kind, Name};
 use super::mechanism::Mechanism;
 use super::secret::{Form, Secret};
@@ -67,8 +68,8 @@ impl Truth {
     pub fn of(case: &Case) -> Self {
         let secret = |drawn: &super::case::Drawn| TrueSecret {
             kind: drawn.secret.name,
-            joints: case.robot.names(&drawn.secret.joints),
-            optional: case.robot.names(&optional(drawn)),
+            joints: case.robot.names(&[drawn.secret.joints.clone(), in_common(case, &drawn.secret)].concat()),
+            optional: case.robot.names(&[optional(drawn), in_common(case, &drawn.secret)].concat()),
             equivalents: equivalents(case, &drawn.secret),
             form: shortened(format!("{:?}", drawn.secret.form)),
             scale: drawn.secret.scale,
@@ -112,6 +113,24 @@ fn allowed(case: &Case) -> Vec<Kind> {
 
 fn optional(drawn: &super::case::Drawn) -> Vec<usize> {
     drawn.secret.joints.iter().copied().filter(|joint| !drawn.material.contains(joint)).collect()
+}
+
+/// Other joints that have a friction of this family, since they rub in one direction only: that is half as
+/// much in both directions, and a difference.
+fn in_common(case: &Case, secret: &Secret) -> Vec<usize> {
+    if !matches!(secret.form, Form::Family(_)) {
+        return Vec::new();
+    }
+    let has = |other: &Secret| match (&other.form, secret.name) {
+        (Form::Friction(Friction::Asymmetric { .. }), Name::Catalogue(Kind::ViscousFriction)) => true,
+        (Form::Friction(Friction::Asymmetric { coulomb, .. }), Name::Catalogue(Kind::CoulombFriction)) => {
+            *coulomb > 0.0
+        }
+        _ => false,
+    };
+    let others = case.secrets.iter().map(|drawn| &drawn.secret).filter(|other| has(other));
+    let joints = others.flat_map(|other| other.joints.iter().copied());
+    joints.filter(|joint| !secret.joints.contains(joint)).collect()
 }
 
 impl TrueSecret {

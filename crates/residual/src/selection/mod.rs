@@ -38,5 +38,5 @@ pub(crate) use multiple::{Multiple, multiples};
 pub(crate) use problem::{Hypothesis, Member, Prior, Problem, Torque, Variant};
 pub(crate) use products::Products;
 pub(crate) use search::{LEAST_STEP, Policy, choose_variants, select};
-pub(crate) use two_ends::{Judged, value_of};
+pub(crate) use two_ends::{Judged, value_in_force};
 pub(crate) use wald::certainty;

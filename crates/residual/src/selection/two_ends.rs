@@ -13,9 +13,11 @@ pub(crate) struct Judged {
 }
 
 impl Judged {
-    /// A model whose torques have these effective rows.
-    pub fn new(problem: Problem, members: &[Member], rows: &[f64]) -> Self {
-        let (fit, value) = fitted(&problem, members, rows);
+    /// A model whose torques have these effective rows, with what is linearised as it is in force, and no
+    /// step beyond that.
+    pub fn new(mut problem: Problem, members: &[Member], rows: &[f64]) -> Self {
+        problem.absent.fill(0.0);
+        let (fit, value) = as_in_force(&problem, members, rows);
         Judged { problem, fit, value }
     }
 
@@ -56,13 +58,19 @@ impl Judged {
     }
 }
 
-/// The criterion of a model whose torques have these effective rows.
-pub(crate) fn value_of(problem: &Problem, members: &[Member], rows: &[f64]) -> f64 {
-    fitted(problem, members, rows).1
+/// The same criterion, and the problem as it was.
+pub(crate) fn value_in_force(problem: &mut Problem, members: &[Member], rows: &[f64]) -> f64 {
+    let nothing = vec![0.0; problem.absent.len()];
+    let absent = std::mem::replace(&mut problem.absent, nothing);
+    let (_, value) = as_in_force(problem, members, rows);
+    problem.absent = absent;
+    value
 }
 
-fn fitted(problem: &Problem, members: &[Member], rows: &[f64]) -> (Fit, f64) {
-    let fit = Fit::new(problem, problem.active(members), rows, None);
+fn as_in_force(problem: &Problem, members: &[Member], rows: &[f64]) -> (Fit, f64) {
+    let free = members.iter().filter(|member| !problem.hypotheses[member.hypothesis].linearised);
+    let free: Vec<Member> = free.copied().collect();
+    let fit = Fit::new(problem, problem.active(&free), rows, None);
     let value = criterion(problem, members, &fit, rows);
     (fit, value)
 }

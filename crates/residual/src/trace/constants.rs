@@ -3,7 +3,7 @@
 use super::hypotheses::{Candidates, Present, known_of_the_site};
 use super::kept_columns::Keep;
 use super::search::Search;
-use crate::selection::{LEAST_STEP, Member, Problem, choose_variants, value_of};
+use crate::selection::{LEAST_STEP, Member, Problem, choose_variants, value_in_force};
 use phiw_effects::Constants;
 use phiw_identification::{EffectSpec, IdentificationError};
 
@@ -33,7 +33,8 @@ impl Search<'_> {
             let effects = std::mem::take(&mut candidates.effects);
             let stage = self.pass(effects, Keep::WhileThereIsRoom)?;
             let mut problem = self.fixed.problem(stage, &mut candidates)?;
-            if depends && !way.goes_on_from(self, &mut problem, &candidates.present)? {
+            let is_linearised = problem.hypotheses.iter().any(|hypothesis| hypothesis.linearised);
+            if is_linearised && !way.goes_on_from(self, &mut problem, &candidates.present)? {
                 continue;
             }
             problem.hypotheses.iter_mut().for_each(|hypothesis| hypothesis.declared = true);
@@ -154,21 +155,9 @@ impl Way {
     /// Leaves the model as it is, or where the way led to a worse one, as it was where it was best.
     fn ends(self, search: &mut Search<'_>) -> Result<(), IdentificationError> {
         let (Some((best, model)), Some(_)) = (self.best, self.moved) else { return Ok(()) };
-        let (mut problem, members) = search.as_it_is()?;
-        if value_in_force(&mut problem, &members, &self.rows) > best + LEAST_STEP {
+        if search.value(&self.rows)? > best + LEAST_STEP {
             (search.specs, search.parameters) = model;
         }
         Ok(())
     }
-}
-
-/// The criterion with what is linearised as it is in force, and no step beyond that.
-fn value_in_force(problem: &mut Problem, members: &[Member], rows: &[f64]) -> f64 {
-    let at_zero = vec![0.0; problem.absent.len()];
-    let absent = std::mem::replace(&mut problem.absent, at_zero);
-    let free = members.iter().filter(|member| !problem.hypotheses[member.hypothesis].linearised);
-    let free: Vec<Member> = free.copied().collect();
-    let value = value_of(problem, &free, rows);
-    problem.absent = absent;
-    value
 }

@@ -191,8 +191,10 @@ impl Search<'_> {
     /// has a name on most of them: where joints rub, all do that are seen to.
     fn name_families(&self, judged: &mut [Judged]) {
         for kind in self.fixed.catalogue.kinds().filter(|kind| kind.joint_property().is_some()) {
-            let is_member =
-                |judged: &&mut Judged| judged.certain && self.specs[judged.place].kind == kind.name();
+            let is_member = |judged: &&mut Judged| {
+                let is_of_kind = self.specs[judged.place].kind == kind.name();
+                judged.certain && is_of_kind && self.may_have_a_name(judged.place)
+            };
             let members: Vec<&mut Judged> = judged.iter_mut().filter(is_member).collect();
             let named = members.iter().filter(|member| member.named).count();
             if 2 * named >= members.len() {

@@ -316,16 +316,11 @@ impl Search<'_> {
 
     /// The model as it is, fitted with these effective rows of each torque.
     pub(super) fn judged(&self, rows: &[f64]) -> Result<Judged, IdentificationError> {
-        let (problem, members) = self.as_it_is()?;
-        Ok(Judged::new(problem, &members, rows))
-    }
-
-    /// The model as it is, with nothing to choose from.
-    pub(super) fn as_it_is(&self) -> Result<(Problem, Vec<Member>), IdentificationError> {
         let mut candidates =
             Candidates::of_model(self.fixed, Present { specs: &self.specs, declared: self.declared });
         let stage = self.pass(Vec::new(), Keep::WhileThereIsRoom)?;
-        Ok((self.fixed.problem(stage, &mut candidates)?, candidates.present))
+        let problem = self.fixed.problem(stage, &mut candidates)?;
+        Ok(Judged::new(problem, &candidates.present, rows))
     }
 
     /// Puts another effect, with its parameters at nothing, in the place of one.

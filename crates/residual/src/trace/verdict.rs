@@ -205,14 +205,16 @@ impl Search<'_> {
     }
 
     /// Of the `named` effects, the first that were found, those of which no parameter is certain: the 95 %
-    /// interval of each holds nothing. What the textbook has of each joint is one with that of the others,
-    /// and stays.
+    /// interval of each holds nothing, about its value or about the one that it has with the effects' constants
+    /// free. But what others on the same joint are beyond is there with them: the
+    /// level that a Stribeck friction rises from is hardly told where that is wide.
     fn uncertain(
         &self,
         model: &Identified,
         named: usize,
     ) -> Result<Vec<(String, Vec<String>)>, IdentificationError> {
         let mut uncertain = Vec::new();
+        let quantile = model.fit.covariance.quantile_95();
         for (place, effect) in model.design.effects().iter().enumerate().skip(self.declared).take(named) {
             let EffectSpec { kind, joints, constants } = effect.spec();
             let own = model.design.effect_parameters(place);
@@ -220,15 +222,26 @@ impl Search<'_> {
                 // Of what is linearised the value stands partly in the constant of the same name.
                 let in_force = constants.get(&info.name).copied().unwrap_or_default();
                 let [low, high] = model.fit.intervals_95[parameter];
+                let half = quantile * model.fit.standard_deviations[parameter];
+                let value = in_force + model.fit.parameters[parameter];
                 // Logs too short for an interval (NaN) say nothing against it.
-                !(in_force + low <= 0.0 && in_force + high >= 0.0)
+                !(in_force + low <= 0.0 && in_force + high >= 0.0 || value.abs() <= half)
             });
-            let of_the_textbook = self.fixed.catalogue.kind(&kind)?.joint_property().is_some();
-            if !is_certain && !of_the_textbook {
+            if !is_certain && !self.is_below_another(&kind, &joints)? {
                 uncertain.push((kind, joints));
             }
         }
         Ok(uncertain)
+    }
+
+    /// Whether another effect of the model, on the same joints, is what is beyond this kind.
+    fn is_below_another(&self, kind: &str, joints: &[String]) -> Result<bool, IdentificationError> {
+        for other in self.specs.iter().filter(|other| other.joints == joints) {
+            if self.fixed.catalogue.kind(&other.kind)?.is_beyond().contains(&kind) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// Whether other constants of the declared effects make the error on motion held out larger than it was
