@@ -441,3 +441,18 @@ fn an_effect_is_not_hidden_by_the_noise_of_another_joint() {
         assert_eq!(named(&tracing), [("torque_ripple".to_owned(), vec!["elbow".to_owned()])], "{seed}");
     }
 }
+
+/// The elbow has no viscous friction. Beside a quadratic and a wide Stribeck friction it was found to have one
+/// of 0.001 N·m·s/rad, within its error of nothing, and had the name, since the shoulder has it.
+#[test]
+fn a_joint_has_no_friction_of_the_others_of_which_nothing_is_certain() {
+    let secret = |state: &State<'_>, torque: &mut [f64]| {
+        let [shoulder, elbow] = [state.qd[0], state.qd[1]];
+        torque[0] += 0.3 * shoulder * shoulder.abs();
+        torque[1] -= 0.4 * elbow;
+        torque[1] += 0.25 * elbow * elbow.abs() + 0.5 * (-(elbow / 0.3).abs()).exp() * (elbow / 0.01).tanh();
+    };
+    let named = named(&traced_on(folds().0, &[], 11, &secret, false));
+    let viscous = |joint: &str| named.contains(&("viscous_friction".to_owned(), vec![joint.to_owned()]));
+    assert!(viscous("shoulder") && !viscous("elbow"), "{named:?}");
+}

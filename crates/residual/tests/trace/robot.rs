@@ -4,8 +4,10 @@ use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Tree, Workspace};
 use phiw_effects::{Catalogue, SignalRanges};
-use phiw_identification::{BlockSource, Data, Fold, Model, Variants, identify};
-use phiw_residual::trace::{HeldModel, TraceInput, TraceOptions, Tracing, Verdict, noise_floor, trace};
+use phiw_identification::{BlockSource, Data, Fold, Identified, Model, Variants, identify};
+use phiw_residual::trace::{
+    FoundEffect, HeldModel, TraceInput, TraceOptions, Tracing, Verdict, noise_floor, trace,
+};
 use phiw_telemetry::{Conditioning, ConditioningOptions, Recording};
 
 pub const URDF: &str = r#"<robot name="two_links"><link name="base"/>
@@ -156,7 +158,33 @@ pub fn traced_recording(
         .unwrap(),
         rows_per_independent: plan.output_rate_hz() / (2.0 * conditioning.parallel_cutoff_hz),
     };
-    trace(input, &TraceOptions::default()).unwrap()
+    let is_held = input.held.is_some();
+    let tracing = trace(input, &TraceOptions::default()).unwrap();
+    if !is_held {
+        each_name_is_certain(&tracing);
+    }
+    tracing
+}
+
+/// Of each effect with a name one constant at least is not within its error of nothing; but a Stribeck
+/// friction has the Coulomb friction below it, however the two share what they are.
+fn each_name_is_certain(tracing: &Tracing) {
+    let Identified { design, fit, .. } = &tracing.model;
+    let quantile = fit.covariance.quantile_95();
+    for FoundEffect { spec, .. } in &tracing.effects {
+        let place = tracing.specs.iter().position(|other| other == spec).unwrap();
+        let own = design.effect_parameters(place).zip(design.effects()[place].parameters());
+        let is_certain = own.clone().any(|(parameter, info)| {
+            let in_force = spec.constants.get(&info.name).copied().unwrap_or_default();
+            (in_force + fit.parameters[parameter]).abs() > quantile * fit.standard_deviations[parameter]
+        });
+        let has_stribeck = tracing
+            .specs
+            .iter()
+            .any(|other| other.kind == "stribeck_friction" && other.joints == spec.joints);
+        let values: Vec<f64> = own.map(|(parameter, _)| fit.parameters[parameter]).collect();
+        assert!(is_certain || spec.kind == "coulomb_friction" && has_stribeck, "{spec:?} {values:?}");
+    }
 }
 
 pub fn named(tracing: &Tracing) -> Vec<(String, Vec<String>)> {
