@@ -381,3 +381,28 @@ fn old_seeds_give_the_logs_that_they_always_gave() {
 /// Sum of the magnitudes of all cells of `train_a.csv`.
 const OLD_SUMS: [(u64, f64); 3] =
     [(1_000_003, 588982.401526), (1_100_001, 504060.509541), (1_300_002, 579449.540858)];
+
+/// What rubs in one direction only rubs half as much in both, and has a difference: that it is named so on a
+/// joint which the family of frictions leaves out is no error.
+#[test]
+fn a_joint_that_rubs_in_one_direction_may_have_a_friction_of_the_family() {
+    let robots = models();
+    let mut found = 0;
+    for index in 0..30 {
+        let spec =
+            Spec::of_seed(Suite::WideEffects.seed(Seeds::Dev, index), 5).expect("every index has a case");
+        let Some(case) = Case::draw(&Spec { robot: 0, ..spec }, &robots[..1]) else { continue };
+        let truth = Truth::of(&case);
+        let of_kind =
+            |kind: Kind| truth.secrets.iter().filter(move |secret| secret.kind == Name::Catalogue(kind));
+        for asymmetric in of_kind(Kind::AsymmetricFriction) {
+            for viscous in of_kind(Kind::ViscousFriction).filter(|secret| secret.joints.len() > 1) {
+                let joint = &asymmetric.joints[0];
+                assert!(viscous.joints.contains(joint), "{index}: {joint}");
+                assert!(viscous.optional.contains(joint), "{index}: {joint}");
+                found += 1;
+            }
+        }
+    }
+    assert!(found > 1, "{found} of thirty cases have both");
+}
