@@ -205,8 +205,8 @@ impl Search<'_> {
     }
 
     /// Of the `named` effects, the first that were found, those of which no parameter is certain: the 95 %
-    /// interval of each holds nothing, about its value or about the one that it has with the effects' constants
-    /// free. But what others on the same joint are beyond is there with them: the
+    /// interval of each holds nothing. That is about the value that it has with all effects' constants free; of
+    /// an effect that has no constants, whose value is not another's with other ones, also about its own. But what others on the same joint are beyond is there with them: the
     /// level that a Stribeck friction rises from is hardly told where that is wide.
     fn uncertain(
         &self,
@@ -224,8 +224,9 @@ impl Search<'_> {
                 let [low, high] = model.fit.intervals_95[parameter];
                 let half = quantile * model.fit.standard_deviations[parameter];
                 let value = in_force + model.fit.parameters[parameter];
+                let holds_nothing = in_force + low <= 0.0 && in_force + high >= 0.0;
                 // Logs too short for an interval (NaN) say nothing against it.
-                !(in_force + low <= 0.0 && in_force + high >= 0.0 || value.abs() <= half)
+                !(holds_nothing || constants.is_empty() && value.abs() <= half)
             });
             if !is_certain && !self.is_below_another(&kind, &joints)? {
                 uncertain.push((kind, joints));

@@ -166,7 +166,7 @@ pub fn traced_recording(
     tracing
 }
 
-/// Of each effect with a name one constant at least is not within its error of nothing; but a Stribeck
+/// Of each effect with a name one parameter at least is not within its error of nothing; but a Stribeck
 /// friction has the Coulomb friction below it, however the two share what they are.
 fn each_name_is_certain(tracing: &Tracing) {
     let Identified { design, fit, .. } = &tracing.model;
@@ -176,7 +176,9 @@ fn each_name_is_certain(tracing: &Tracing) {
         let own = design.effect_parameters(place).zip(design.effects()[place].parameters());
         let is_certain = own.clone().any(|(parameter, info)| {
             let in_force = spec.constants.get(&info.name).copied().unwrap_or_default();
-            (in_force + fit.parameters[parameter]).abs() > quantile * fit.standard_deviations[parameter]
+            let [low, high] = fit.intervals_95[parameter];
+            let is_large = fit.parameters[parameter].abs() > quantile * fit.standard_deviations[parameter];
+            (in_force + low > 0.0 || in_force + high < 0.0) && (is_large || !spec.constants.is_empty())
         });
         let has_stribeck = tracing
             .specs
