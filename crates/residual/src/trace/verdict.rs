@@ -205,9 +205,10 @@ impl Search<'_> {
     }
 
     /// Of the `named` effects, the first that were found, those of which no parameter is certain: the 95 %
-    /// interval of each holds nothing. That is about the value that it has with all effects' constants free; of
-    /// an effect that has no constants, whose value is not another's with other ones, also about its own. But what others on the same joint are beyond is there with them: the
-    /// level that a Stribeck friction rises from is hardly told where that is wide.
+    /// interval of each holds nothing. That is about the value that it has with all effects' constants free;
+    /// of an effect that has no constants, whose value means the same with other ones, also about its own.
+    /// But what others on the same joint are beyond is there with them: the level that a Stribeck friction
+    /// rises from is hardly told where that is wide.
     fn uncertain(
         &self,
         model: &Identified,

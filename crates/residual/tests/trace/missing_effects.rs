@@ -442,8 +442,8 @@ fn an_effect_is_not_hidden_by_the_noise_of_another_joint() {
     }
 }
 
-/// The elbow has no viscous friction. Beside a quadratic and a wide Stribeck friction it was found to have one
-/// of 0.001 N·m·s/rad, within its error of nothing, and had the name, since the shoulder has it.
+/// The elbow has no viscous friction. Beside a quadratic and a wide Stribeck friction it was found to have
+/// one of 0.001 N·m·s/rad, within its error of nothing, and had the name, since the shoulder has it.
 #[test]
 fn a_joint_has_no_friction_of_the_others_of_which_nothing_is_certain() {
     let secret = |state: &State<'_>, torque: &mut [f64]| {
