@@ -3,10 +3,9 @@
 use crate::Error;
 use crate::arguments::ExplainArguments;
 use crate::session::Session;
-use crate::torque_zeros::ZerosOfLogs;
 use crate::warnings::file_name;
+use phiw_identification::Data;
 use phiw_identification::fitting::{Disturbance, DisturbanceSettings, disturbances};
-use phiw_identification::{Data, Progress};
 use phiw_report::number::significant;
 use phiw_residual::trace::Tracing;
 use std::path::PathBuf;
@@ -49,41 +48,6 @@ impl DisturbedLogs {
         let of_log = |found: Disturbance| Some((session.arguments.train.get(found.log)?.clone(), found));
         let found = self.found.iter().cloned().chain(found.into_iter().filter_map(of_log)).collect();
         Ok(Some(DisturbedLogs { found, traces: self.traces + 1 }))
-    }
-
-    /// Those that still are disturbances to a model that was fitted without them, if any is none: what one
-    /// model does not foretell another may. Nothing else is sought then. `zeros` are those of the torques.
-    ///
-    /// # Errors
-    /// A log cannot be read any more.
-    pub fn without_those_foretold(
-        &self,
-        arguments: &ExplainArguments,
-        zeros: Option<&ZerosOfLogs>,
-        tracing: &Tracing,
-        progress: Progress<'_>,
-    ) -> Result<Option<Self>, Error> {
-        if self.found.is_empty() {
-            return Ok(None);
-        }
-        let mut arguments = arguments.session.clone();
-        arguments.in_memory.disturbed.clear();
-        let mut whole = Session::open(&arguments, progress)?;
-        zeros.into_iter().for_each(|zeros| zeros.take_off(&mut whole.logs));
-        let sources = whole.logs.sources(progress);
-        let data = whole.data(&sources);
-        let (design, parameters) = (&tracing.model.design, &tracing.model.fit.parameters);
-        let settings = DisturbanceSettings::default();
-        let still = disturbances(design, parameters, &data.train, &data.sources, &settings)?;
-        let still_is = |(log, found): &&(PathBuf, Disturbance)| {
-            let [from, to] = found.stretch_s;
-            still.iter().any(|other| {
-                let [other_from, other_to] = other.stretch_s;
-                whole.arguments.train.get(other.log) == Some(log) && other_from < to && from < other_to
-            })
-        };
-        let found: Vec<(PathBuf, Disturbance)> = self.found.iter().filter(still_is).cloned().collect();
-        Ok((found.len() < self.found.len()).then_some(DisturbedLogs { found, traces: TRACES }))
     }
 
     /// The arguments of an `explain` that leaves them out.

@@ -132,12 +132,7 @@ fn results_knowing(
         let without = disturbed.left_out_of(arguments);
         return results_knowing(&without, console, &OfTheLogs { disturbed, ..known.clone() });
     }
-    let zeros = known.torque_zeros.as_ref();
-    if let Some(disturbed) = known.disturbed.without_those_foretold(arguments, zeros, &tracing, &progress)? {
-        let without = disturbed.left_out_of(arguments);
-        return results_knowing(&without, console, &OfTheLogs { disturbed, ..known.clone() });
-    }
-    let zeros = ZerosOfLogs::of(&session, &data, &tracing, zeros)?;
+    let zeros = ZerosOfLogs::of(&session, &data, &tracing, known.torque_zeros.as_ref())?;
     if zeros.is_some() {
         let traced_for_zeros = known.traced_for_zeros + 1;
         let known = OfTheLogs { torque_zeros: zeros, traced_for_zeros, ..known.clone() };
