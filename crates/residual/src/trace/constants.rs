@@ -107,9 +107,9 @@ impl Search<'_> {
 
 /// What a model was on the way to better constants.
 ///
-/// A step is to first order only where something is linearised, or made of the torque of the model as it was
-/// before the step. One that makes the criterion larger is taken again, half as long. A compliance of
-/// 3·10⁻⁶ rad/(N·m) once went to 0.04 in one step, beside a robot's torques of thousands of N·m.
+/// Where something is linearised a step is to first order only. One that makes the criterion larger is taken
+/// again, half as long. A compliance of 3·10⁻⁶ rad/(N·m) once went to 0.04 in one step, beside a robot's
+/// torques of thousands of N·m.
 #[derive(Default)]
 struct Way {
     /// Effective rows of each torque, the same for all of the way.
