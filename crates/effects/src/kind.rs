@@ -100,8 +100,8 @@ pub trait EffectKind: Send + Sync {
         &[]
     }
 
-    /// Names of the kinds that a joint has if it has this one: it is what is beyond them, and they have a name
-    /// with it, however uncertain their own share is.
+    /// Names of the kinds that a joint has if it has this one: it is what is beyond them, and they have a
+    /// name with it, however uncertain their own share is.
     fn is_beyond(&self) -> &'static [&'static str] {
         &[]
     }
