@@ -79,7 +79,7 @@ impl Command {
 }
 
 /// Arguments of `phiw explain`.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args)]
 pub struct ExplainArguments {
     /// Robot, logs and declared model.
     #[command(flatten)]

@@ -127,14 +127,8 @@ impl Case {
         let identified = phiw::identify::identify(&self.session(declare, "identified"), &Console::silent())
             .unwrap()
             .report;
-        let arguments = ExplainArguments {
-            session: self.session(declare, "explained"),
-            model: None,
-            draws: 0,
-            exclude: Vec::new(),
-            false_name_rate: None,
-            threshold: Vec::new(),
-        };
+        let arguments =
+            ExplainArguments { session: self.session(declare, "explained"), ..ExplainArguments::default() };
         let explained = phiw::explain::explain(&arguments, &Console::silent()).unwrap().report;
         let pairs = [
             (&identified.before.train, &explained.before.train),

@@ -168,14 +168,7 @@ fn changed(urdf: &str, before: &[Recording], logs: &[Recording], declared: &[&st
 }
 
 fn explained_from(session: SessionArguments, model: Option<PathBuf>) -> ReportJson {
-    let arguments = ExplainArguments {
-        session,
-        model,
-        draws: 0,
-        exclude: Vec::new(),
-        false_name_rate: None,
-        threshold: Vec::new(),
-    };
+    let arguments = ExplainArguments { session, model, ..ExplainArguments::default() };
     explain(&arguments, &Console::silent()).unwrap().report
 }
 

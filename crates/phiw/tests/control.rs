@@ -55,11 +55,9 @@ impl Scene {
     fn explain_at(&self, declare: &[&str], exclude: &[&str], false_name_rate: Option<f64>) -> ReportJson {
         let arguments = ExplainArguments {
             session: self.session(declare, "explained"),
-            model: None,
-            draws: 0,
             exclude: exclude.iter().map(|&excluded| excluded.to_owned()).collect(),
             false_name_rate,
-            threshold: Vec::new(),
+            ..ExplainArguments::default()
         };
         phiw::explain::explain(&arguments, &Console::silent()).unwrap().report
     }

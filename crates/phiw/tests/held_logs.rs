@@ -28,14 +28,7 @@ fn explained(logs: [Recording; 2]) -> (Names, [f64; 2], Vec<String>) {
         out: path("out"),
         ..SessionArguments::default()
     };
-    let arguments = ExplainArguments {
-        session,
-        model: None,
-        draws: 0,
-        exclude: Vec::new(),
-        false_name_rate: None,
-        threshold: Vec::new(),
-    };
+    let arguments = ExplainArguments { session, ..ExplainArguments::default() };
     let report = explain(&arguments, &Console::silent()).unwrap().report;
     let names: Names =
         report.effects.iter().map(|effect| (effect.kind.clone(), effect.joints.clone())).collect();

@@ -77,14 +77,7 @@ fn held_out_error(logs: &Path, (urdf, train, validate): (&str, &[&str], &str), d
         quiet: true,
         ..SessionArguments::default()
     };
-    let arguments = ExplainArguments {
-        session,
-        model: None,
-        draws: 0,
-        exclude: Vec::new(),
-        false_name_rate: None,
-        threshold: Vec::new(),
-    };
+    let arguments = ExplainArguments { session, ..ExplainArguments::default() };
     let report = phiw::explain::explain(&arguments, &Console::silent()).unwrap().report;
     report.after.validate.relative.unwrap()
 }

@@ -115,14 +115,7 @@ fn session(urdf: &Path, train: Vec<PathBuf>, validate: Vec<PathBuf>, out: PathBu
 }
 
 fn run(arguments: &SessionArguments) -> anyhow::Result<PathBuf> {
-    let arguments = ExplainArguments {
-        session: arguments.clone(),
-        model: None,
-        draws: 0,
-        exclude: Vec::new(),
-        false_name_rate: None,
-        threshold: Vec::new(),
-    };
+    let arguments = ExplainArguments { session: arguments.clone(), ..ExplainArguments::default() };
     println!("{}\n", command_line(&arguments));
     let Outcome { summary, warnings, report_html, .. } = explain(&arguments, &Console::of_terminal(false))?;
     warnings.iter().for_each(|warning| println!("warning: {warning}"));

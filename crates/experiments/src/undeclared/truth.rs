@@ -66,15 +66,19 @@ pub struct TrueSecret {
 impl Truth {
     /// Of a drawn case.
     pub fn of(case: &Case) -> Self {
-        let secret = |drawn: &super::case::Drawn| TrueSecret {
-            kind: drawn.secret.name,
-            joints: case.robot.names(&[drawn.secret.joints.clone(), in_common(case, &drawn.secret)].concat()),
-            optional: case.robot.names(&[optional(drawn), in_common(case, &drawn.secret)].concat()),
-            equivalents: equivalents(case, &drawn.secret),
-            form: shortened(format!("{:?}", drawn.secret.form)),
-            scale: drawn.secret.scale,
-            size: drawn.size,
-            visible: drawn.visible,
+        let secret = |drawn: &super::case::Drawn| {
+            let in_common = in_common(case, &drawn.secret);
+            let and_those = |joints: &[usize]| case.robot.names(&[joints, &in_common].concat());
+            TrueSecret {
+                kind: drawn.secret.name,
+                joints: and_those(&drawn.secret.joints),
+                optional: and_those(&optional(drawn)),
+                equivalents: equivalents(case, &drawn.secret),
+                form: shortened(format!("{:?}", drawn.secret.form)),
+                scale: drawn.secret.scale,
+                size: drawn.size,
+                visible: drawn.visible,
+            }
         };
         Truth {
             seed: case.spec.seed,

@@ -103,11 +103,7 @@ pub fn explain_arguments(
             out: folder.join("out"),
             ..SessionArguments::default()
         },
-        model: None,
-        draws: 0,
-        exclude: Vec::new(),
-        false_name_rate: None,
-        threshold: Vec::new(),
+        ..ExplainArguments::default()
     }
 }
 
