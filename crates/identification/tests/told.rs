@@ -30,9 +30,12 @@ fn told_of(tree: &Tree, recording: &Recording, seconds: f64) -> (Told, Consisten
 /// Two links of 0.5 m that turn about z in a vertical plane (gravity along −y of the links' frames).
 const PLANAR: &str = r#"<robot name="planar">
   <link name="base"/>
-  <link name="upper"><inertial><origin xyz="0.2 0.01 0"/><mass value="3"/><inertia ixx="0.02" iyy="0.06" izz="0.07" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <link name="lower"><inertial><origin xyz="0.25 0.02 0"/><mass value="2"/><inertia ixx="0.01" iyy="0.04" izz="0.045" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="shoulder" type="continuous"><parent link="base"/><child link="upper"/><origin xyz="0 0 1" rpy="1.5707963267948966 0 0"/><axis xyz="0 0 1"/></joint>
+  <link name="upper"><inertial><origin xyz="0.2 0.01 0"/><mass value="3"/>
+    <inertia ixx="0.02" iyy="0.06" izz="0.07" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="lower"><inertial><origin xyz="0.25 0.02 0"/><mass value="2"/>
+    <inertia ixx="0.01" iyy="0.04" izz="0.045" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="shoulder" type="continuous"><parent link="base"/><child link="upper"/><origin xyz="0 0 1" rpy="1.5707963267948966 0 0"/>
+    <axis xyz="0 0 1"/></joint>
   <joint name="elbow" type="continuous"><parent link="upper"/><child link="lower"/><origin xyz="0.5 0 0"/><axis xyz="0 0 1"/></joint>
 </robot>"#;
 

@@ -111,8 +111,10 @@ impl Fleet {
 /// Two joints, named as in the formats' own files.
 const TWO_JOINTS: &str = r#"<robot name="two_joints">
   <link name="base"/>
-  <link name="upper"><inertial><origin xyz="0.2 0 0.01"/><mass value="3"/><inertia ixx="0.02" iyy="0.07" izz="0.08" ixy="0" ixz="0.004" iyz="0"/></inertial></link>
-  <link name="lower"><inertial><origin xyz="0.15 -0.02 0"/><mass value="1.5"/><inertia ixx="0.005" iyy="0.02" izz="0.021" ixy="0.001" ixz="0" iyz="0"/></inertial></link>
+  <link name="upper"><inertial><origin xyz="0.2 0 0.01"/><mass value="3"/>
+    <inertia ixx="0.02" iyy="0.07" izz="0.08" ixy="0" ixz="0.004" iyz="0"/></inertial></link>
+  <link name="lower"><inertial><origin xyz="0.15 -0.02 0"/><mass value="1.5"/>
+    <inertia ixx="0.005" iyy="0.02" izz="0.021" ixy="0.001" ixz="0" iyz="0"/></inertial></link>
   <joint name="a" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/></joint>
   <joint name="b" type="continuous"><parent link="upper"/><child link="lower"/><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/></joint>
 </robot>

@@ -14,7 +14,11 @@ pub(crate) const NAME: &str = "MuJoCo";
 #[non_exhaustive]
 pub enum MujocoError {
     /// The library is nowhere.
-    #[error("MuJoCo {version} is not found: run `cargo xtask mujoco` to fetch it, or set {variable}; tried:{tried}", version = crate::VERSION, variable = crate::LIBRARY_VARIABLE)]
+    #[error(
+        "MuJoCo {version} is not found: run `cargo xtask mujoco` to fetch it, or set {variable}; tried:{tried}",
+        version = crate::VERSION,
+        variable = crate::LIBRARY_VARIABLE
+    )]
     NotFound {
         /// The places, one on each line, with what is wrong there.
         tried: String,
@@ -43,7 +47,8 @@ pub enum MujocoError {
     },
     /// A link's parameters have no centre of mass.
     #[error(
-        "the inertial parameters of {link} are those of no body: the mass is {mass} kg, but the first moment is not zero, so that there is no centre of mass"
+        "the inertial parameters of {link} are those of no body: the mass is {mass} kg, but the first \
+         moment is not zero, so that there is no centre of mass"
     )]
     NoCenterOfMass {
         /// The link.

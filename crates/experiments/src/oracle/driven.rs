@@ -42,12 +42,17 @@ const LOOP: f64 = 10.0;
 
 const URDF: &str = r#"<robot name="driven">
   <link name="base"/>
-  <link name="link_1"><inertial><origin xyz="0.02 0.01 0.1"/><mass value="5"/><inertia ixx="0.05" iyy="0.06" izz="0.04" ixy="0.003" ixz="0" iyz="-0.002"/></inertial></link>
-  <link name="link_2"><inertial><origin xyz="0.2 0.03 -0.01"/><mass value="3"/><inertia ixx="0.02" iyy="0.07" izz="0.08" ixy="0" ixz="0.004" iyz="0"/></inertial></link>
-  <link name="link_3"><inertial><origin xyz="0.15 -0.02 0.02"/><mass value="1.5"/><inertia ixx="0.005" iyy="0.02" izz="0.021" ixy="0.001" ixz="0" iyz="0"/></inertial></link>
+  <link name="link_1"><inertial><origin xyz="0.02 0.01 0.1"/><mass value="5"/>
+    <inertia ixx="0.05" iyy="0.06" izz="0.04" ixy="0.003" ixz="0" iyz="-0.002"/></inertial></link>
+  <link name="link_2"><inertial><origin xyz="0.2 0.03 -0.01"/><mass value="3"/>
+    <inertia ixx="0.02" iyy="0.07" izz="0.08" ixy="0" ixz="0.004" iyz="0"/></inertial></link>
+  <link name="link_3"><inertial><origin xyz="0.15 -0.02 0.02"/><mass value="1.5"/>
+    <inertia ixx="0.005" iyy="0.02" izz="0.021" ixy="0.001" ixz="0" iyz="0"/></inertial></link>
   <joint name="joint_1" type="continuous"><parent link="base"/><child link="link_1"/><origin xyz="0 0 0.3"/><axis xyz="0 0 1"/></joint>
-  <joint name="joint_2" type="continuous"><parent link="link_1"/><child link="link_2"/><origin xyz="0.05 0 0.2" rpy="0.2 0 0"/><axis xyz="0 1 0"/></joint>
-  <joint name="joint_3" type="continuous"><parent link="link_2"/><child link="link_3"/><origin xyz="0.4 0 0" rpy="0 0 0.5"/><axis xyz="0 1 0"/></joint>
+  <joint name="joint_2" type="continuous"><parent link="link_1"/><child link="link_2"/><origin xyz="0.05 0 0.2" rpy="0.2 0 0"/>
+    <axis xyz="0 1 0"/></joint>
+  <joint name="joint_3" type="continuous"><parent link="link_2"/><child link="link_3"/><origin xyz="0.4 0 0" rpy="0 0 0.5"/>
+    <axis xyz="0 1 0"/></joint>
 </robot>
 "#;
 
