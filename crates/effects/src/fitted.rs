@@ -20,6 +20,11 @@ impl<'a> FittedEffect<'a> {
         FittedEffect { spec, parameters, values }
     }
 
+    /// The name of its kind.
+    pub fn kind(&self) -> &'a str {
+        &self.spec.kind
+    }
+
     /// Its joints, in words.
     pub fn joints(&self) -> String {
         self.spec.joints.join(" and ")

@@ -255,6 +255,22 @@ impl EffectKind for Stribeck {
     fn is_beyond(&self) -> &'static [&'static str] {
         &["coulomb_friction"]
     }
+    /// Friction falls where the speed grows. Where it grows throughout, a viscous friction is bent.
+    fn is_itself_beside(&self, own: &FittedEffect<'_>, simpler: &[FittedEffect<'_>]) -> bool {
+        let viscous: f64 = simpler
+            .iter()
+            .filter(|other| other.kind() == "viscous_friction")
+            .map(|other| other.value(0))
+            .sum();
+        let speed = constant(own.constants(), STRIBECK_VELOCITY, STRIBECK_DEFAULTS.0);
+        let exponent = constant(own.constants(), EXPONENT, STRIBECK_DEFAULTS.1);
+        // Over the speed, where it falls most steeply: at rest if the exponent is no more than 1, and there no
+        // steeper than from where the sign has turned.
+        let steepest = (1.0 - exponent.recip()).max(0.0).powf(exponent.recip());
+        let at = steepest.max(own.constant(WIDTH) / speed);
+        let falls_by = own.value(0) / speed * exponent * at.powf(exponent - 1.0) * (-at.powf(exponent)).exp();
+        falls_by > viscous
+    }
     fn form_of(&self) -> &'static [&'static str] {
         &["viscous_friction", "coulomb_friction"]
     }

@@ -106,6 +106,12 @@ pub trait EffectKind: Send + Sync {
         &[]
     }
 
+    /// Whether it does what it has its name for beside `simpler` ones of its joint, all with their fitted
+    /// values: one that does not only bends what they make, and has no name.
+    fn is_itself_beside(&self, _own: &FittedEffect<'_>, _simpler: &[FittedEffect<'_>]) -> bool {
+        true
+    }
+
     /// Names of the simpler kinds whose form it polishes: it enters a model with these on the same joint, and
     /// has a name of its own only where it does what they cannot.
     fn form_of(&self) -> &'static [&'static str] {

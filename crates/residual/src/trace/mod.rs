@@ -15,6 +15,7 @@ mod hypotheses;
 mod impossible;
 mod input;
 mod interchangeable;
+mod itself;
 mod kept_columns;
 mod leaning;
 mod limits;
@@ -35,6 +36,7 @@ mod thresholds;
 mod tracing;
 mod trial;
 mod turning;
+mod unstructured;
 mod variation;
 mod verdict;
 

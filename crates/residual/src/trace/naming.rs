@@ -73,12 +73,22 @@ impl Search<'_> {
             }
             self.refine()?;
         };
-        let mut judged = self.judge(&trial)?;
-        self.judge_beside_forms(&trial, &mut judged);
-        self.judge_small(&trial, &mut judged)?;
-        self.judge_interchangeable(&trial, &mut judged);
-        self.name_families(&mut judged);
+        self.noise.clone_from(&self.input.noise_floor);
+        let mut judged = self.judge_all(&trial)?;
+        if self.take_for_noise(&trial, &judged)? {
+            judged = self.judge_all(&trial)?;
+        }
         self.in_order(&trial, judged)
+    }
+
+    /// The effects that were found, with or without a name, beside the noise as it is known.
+    fn judge_all(&self, trial: &Trial) -> Result<Vec<Judged>, IdentificationError> {
+        let mut judged = self.judge(trial)?;
+        self.judge_beside_forms(trial, &mut judged);
+        self.judge_small(trial, &mut judged)?;
+        self.judge_interchangeable(trial, &mut judged);
+        self.name_families(&mut judged);
+        Ok(judged)
     }
 
     /// For each effect of the model how many simpler ones on the same joints it stands on, by its place: what
@@ -220,6 +230,7 @@ impl Search<'_> {
         let EffectSpec { kind, joints, .. } = &self.specs[place];
         let of_the_log = self.fixed.catalogue.kind(kind).is_ok_and(EffectKind::is_of_the_log);
         !of_the_log
+            && self.is_itself(place).unwrap_or(false)
             && !self.refines_special_case(place)
             && !self.is_how_a_friction_turns(place)
             && !self.uncertain.iter().any(|(other, on)| other == kind && on == joints)
@@ -303,6 +314,7 @@ impl Search<'_> {
             let [left_without, left_with] =
                 [without, with].map(|squares| self.beyond_noise(trial, torque, squares));
             !self.is_as_it_was(torque, (without / trial.torque(torque).rows().max(1.0)).sqrt())
+                && taken >= self.options.thresholds.least_share * without
                 && taken >= self.options.thresholds.least_share_of_kin * left_without
                 && taken * left_without >= self.options.thresholds.least_of_others * of_simpler * left_with
                 && (taken / whole).sqrt() >= self.options.thresholds.least_size
@@ -312,7 +324,7 @@ impl Search<'_> {
     /// What of the squares left of a torque is no noise. Noise cannot be taken away, and what is left is
     /// known no better than errors are told apart.
     fn beyond_noise(&self, trial: &Trial, torque: usize, squares: f64) -> f64 {
-        let noise = trial.torque(torque).rows() * self.input.noise_floor[torque].powi(2);
+        let noise = trial.torque(torque).rows() * self.noise[torque].powi(2);
         let unknown = (self.options.thresholds.same_error.powi(2) - 1.0) * noise;
         (squares - noise).max(unknown).max(f64::MIN_POSITIVE)
     }

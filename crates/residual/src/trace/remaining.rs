@@ -49,6 +49,7 @@ impl Search<'_> {
         let fit = probe::Fit {
             peaks: &shape,
             fixed: self.fixed,
+            folds: &folds,
             specs: &self.specs,
             parameters: &self.parameters,
             ranges: &self.input.ranges,

@@ -51,6 +51,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         refuted: Vec::new(),
         uncertain: Vec::new(),
         refined: Vec::new(),
+        noise: input.noise_floor.clone(),
         held_out_had_a_say: false,
         left_out_by_held_out: Vec::new(),
         input: &input,
@@ -113,6 +114,8 @@ pub(super) struct Search<'a> {
     pub uncertain: Vec<(String, Vec<String>)>,
     /// Effects that gave way to their special cases and refine them.
     pub refined: Vec<Refined>,
+    /// What counts as noise of each torque where names are judged, RMS \[N·m, N\].
+    pub noise: Vec<f64>,
     /// Whether motion held out had a say.
     pub held_out_had_a_say: bool,
     /// What was left out for that.

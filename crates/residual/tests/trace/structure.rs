@@ -122,3 +122,19 @@ fn products_of_signals_that_no_effect_has_are_seen() {
         assert!(follows.iter().any(|follows| follows.signals == signals), "{what}: {follows:?}");
     }
 }
+
+/// A friction that is a form of another was judged beside a floor that has little of coloured noise: what the
+/// noise left was a gap, and a difference between the two directions had no name.
+#[test]
+fn a_form_of_friction_is_named_under_noise_that_its_floor_does_not_tell() {
+    for (difference, expected) in [(0.15, true), (0.0, false)] {
+        let noise = coloured_noise();
+        let tracing = traced(11, &|state, torque| {
+            torque[1] += difference * state.qd[1].abs();
+            noise(torque);
+        });
+        let form = ("asymmetric_friction".to_owned(), vec!["elbow".to_owned()]);
+        let expected = if expected { vec![form] } else { Vec::new() };
+        assert_eq!(named(&tracing), expected, "{difference} N·m·s/rad: {:?}", tracing.effects);
+    }
+}

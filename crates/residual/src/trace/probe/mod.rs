@@ -11,7 +11,7 @@ use super::residuals::ResidualShape;
 use super::stage::Fixed;
 use crate::selection::students_tail;
 use phiw_effects::SignalRanges;
-use phiw_identification::{EffectSpec, IdentificationError};
+use phiw_identification::{EffectSpec, Fold, IdentificationError};
 use phiw_regressor::RegressorError;
 use phiw_regressor::factor::{Factor, FactorBuilder, ROUNDING};
 use phiw_regressor::least_squares::GroupedFactor;
@@ -47,6 +47,8 @@ const KNOWN: f64 = 0.01;
 #[derive(Clone, Copy)]
 pub(super) struct Fit<'a> {
     pub fixed: &'a Fixed<'a>,
+    /// Motion of which one part is foretold from the others.
+    pub folds: &'a [Fold],
     pub specs: &'a [EffectSpec],
     pub parameters: &'a [f64],
     pub ranges: &'a SignalRanges,
@@ -112,8 +114,7 @@ fn probes(
         }
     }
     let Fit { fixed, specs, parameters, .. } = fit;
-    let folds = [fixed.data.train.as_slice(), &fixed.data.held_out].concat();
-    let folds = split_by_motion(fixed, folds)?;
+    let folds = split_by_motion(fixed, fit.folds.to_vec())?;
     let (design, folds) = fixed.factors(specs, effects, fixed.reference(specs, parameters)?, &folds)?;
     // A held model's parameters do not give way.
     let free = if fixed.prior.is_some() { 0 } else { parameters.len() };

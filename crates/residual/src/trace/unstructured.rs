@@ -1,0 +1,51 @@
+//! Noise that is larger than its floor: what is left of a torque, coloured or not, and follows nothing.
+
+use super::naming::Judged;
+use super::probe;
+use super::residuals::{Peaks, residual_shape};
+use super::search::Search;
+use super::trial::Trial;
+use phiw_identification::IdentificationError;
+
+impl Search<'_> {
+    /// Takes for noise what the model leaves of torques on which an effect is certain and has no name, where
+    /// that is more than the floor and training motion foretells none of it. Whether it has for any torque.
+    ///
+    /// The floor is told by what is above the band of the motion. Of coloured noise, or noise that the drive
+    /// filtered, it has a small part, and what noise leaves would be a gap that effects have left.
+    pub(super) fn take_for_noise(
+        &mut self,
+        trial: &Trial,
+        judged: &[Judged],
+    ) -> Result<bool, IdentificationError> {
+        let nameless = judged.iter().filter(|judged| judged.certain && !judged.named);
+        let members = nameless.filter_map(|judged| trial.member(judged.place));
+        let mut rows: Vec<usize> = members
+            .flat_map(|member| trial.problem.hypotheses[member.hypothesis].torques.iter().copied())
+            .collect();
+        rows.sort_unstable();
+        rows.dedup();
+        let squares = trial.foretold_squares(&trial.fit);
+        let left = |row: usize| (squares[row] / trial.torque(row).rows().max(1.0)).sqrt();
+        rows.retain(|&row| left(row) > self.options.thresholds.same_error * self.noise[row]);
+        if rows.is_empty() {
+            return Ok(false);
+        }
+        let (data, joints) = (self.fixed.data, &self.input.ranges.joints);
+        let (design, sources) = (self.design()?, &data.sources);
+        let shape = residual_shape(&design, &self.parameters, &data.train, sources, joints, Peaks::All)?;
+        let fit = probe::Fit {
+            peaks: &shape,
+            fixed: self.fixed,
+            folds: &data.train,
+            specs: &self.specs,
+            parameters: &self.parameters,
+            ranges: &self.input.ranges,
+            false_alarm: self.options.thresholds.false_structure_probability,
+        };
+        let following = probe::following(fit, &rows)?;
+        rows.retain(|row| !following.contains(row) && shape.wander[*row] <= self.options.thresholds.wander);
+        rows.iter().for_each(|&row| self.noise[row] = left(row));
+        Ok(!rows.is_empty())
+    }
+}
