@@ -179,6 +179,10 @@ impl EffectKind for Quadratic {
         let velocity = Expression::velocity;
         found.own_torque(|joint| found.value(0) * (velocity(joint) * velocity(joint).magnitude()))
     }
+    /// It grows faster than the speed. One that takes from a viscous friction bends that.
+    fn is_itself_beside(&self, own: &FittedEffect<'_>, _simpler: &[FittedEffect<'_>]) -> bool {
+        own.value(0) > 0.0
+    }
     fn form_of(&self) -> &'static [&'static str] {
         &["viscous_friction", "coulomb_friction"]
     }
