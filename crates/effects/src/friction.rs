@@ -268,8 +268,8 @@ impl EffectKind for Stribeck {
             .sum();
         let speed = constant(own.constants(), STRIBECK_VELOCITY, STRIBECK_DEFAULTS.0);
         let exponent = constant(own.constants(), EXPONENT, STRIBECK_DEFAULTS.1);
-        // Over the speed, where it falls most steeply: at rest if the exponent is no more than 1, and there no
-        // steeper than from where the sign has turned.
+        // Over the speed, where it falls most steeply: at rest if the exponent is no more than 1, and there
+        // no steeper than from where the sign has turned.
         let steepest = (1.0 - exponent.recip()).max(0.0).powf(exponent.recip());
         let at = steepest.max(own.constant(WIDTH) / speed);
         let falls_by = own.value(0) / speed * exponent * at.powf(exponent - 1.0) * (-at.powf(exponent)).exp();

@@ -2,7 +2,6 @@
 
 use super::body_prior::BodyPrior;
 use super::concentrated_settings::ConcentratedSettings;
-use super::fixed_point::FixedPoint;
 use super::in_order::{Colour, InOrder};
 use super::likelihood::column;
 use super::misfit::{TorqueMisfit, misfits};
@@ -284,6 +283,32 @@ impl Parts<'_> {
     }
 }
 
+/// Where a path of steps that shrink slowly leads, from three points of it (SQUAREM: Varadhan & Roland 2008),
+/// distances counted in standard deviations; the last point where bodies would not be possible there.
+fn extrapolated(
+    [first, second, third]: [&Mat<f64>; 3],
+    covariance: &Mat<f64>,
+    prior: &BodyPrior,
+) -> Mat<f64> {
+    let (step, bend) = (second - first, third - second - (second - first));
+    let length = |along: &Mat<f64>| {
+        let square = |k: usize| along[(k, 0)].powi(2) / covariance[(k, k)].max(f64::MIN_POSITIVE);
+        (0..along.nrows()).map(square).sum::<f64>().sqrt()
+    };
+    let mut share = (length(&step) / length(&bend)).clamp(1.0, LONGEST_SHARE);
+    while share > 1.0 {
+        let trial = first + &step * faer::Scale(2.0 * share) + &bend * faer::Scale(share * share);
+        if prior.divergence(&trial).is_finite() {
+            return trial;
+        }
+        share = if share > 1.1 { 0.5 * (share + 1.0) } else { 1.0 };
+    }
+    third.clone()
+}
+
+/// Longest extrapolation, in steps.
+const LONGEST_SHARE: f64 = 4.0;
+
 /// Gives all torques the median correlation.
 fn in_common(colours: &mut [Colour]) {
     let mut all: Vec<f64> = colours.iter().map(|colour| colour.correlation).collect();
@@ -399,7 +424,7 @@ impl ConcentratedLikelihood {
             colours = next;
         }
         let mut last: Option<Evidence> = None;
-        let mut path = FixedPoint::default();
+        let mut path = vec![x.clone()];
         for _ in 0..settings.smoothings {
             let w = &parts.map * &x;
             let w = w.col_as_slice(0);
@@ -411,21 +436,17 @@ impl ConcentratedLikelihood {
             let smoothed = self.smoothed(design, present, (w, &colours, &std), Which::MostLikely)?;
             let Some((again, spread)) = smoothed else { break };
             let own = Parts { spread: Some(spread), ..self.parts(design, &again)? };
-            let from = x.clone();
             let found = own.profile(self, &colours)?.minimum(x, settings.newton.most_steps, &mut curvature);
             (x, covariance) = (found.x, found.covariance);
-            let mut changed = f64::INFINITY;
-            if let Some(covariance) = &covariance {
-                let is_possible = |x: &Mat<f64>| own.prior.divergence(x).is_finite();
-                (x, changed) = path.next(from, x, covariance, is_possible);
+            path.push(x.clone());
+            if let ([first, second, third], Some(covariance)) = (path.as_slice(), &covariance) {
+                x = extrapolated([first, second, third], covariance, &own.prior);
+                path = vec![x.clone()];
             }
             let w = &own.map * &x;
             colours = own.colours(self, w.col_as_slice(0));
             std_of_noise = own.profile(self, &colours)?.noise(&w);
             last = Some(again);
-            if changed < settings.smoothed {
-                break;
-            }
         }
         let w = &parts.map * &x;
         if last.is_none() {

@@ -33,12 +33,9 @@ pub struct ConcentratedSettings {
     /// delivers its command better than to some thousandths, and without a floor a log without noise would
     /// leave no digits for the bodies.
     pub least_noise: f64,
-    /// Times at most that the motion of encoders is found anew under the estimate, and the estimate after it
-    /// (`smoothing.rs`), each from where the last few of them lead. Default: 30.
+    /// Times that the motion of encoders is found anew under the estimate, and the estimate after it
+    /// (`smoothing.rs`); after two of them the estimate is carried on along their path. Default: 5.
     pub smoothings: usize,
-    /// Change of the parameters in one of these, in standard deviations (RMS over the parameters), from which
-    /// on another is worth it. Default: 0.005.
-    pub smoothed: f64,
     /// What is left of how an acceleration decays within a period, as a torque over the noise's: the belief's
     /// friction and inertia are not exact. Default: 0.1.
     pub decay_error: f64,
@@ -63,8 +60,7 @@ impl Default for ConcentratedSettings {
             settled: 0.005,
             largest_correlation: 0.98,
             least_noise: 3e-3,
-            smoothings: 30,
-            smoothed: 0.005,
+            smoothings: 5,
             decay_error: 0.1,
             reading_error: 1.0,
             smoothing_instant_s: 0.1,

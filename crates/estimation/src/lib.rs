@@ -12,7 +12,6 @@ mod error;
 mod estimator;
 mod evidence;
 mod exchange;
-mod fixed_point;
 mod foresight;
 mod free_directions;
 mod in_order;

@@ -6,8 +6,8 @@ use crate::arm;
 use arm::Arm;
 use phiw_curriculum::{Experiment, unreliable_model};
 use phiw_estimation::{
-    ConcentratedLikelihood, ConcentratedSettings, Estimate, Estimator, Evidence, EvidenceSettings,
-    LeastSquares, MotionLog, RowsAt, TorqueNoise,
+    ConcentratedLikelihood, Estimator, Evidence, EvidenceSettings, LeastSquares, MotionLog, RowsAt,
+    TorqueNoise,
 };
 use phiw_identification::Design;
 use phiw_simulated_robot::{Encoders, KnownOfController, LoggedTorque, Measuring, SimulatedRobot};
@@ -105,34 +105,6 @@ fn slow_noise_and_encoders_ask_for_the_motion_under_the_belief() {
     let (spline, smoothed) = (error(0), error(5));
     println!("spline {spline}, smoothed {smoothed}, at first {}", rms(&start, &truth));
     assert!(smoothed < 0.8 * spline, "{smoothed} from {spline}");
-}
-
-/// Five times was where encoders read a thousand times a second leave nothing to find; read with each command
-/// they were left far from the end.
-#[test]
-fn the_motion_of_encoders_is_found_anew_until_it_changes_nothing() {
-    let arm = Arm::new(0.05);
-    let initial = unreliable_model(&arm.truth, 5);
-    let start = initial.parameters(&arm.robot).unwrap();
-    for every_s in [1e-3, 1e-2] {
-        let measuring = Measuring { encoders: Some(Encoders::new(17, every_s)), ..Measuring::default() };
-        let (design, evidence) = measure(&arm, measuring);
-        let found = |most: usize, smoothed: f64| {
-            let mut estimator = ConcentratedLikelihood::new(initial.clone());
-            (estimator.settings.smoothings, estimator.settings.smoothed) = (most, smoothed);
-            estimator.estimate(&design, &evidence, &initial, &start).unwrap()
-        };
-        let usual = ConcentratedSettings::default();
-        let (end, five) = (found(60, 0.0), found(5, 0.0));
-        let own = found(usual.smoothings, usual.smoothed);
-        let away = |from: &Estimate| {
-            let all = from.parameters.iter().zip(&end.parameters).zip(&end.standard_deviations);
-            let away: Vec<f64> = all.map(|((own, end), std)| (own - end) / std).collect();
-            rms(&away, &vec![0.0; away.len()])
-        };
-        println!("{every_s} s: {} and {} standard deviations from the end", away(&own), away(&five));
-        assert!(away(&own) < 0.05, "{every_s} s: {} standard deviations", away(&own));
-    }
 }
 
 /// What was delivered beside the command is in the log, and moved the robot: little is left that is not
