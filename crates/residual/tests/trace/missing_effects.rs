@@ -454,17 +454,18 @@ fn a_joint_has_no_friction_of_the_others_of_which_nothing_is_certain() {
     assert!(viscous("shoulder") && !viscous("elbow"), "{named:?}");
 }
 
-/// A viscous friction that grows with a power of the speed is bent, and does not fall: it is no Stribeck
-/// friction, however well that draws it.
+/// A viscous friction that grows with a power of the speed is bent, and neither falls nor grows with the
+/// square: a Stribeck and a negative quadratic friction were named, which together draw it.
 #[test]
-fn a_viscous_friction_that_is_bent_is_no_stribeck_friction() {
+fn a_viscous_friction_that_is_bent_is_no_other_friction() {
     for (power, falls, expected) in [(0.7, 0.0, false), (1.0, 3.0, true)] {
         let tracing = traced(11, &|state, torque| {
             let speed = state.qd[1].abs();
             let own = 5.0 * speed.powf(power) + falls * (-(speed / 0.15).powi(2)).exp();
             torque[1] += own * (state.qd[1] / 0.01).tanh();
         });
-        let is_named = named(&tracing).iter().any(|(kind, _)| kind == "stribeck_friction");
+        let others = ["stribeck_friction", "quadratic_friction"];
+        let is_named = named(&tracing).iter().any(|(kind, _)| others.contains(&kind.as_str()));
         assert_eq!(is_named, expected, "{power}: {:?}", tracing.effects);
     }
 }
