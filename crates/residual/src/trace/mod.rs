@@ -6,6 +6,7 @@
 //! parts of the training motion, foretold from the other parts, say what has a name. Motion held out is for
 //! the errors that are reported.
 
+mod bent;
 mod constants;
 mod floor;
 mod folds;
@@ -15,13 +16,13 @@ mod hypotheses;
 mod impossible;
 mod input;
 mod interchangeable;
-mod itself;
 mod kept_columns;
 mod leaning;
 mod limits;
 mod multiples;
 mod naming;
 mod of_training_logs;
+mod order;
 mod probe;
 mod remaining;
 mod residuals;
@@ -42,7 +43,7 @@ mod verdict;
 
 pub use floor::{noise_floor, noise_floor_at, poses};
 pub use input::{HeldModel, TraceInput, TraceOptions};
-pub use naming::LEAST_RIVAL;
+pub use order::LEAST_RIVAL;
 pub use probe::Dependence;
 pub use residuals::{Peaks, ResidualShape, ranges_of_residual, residual_shape};
 pub use scanned::{ScannedConstant, scanned_constants};

@@ -1,12 +1,12 @@
 //! What the final model leaves: whether it has structure, and what it follows.
 
 use super::probe;
-use super::residuals::{Peaks, residual_shape};
+use super::residuals::{Peaks, ResidualShape, residual_shape};
 use super::search::Search;
 use super::tracing::{Disturbance, Remaining};
 use crate::selection::Products;
-use phiw_identification::IdentificationError;
 use phiw_identification::fitting::{Fit, LogChange, TorqueError};
+use phiw_identification::{Fold, IdentificationError};
 use phiw_regressor::least_squares::GroupedFactor;
 
 /// Standard deviations of the parameters whose error on motion held out is expected.
@@ -41,22 +41,12 @@ impl Search<'_> {
         if large.is_empty() {
             return Ok(remaining);
         }
-        let joints = &self.input.ranges.joints;
         let data = self.fixed.data;
         let folds = [data.train.as_slice(), &data.held_out].concat();
-        let shape =
-            residual_shape(&self.design()?, &self.parameters, &folds, &data.sources, joints, Peaks::All)?;
-        let fit = probe::Fit {
-            peaks: &shape,
-            fixed: self.fixed,
-            folds: &folds,
-            specs: &self.specs,
-            parameters: &self.parameters,
-            ranges: &self.input.ranges,
-            false_alarm: self.options.thresholds.false_structure_probability,
-        };
+        let shape = self.shape_of_residual(&folds)?;
+        let fit = self.probed(&folds, &shape);
         let following = probe::following(fit, &large)?;
-        let wanders = |row: usize| shape.wander[row] > self.options.thresholds.wander;
+        let wanders = |row: usize| self.wanders(&shape, row);
         let differs = |row: usize| changes.iter().any(|change| change.row == row);
         let is_structured = |row: &usize| {
             following.contains(row) || wanders(*row) || differs(*row) || worse_than_none.contains(row)
@@ -75,6 +65,30 @@ impl Search<'_> {
         remaining.by_log = structured.iter().copied().filter(|&row| differs(row)).map(name).collect();
         remaining.joints = structured.into_iter().map(name).collect();
         Ok(remaining)
+    }
+
+    /// What the model leaves on some folds, sample by sample.
+    pub(super) fn shape_of_residual(&self, folds: &[Fold]) -> Result<ResidualShape, IdentificationError> {
+        let (sources, joints) = (&self.fixed.data.sources, &self.input.ranges.joints);
+        residual_shape(&self.design()?, &self.parameters, folds, sources, joints, Peaks::All)
+    }
+
+    /// The model, as a probe looks at what it leaves on these folds.
+    pub(super) fn probed<'b>(&'b self, folds: &'b [Fold], shape: &'b ResidualShape) -> probe::Fit<'b> {
+        probe::Fit {
+            peaks: shape,
+            fixed: self.fixed,
+            folds,
+            specs: &self.specs,
+            parameters: &self.parameters,
+            ranges: &self.input.ranges,
+            false_alarm: self.options.thresholds.false_structure_probability,
+        }
+    }
+
+    /// Whether a residual is correlated over seconds, which no sensor's noise is.
+    pub(super) fn wanders(&self, shape: &ResidualShape, row: usize) -> bool {
+        shape.wander[row] > self.options.thresholds.wander
     }
 
     /// Whether a residual (RMS) is more than noise, and more than what the parameters' own uncertainty makes

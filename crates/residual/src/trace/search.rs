@@ -50,6 +50,7 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         asks_of_variation: false,
         refuted: Vec::new(),
         uncertain: Vec::new(),
+        bent: Vec::new(),
         refined: Vec::new(),
         noise: input.noise_floor.clone(),
         held_out_had_a_say: false,
@@ -112,6 +113,8 @@ pub(super) struct Search<'a> {
     pub refuted: Vec<EffectSpec>,
     /// Kinds and joints of which no parameter is certain once their constants are free: they have no name.
     pub uncertain: Vec<(String, Vec<String>)>,
+    /// Kinds and joints that only bend what is simpler, as the model is when names are given: they have none.
+    pub bent: Vec<(String, Vec<String>)>,
     /// Effects that gave way to their special cases and refine them.
     pub refined: Vec<Refined>,
     /// What counts as noise of each torque where names are judged, RMS \[N·m, N\].

@@ -9,7 +9,7 @@ use thiserror::Error;
 /// prints for every value what is named falsely, what is called sufficient, and how many effects are named.
 ///
 /// What a probe must foretell (`probe/`), how much error parameters may make (`remaining.rs`), when a value
-/// is beyond its bounds by chance (`admissible.rs`), when an effect is a rival (`naming.rs`) and when a
+/// is beyond its bounds by chance (`admissible.rs`), when an effect is a rival (`order.rs`) and when a
 /// drive's limit is one (`limits.rs`) stand as constants where they are used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {

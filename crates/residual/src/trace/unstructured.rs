@@ -2,14 +2,14 @@
 
 use super::naming::Judged;
 use super::probe;
-use super::residuals::{Peaks, residual_shape};
 use super::search::Search;
 use super::trial::Trial;
 use phiw_identification::IdentificationError;
 
 impl Search<'_> {
-    /// Takes for noise what the model leaves of torques on which an effect is certain and has no name, where
-    /// that is more than the floor and training motion foretells none of it. Whether it has for any torque.
+    /// Takes for noise what the model leaves of torques on which an effect is certain and has no name, but
+    /// may have one, where that is more than the floor and training motion foretells none of it. Whether it
+    /// has for any torque.
     ///
     /// The floor is told by what is above the band of the motion. Of coloured noise, or noise that the drive
     /// filtered, it has a small part, and what noise leaves would be a gap that effects have left.
@@ -18,7 +18,8 @@ impl Search<'_> {
         trial: &Trial,
         judged: &[Judged],
     ) -> Result<bool, IdentificationError> {
-        let nameless = judged.iter().filter(|judged| judged.certain && !judged.named);
+        let may = |judged: &&Judged| judged.certain && !judged.named && self.may_have_a_name(judged.place);
+        let nameless = judged.iter().filter(may);
         let members = nameless.filter_map(|judged| trial.member(judged.place));
         let mut rows: Vec<usize> = members
             .flat_map(|member| trial.problem.hypotheses[member.hypothesis].torques.iter().copied())
@@ -31,20 +32,10 @@ impl Search<'_> {
         if rows.is_empty() {
             return Ok(false);
         }
-        let (data, joints) = (self.fixed.data, &self.input.ranges.joints);
-        let (design, sources) = (self.design()?, &data.sources);
-        let shape = residual_shape(&design, &self.parameters, &data.train, sources, joints, Peaks::All)?;
-        let fit = probe::Fit {
-            peaks: &shape,
-            fixed: self.fixed,
-            folds: &data.train,
-            specs: &self.specs,
-            parameters: &self.parameters,
-            ranges: &self.input.ranges,
-            false_alarm: self.options.thresholds.false_structure_probability,
-        };
-        let following = probe::following(fit, &rows)?;
-        rows.retain(|row| !following.contains(row) && shape.wander[*row] <= self.options.thresholds.wander);
+        let folds = &self.fixed.data.train;
+        let shape = self.shape_of_residual(folds)?;
+        let following = probe::following(self.probed(folds, &shape), &rows)?;
+        rows.retain(|row| !following.contains(row) && !self.wanders(&shape, *row));
         rows.iter().for_each(|&row| self.noise[row] = left(row));
         Ok(!rows.is_empty())
     }
