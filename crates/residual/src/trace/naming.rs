@@ -224,8 +224,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Whether an effect is one of the robot, and not of its log, was not found to be uncertain, does what its
-    /// name says, and refines neither its special case nor a friction by how that turns.
+    /// Whether an effect is one of the robot, and not of its log, was not found to be uncertain, does what
+    /// its name says, and refines neither its special case nor a friction by how that turns.
     pub(super) fn may_have_a_name(&self, place: usize) -> bool {
         let EffectSpec { kind, joints, .. } = &self.specs[place];
         let of_the_log = self.fixed.catalogue.kind(kind).is_ok_and(EffectKind::is_of_the_log);
