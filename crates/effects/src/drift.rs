@@ -3,7 +3,9 @@
 use crate::bristles::{Bristles, DEFLECTION, bristles_near, with_bristles};
 use crate::columns::{Formula, OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, Refinement, Signal, SignalRanges, around, constant, values};
+use crate::kind::{
+    Constants, EffectKind, Refinement, Signal, SignalRanges, SpecialCase, around, constant, values,
+};
 use crate::sign::Sign;
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
@@ -55,6 +57,9 @@ impl EffectKind for ThermalDrift {
         let falls = [0, 1].iter().all(|&place| found.value(place) >= 0.0);
         let what = if falls { "falls as it warms up" } else { "changes with time" };
         format!("The friction of {joint} {what}, over {time:.0} s.")
+    }
+    fn special_case(&self) -> Option<SpecialCase> {
+        Some(SpecialCase { kind: "viscous_friction", parameter: Some("fv_cold") })
     }
     fn seen_against(&self) -> Signal {
         Signal::Time

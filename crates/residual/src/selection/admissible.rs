@@ -5,12 +5,8 @@ use super::fit::Fit;
 use super::problem::Member;
 use super::screening::screen;
 use super::search::{Model, NEAR, Search};
-use super::wald::squares_of;
 use rayon::prelude::*;
 
-/// Squared standard deviations beyond its bounds up to which a member that is required may be there by
-/// chance.
-const BY_CHANCE: f64 = 9.0;
 /// Models of one step that are fitted with their own weights, after all have been fitted with those of the
 /// present model.
 const FITTED_IN_FULL: usize = 3;
@@ -51,7 +47,7 @@ impl Search<'_> {
         models
     }
 
-    /// A model with the weights of `start`; what breaks its bounds is absent, with all that requires it.
+    /// A model with the weights of `start`; what breaks its bounds is absent, and what requires that stays.
     fn quickly(&self, mut members: Vec<Member>, start: &Fit) -> Model {
         let fitted = Fit::beside(self.problem, self.problem.active(&members), &self.rows, start);
         let mut absent: Vec<usize> = Vec::new();
@@ -66,15 +62,9 @@ impl Search<'_> {
                 let value = criterion(self.problem, &members, &fit, &self.rows);
                 return Model { members, fit, value, settled: false };
             }
-            let goes = |member: &Member| {
-                let own = &self.problem.hypotheses[member.hypothesis];
-                let requires = |broken: &Member| !own.declared && own.requires.contains(&broken.hypothesis);
-                broken.iter().any(|broken| broken == member || requires(broken))
-            };
-            let (gone, left): (Vec<Member>, Vec<Member>) = members.into_iter().partition(goes);
-            members = left;
+            members.retain(|member| !broken.contains(member));
             let parameters =
-                gone.iter().flat_map(|&member| self.problem.variant(member).parameters.iter().copied());
+                broken.iter().flat_map(|&member| self.problem.variant(member).parameters.iter().copied());
             absent.extend(parameters.filter_map(|parameter| fitted.place[parameter]));
             fit = fitted.pinned(self.problem, &absent);
             if fit.is_none() {
@@ -106,12 +96,8 @@ impl Search<'_> {
             };
             let without_forms: Vec<Member> =
                 members.iter().filter(|member| !depends(member, required)).copied().collect();
-            // What requires something that cannot be goes; where that may be by chance, what the criterion is
-            // smaller without.
-            if squares_of(self.problem, &fit, *required) > BY_CHANCE {
-                members = without_forms;
-                continue;
-            }
+            // A friction may be bent where nothing is left of what it is a form of: what the criterion is
+            // smaller without goes.
             let value = |members: &Vec<Member>| {
                 let fit = Fit::beside(self.problem, self.problem.active(members), &self.rows, &fit);
                 criterion(self.problem, members, &fit, &self.rows)

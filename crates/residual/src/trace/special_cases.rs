@@ -147,16 +147,17 @@ impl Search<'_> {
                 (Some(parameter.name.as_str()) == special.and_then(|special| special.parameter))
                     .then_some(place)
             });
-        // What is left of its torque beside the column that makes the special case.
+        // What is left of its torque beside the column that makes the special case, and beside what the
+        // textbook has of the joint.
+        let beside: Vec<usize> = own
+            .textbook_beside(member)
+            .flat_map(|other| own.problem.variant(other).parameters.iter().copied())
+            .chain(alike)
+            .collect();
         let beyond = |torque: usize| {
-            let (rows, values) = (own.torque(torque), own.values_of(member, torque));
-            let column = alike.and_then(|parameter| own.problem.torques[torque].column(parameter));
-            let along = column.map_or(0.0, |column| {
-                let products = rows.column(column);
-                let along: f64 = values.iter().map(|&(other, value)| products[other] * value).sum();
-                along * along / products[column].max(f64::MIN_POSITIVE)
-            });
-            (rows.size_of(&values) - along).max(0.0)
+            let column = |&parameter: &usize| own.problem.torques[torque].column(parameter);
+            let columns: Vec<usize> = beside.iter().filter_map(column).collect();
+            own.torque(torque).size_beside(&own.values_of(member, torque), &columns)
         };
         let (seen, absorbed) = self.is_seen_or_absorbed(&own, member, &squares, beyond);
         Ok(!seen && !absorbed && !self.is_form_material(&own, member, &squares))

@@ -8,14 +8,14 @@ use thiserror::Error;
 /// `cargo xtask undeclared --suite wide_right,wide_effects --seeds dev --threshold NAME=VALUE,VALUE…`, which
 /// prints for every value what is named falsely, what is called sufficient, and how many effects are named.
 ///
-/// What a probe must foretell (`probe/`), how much error parameters may make (`remaining.rs`), when a value
-/// is beyond its bounds by chance (`admissible.rs`), when an effect is a rival (`order.rs`) and when a
-/// drive's limit is one (`limits.rs`) stand as constants where they are used.
+/// What a probe must foretell (`probe/`), how much error parameters may make (`remaining.rs`), when an effect
+/// is a rival (`order.rs`) and when a drive's limit is one (`limits.rs`) stand as constants where they are
+/// used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {
     /// Probability of naming anything on a right model, for all candidates of a run together; that at which
-    /// one refinement is in the model, if it were not there; and that at which an end is taken from another
-    /// start, if the two were as good.
+    /// one refinement is in the model, or a member of a family has its name, if it were not there; and that at
+    /// which an end is taken from another start, if the two were as good.
     pub false_name_probability: f64,
     /// Probability that a residual of noise, of any torque, seems to follow any signal. At that of a name, a
     /// spring that is smaller than coloured noise is not seen.

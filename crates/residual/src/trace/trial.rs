@@ -147,6 +147,17 @@ impl Trial {
         self.held_out_squares(&without)
     }
 
+    /// What the textbook has of the joint of a member that is not of the textbook: what these could do of its
+    /// work has their names.
+    pub fn textbook_beside(&self, member: Member) -> impl Iterator<Item = Member> {
+        let own = &self.problem.hypotheses[member.hypothesis];
+        let is_beside = |other: &&Member| {
+            let hypothesis = &self.problem.hypotheses[other.hypothesis];
+            !own.textbook && hypothesis.textbook && hypothesis.torques == own.torques
+        };
+        self.members.iter().filter(is_beside).copied()
+    }
+
     /// The squares of what a member adds to a torque, beyond what others could add.
     pub fn size_beside(&self, member: Member, others: &[Member], torque: usize) -> f64 {
         let rows = &self.problem.torques[torque];

@@ -1,6 +1,7 @@
 //! Tracing on recordings of a small robot whose secrets are known: named right, with its joints, and nothing
 //! else.
 
+mod bent_friction;
 mod declared;
 mod held_model;
 mod leading_friction;
