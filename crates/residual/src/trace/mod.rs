@@ -8,6 +8,7 @@
 
 mod bent;
 mod constants;
+mod constants_together;
 mod floor;
 mod folds;
 mod general_forms;

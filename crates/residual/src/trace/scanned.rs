@@ -36,6 +36,18 @@ pub fn scanned_constants(
     model: &mut Identified,
     data: &Data<'_>,
 ) -> Result<Vec<ScannedConstant>, IdentificationError> {
+    scanned_constants_of(catalogue, ranges, model, data, |_, _| true)
+}
+
+/// The same for those constants only, by their effects' places in the design and their names; the others are
+/// taken for known.
+pub(super) fn scanned_constants_of(
+    catalogue: &Catalogue,
+    ranges: &SignalRanges,
+    model: &mut Identified,
+    data: &Data<'_>,
+    is_free: impl Fn(usize, &str) -> bool,
+) -> Result<Vec<ScannedConstant>, IdentificationError> {
     let Identified { design, fit, .. } = model;
     let tree = design.tree();
     let (mut constants, mut reaches) = (Vec::new(), Vec::new());
@@ -45,7 +57,7 @@ pub fn scanned_constants(
         let near = catalogue.refined(&spec, tree, ranges, 0)?;
         for (name, &value) in &spec.constants {
             // Where it stands for a parameter, that has the deviation.
-            if parameters.iter().any(|parameter| parameter.name == *name) {
+            if !is_free(index, name) || parameters.iter().any(|parameter| parameter.name == *name) {
                 continue;
             }
             // What differs in a second constant, too, is another form and no step of this one.

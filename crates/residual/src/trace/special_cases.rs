@@ -21,6 +21,8 @@ impl Search<'_> {
     /// Two that both have an offset in them do each other's work, and neither would have a name; so what the
     /// effect makes beyond its special case refines that.
     pub(super) fn prefer_special_cases(&mut self) -> Result<(), IdentificationError> {
+        self.noise.clone_from(&self.input.noise_floor);
+        self.take_for_noise_beside_special_cases()?;
         let mut gave_way = Vec::new();
         let mut place = self.declared;
         while place < self.specs.len() {

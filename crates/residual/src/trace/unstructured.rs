@@ -21,9 +21,34 @@ impl Search<'_> {
         let may = |judged: &&Judged| judged.certain && !judged.named && self.may_have_a_name(judged.place);
         let nameless = judged.iter().filter(may);
         let members = nameless.filter_map(|judged| trial.member(judged.place));
-        let mut rows: Vec<usize> = members
+        let rows = members
             .flat_map(|member| trial.problem.hypotheses[member.hypothesis].torques.iter().copied())
             .collect();
+        self.take_for_noise_of(trial, rows)
+    }
+
+    /// The same for the torques on which effects were found that have a special case: what they take beyond
+    /// it is judged beside what is left.
+    pub(super) fn take_for_noise_beside_special_cases(&mut self) -> Result<(), IdentificationError> {
+        let trial = self.trial()?;
+        let has_special_case = |place: &usize| {
+            let kind = self.fixed.catalogue.kind(&self.specs[*place].kind);
+            kind.is_ok_and(|kind| kind.special_case().is_some())
+        };
+        let places = (self.declared..self.specs.len()).filter(has_special_case);
+        let rows = places
+            .filter_map(|place| trial.member(place))
+            .flat_map(|member| trial.problem.hypotheses[member.hypothesis].torques.iter().copied())
+            .collect();
+        self.take_for_noise_of(&trial, rows)?;
+        Ok(())
+    }
+
+    fn take_for_noise_of(
+        &mut self,
+        trial: &Trial,
+        mut rows: Vec<usize>,
+    ) -> Result<bool, IdentificationError> {
         rows.sort_unstable();
         rows.dedup();
         let squares = trial.foretold_squares(&trial.fit);

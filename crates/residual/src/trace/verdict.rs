@@ -20,7 +20,8 @@ impl Search<'_> {
     /// Training motion alone decides, unless the declared model foretells motion held out better than what is
     /// chosen: a model that an effect makes worse is of no use to anybody. Then that motion has a say, and
     /// the result says so.
-    pub(super) fn finish(self) -> Result<Tracing, IdentificationError> {
+    pub(super) fn finish(mut self) -> Result<Tracing, IdentificationError> {
+        self.refine_together()?;
         let before = self.declared_error()?;
         let most = self.counted(&before.1) * (1.0 + ROUNDING);
         let tracing = self.clone().finish_with(before.clone(), Harm::EachTorque)?;

@@ -459,7 +459,7 @@ fn a_joint_has_no_friction_of_the_others_of_which_nothing_is_certain() {
 /// of twenty that have no such friction is as far from nothing.
 #[test]
 fn a_member_of_a_family_is_more_certain_than_one_in_twenty() {
-    for (seed, viscous, expected) in [(2, 0.12, false), (4, 0.02, false), (6, 0.02, false), (2, 0.2, true)] {
+    for (seed, viscous, expected) in [(2, 0.03, false), (4, 0.02, false), (6, 0.02, false), (2, 0.12, true)] {
         let secret = |state: &State<'_>, torque: &mut [f64]| {
             let [shoulder, elbow] = [state.qd[0], state.qd[1]];
             torque[0] += 0.3 * shoulder * shoulder.abs();

@@ -2,6 +2,7 @@
 //! else.
 
 mod bent_friction;
+mod constants;
 mod declared;
 mod held_model;
 mod leading_friction;

@@ -59,7 +59,8 @@ fn a_spring_to_the_neighbour_under_coloured_noise_is_not_explained() {
     assert!(follows.iter().any(|follows| follows.signals == ["q.shoulder"]), "{follows:?}");
 }
 
-/// Its sign changes with every reversal: over tenths of a second it looks like noise.
+/// Its sign changes with every reversal: over tenths of a second it looks like noise. It is a friction that
+/// depends on the position, and is called that where its constants are found.
 #[test]
 fn friction_that_comes_and_goes_around_the_turn_is_not_sufficient() {
     let noise = coloured_noise();
@@ -68,8 +69,10 @@ fn friction_that_comes_and_goes_around_the_turn_is_not_sufficient() {
         torque[1] += 0.5 * (9.0 * state.q[1]).sin() * (state.qd[1] / 0.01).tanh();
     };
     let tracing = traced(11, &friction);
+    let own = ("position_dependent_friction".to_owned(), vec!["elbow".to_owned()]);
     assert!(
-        matches!(tracing.verdict, Verdict::Unexplained | Verdict::PartlyExplained),
+        matches!(tracing.verdict, Verdict::Unexplained | Verdict::PartlyExplained)
+            || named(&tracing) == [own],
         "{:?} {:?}",
         tracing.verdict,
         named(&tracing)
