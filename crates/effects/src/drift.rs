@@ -58,6 +58,7 @@ impl EffectKind for ThermalDrift {
         let what = if falls { "falls as it warms up" } else { "changes with time" };
         format!("The friction of {joint} {what}, over {time:.0} s.")
     }
+    /// Over many times the session it is a friction that stays.
     fn special_case(&self) -> Option<SpecialCase> {
         Some(SpecialCase { kind: "viscous_friction", parameter: Some("fv_cold") })
     }

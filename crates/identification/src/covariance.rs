@@ -1,9 +1,10 @@
 //! The covariance of a fit's parameters.
 
+use crate::prediction_errors::BAND_95;
 use phiw_dynamics::DimensionError;
 use phiw_dynamics::check::check_size;
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Where a covariance comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,16 +61,9 @@ impl Covariance {
     /// Standard deviations to each side that a 95 % interval has: Student's quantile for the folds that the
     /// covariance is of.
     pub fn quantile_95(&self) -> f64 {
-        self.quantile(0.05)
-    }
-
-    /// Standard deviations to each side of an interval that misses the value with probability `outside`.
-    pub fn quantile(&self, outside: f64) -> f64 {
-        let at = 1.0 - 0.5 * outside;
-        let normal = || Normal::standard().inverse_cdf(at);
         match self.folds {
-            0..2 => normal(),
-            folds => student_quantile((folds - 1) as f64, at).unwrap_or_else(normal),
+            0..2 => BAND_95,
+            folds => student_quantile_95((folds - 1) as f64),
         }
     }
 
@@ -138,9 +132,9 @@ impl Covariance {
     }
 }
 
-/// The quantile `at` of Student's distribution; none where it has no degrees of freedom.
-fn student_quantile(freedom: f64, at: f64) -> Option<f64> {
-    Some(StudentsT::new(0.0, 1.0, freedom).ok()?.inverse_cdf(at))
+/// The 97.5 % quantile of Student's distribution.
+fn student_quantile_95(freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, freedom).map_or(BAND_95, |student| student.inverse_cdf(0.975))
 }
 
 #[cfg(test)]
@@ -161,7 +155,7 @@ mod tests {
             (1e6, 1.960),
         ];
         for (freedom, expected) in table {
-            let found = student_quantile(freedom, 0.975).unwrap();
+            let found = student_quantile_95(freedom);
             assert!((found - expected).abs() < 6e-4, "{freedom}: {found}");
         }
     }

@@ -17,9 +17,10 @@ const HALVINGS: usize = 2;
 type Constant = (usize, String);
 
 impl Search<'_> {
-    /// Takes all scanned constants to where the fit is best with all of them free, if the criterion is smaller
-    /// there (Gauss and Newton's steps, the linear parameters projected out).
+    /// Takes all scanned constants to where the fit is best with all of them free, if the criterion is
+    /// smaller there (Gauss and Newton's steps, the linear parameters projected out).
     ///
+    /// Each constant that moves must be worth a step of the criterion: noise alone makes it a little smaller.
     /// What ends beyond what its kind would try is put at the last that it would, and the others once more to
     /// where the fit is best with that.
     pub(super) fn refine_together(&mut self) -> Result<(), IdentificationError> {
@@ -34,7 +35,10 @@ impl Search<'_> {
             value = branch.value(&branch.chosen.rows)?;
             value = branch.step_together(value, &at_their_end)?;
         }
-        if value < start {
+        let moved = self.specs.iter().zip(&branch.specs).flat_map(|(own, other)| {
+            own.constants.iter().filter(|(name, value)| other.constants.get(*name) != Some(value))
+        });
+        if value < start - LEAST_STEP * moved.count() as f64 {
             *self = branch;
         }
         Ok(())
@@ -72,7 +76,8 @@ impl Search<'_> {
         Ok(value)
     }
 
-    /// For each scanned constant that the logs tell, but for those `known`, how far it is from the best value.
+    /// For each scanned constant that the logs tell, but for those `known`, how far it is from the best
+    /// value.
     fn ways_to_the_best(&self, known: &[Constant]) -> Result<Vec<(Constant, f64)>, IdentificationError> {
         let data = self.fixed.data;
         let design = self.design()?;

@@ -14,8 +14,8 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {
     /// Probability of naming anything on a right model, for all candidates of a run together; that at which
-    /// one refinement is in the model, or a member of a family has its name, if it were not there; and that at
-    /// which an end is taken from another start, if the two were as good.
+    /// one refinement is in the model, if it were not there; and that at which an end is taken from another
+    /// start, if the two were as good.
     pub false_name_probability: f64,
     /// Probability that a residual of noise, of any torque, seems to follow any signal. At that of a name, a
     /// spring that is smaller than coloured noise is not seen.

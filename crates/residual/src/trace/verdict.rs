@@ -208,31 +208,25 @@ impl Search<'_> {
     /// Of the `named` effects, the first that were found, those of which no parameter is certain: the 95 %
     /// interval of each holds nothing. That is about the value that it has with all effects' constants free;
     /// of an effect that has no constants, whose value means the same with other ones, also about its own.
-    /// A member of a family, which may have its name however small it is, must be as certain as all names
-    /// together are to be. But what others on the same joint are beyond is there with them: the level that a
-    /// Stribeck friction rises from is hardly told where that is wide.
+    /// But what others on the same joint are beyond is there with them: the level that a Stribeck friction
+    /// rises from is hardly told where that is wide.
     fn uncertain(
         &self,
         model: &Identified,
         named: usize,
     ) -> Result<Vec<(String, Vec<String>)>, IdentificationError> {
         let mut uncertain = Vec::new();
-        let covariance = &model.fit.covariance;
-        let quantile = covariance.quantile_95();
-        let of_family = covariance.quantile(self.options.thresholds.false_name_probability);
+        let quantile = model.fit.covariance.quantile_95();
         for (place, effect) in model.design.effects().iter().enumerate().skip(self.declared).take(named) {
             let EffectSpec { kind, joints, constants } = effect.spec();
             let own = model.design.effect_parameters(place);
-            let is_of_family = self.fixed.catalogue.kind(&kind)?.joint_property().is_some();
             let is_certain = own.zip(effect.parameters()).any(|(parameter, info)| {
                 // Of what is linearised the value stands partly in the constant of the same name.
                 let in_force = constants.get(&info.name).copied().unwrap_or_default();
                 let [low, high] = model.fit.intervals_95[parameter];
                 let half = quantile * model.fit.standard_deviations[parameter];
                 let value = in_force + model.fit.parameters[parameter];
-                let of_family = of_family * model.fit.standard_deviations[parameter];
-                let holds_nothing = in_force + low <= 0.0 && in_force + high >= 0.0
-                    || is_of_family && value.abs() <= of_family;
+                let holds_nothing = in_force + low <= 0.0 && in_force + high >= 0.0;
                 // Logs too short for an interval (NaN) say nothing against it.
                 !(holds_nothing || constants.is_empty() && value.abs() <= half)
             });

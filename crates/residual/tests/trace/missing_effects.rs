@@ -453,21 +453,3 @@ fn a_joint_has_no_friction_of_the_others_of_which_nothing_is_certain() {
     let viscous = |joint: &str| named.contains(&("viscous_friction".to_owned(), vec![joint.to_owned()]));
     assert!(viscous("shoulder") && !viscous("elbow"), "{named:?}");
 }
-
-/// The shoulder has a viscous friction, and so may a small one of the elbow have its name. It had it, too,
-/// where a deviation of 2.4 to 2.7 from nothing is all that the final fit says of it: with many joints, one
-/// of twenty that have no such friction is as far from nothing.
-#[test]
-fn a_member_of_a_family_is_more_certain_than_one_in_twenty() {
-    for (seed, viscous, expected) in [(2, 0.03, false), (4, 0.02, false), (6, 0.02, false), (2, 0.12, true)] {
-        let secret = |state: &State<'_>, torque: &mut [f64]| {
-            let [shoulder, elbow] = [state.qd[0], state.qd[1]];
-            torque[0] += 0.3 * shoulder * shoulder.abs();
-            torque[1] += (viscous - 0.4) * elbow + 0.15 * elbow * elbow.abs();
-            torque[1] += (-(elbow / 0.3).abs()).exp() * (elbow / 0.01).tanh();
-        };
-        let named = named(&traced_on(folds().0, &[], seed, &secret, false));
-        let has_name = named.contains(&("viscous_friction".to_owned(), vec!["elbow".to_owned()]));
-        assert_eq!(has_name, expected, "{seed}, {viscous} N·m·s/rad: {named:?}");
-    }
-}
