@@ -112,8 +112,8 @@ pub trait EffectKind: Send + Sync {
         true
     }
 
-    /// Names of the simpler kinds whose form it polishes: it enters a model with these on the same joint, and
-    /// has a name of its own only where it does what they cannot.
+    /// Names of the simpler kinds whose form it polishes: it enters a model with these on the same joint, as
+    /// far as anything is left of them, and has a name of its own only where it does what they cannot.
     fn form_of(&self) -> &'static [&'static str] {
         &[]
     }

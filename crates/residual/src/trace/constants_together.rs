@@ -49,6 +49,9 @@ impl Search<'_> {
     fn step_together(&mut self, mut value: f64, known: &[Constant]) -> Result<f64, IdentificationError> {
         for _ in 0..STEPS {
             let ways = self.ways_to_the_best(known)?;
+            if ways.is_empty() {
+                break;
+            }
             let mut share = 1.0;
             let mut better = None;
             for _ in 0..=HALVINGS {

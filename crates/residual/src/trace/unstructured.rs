@@ -30,13 +30,17 @@ impl Search<'_> {
     /// The same for the torques on which effects were found that have a special case: what they take beyond
     /// it is judged beside what is left.
     pub(super) fn take_for_noise_beside_special_cases(&mut self) -> Result<(), IdentificationError> {
-        let trial = self.trial()?;
         let has_special_case = |place: &usize| {
             let kind = self.fixed.catalogue.kind(&self.specs[*place].kind);
             kind.is_ok_and(|kind| kind.special_case().is_some())
         };
-        let places = (self.declared..self.specs.len()).filter(has_special_case);
+        let places: Vec<usize> = (self.declared..self.specs.len()).filter(has_special_case).collect();
+        if places.is_empty() {
+            return Ok(());
+        }
+        let trial = self.trial()?;
         let rows = places
+            .into_iter()
             .filter_map(|place| trial.member(place))
             .flat_map(|member| trial.problem.hypotheses[member.hypothesis].torques.iter().copied())
             .collect();
@@ -44,6 +48,7 @@ impl Search<'_> {
         Ok(())
     }
 
+    /// The same for these torques, as far as it is more than the floor and follows nothing.
     fn take_for_noise_of(
         &mut self,
         trial: &Trial,
