@@ -45,7 +45,20 @@ impl Search<'_> {
     /// What does harm is left out.
     pub(super) fn name(&mut self, harm: Harm) -> Result<(Vec<FoundEffect>, usize), IdentificationError> {
         self.noise.clone_from(&self.input.noise_floor);
-        let trial = loop {
+        let trial = self.without_harm(harm)?;
+        self.bent = self.bent()?;
+        let levels = self.levels(&trial);
+        let simpler = self.simpler(&levels)?;
+        let mut judged = self.judge_all(&trial, &levels, &simpler)?;
+        if self.take_for_noise(&trial, &judged)? {
+            judged = self.judge_all(&trial, &levels, &simpler)?;
+        }
+        self.in_order(&trial, judged)
+    }
+
+    /// Leaves out what does harm, with the trial of what is left.
+    pub(super) fn without_harm(&mut self, harm: Harm) -> Result<Trial, IdentificationError> {
+        loop {
             self.call_by_the_frictions_name()?;
             let trial = self.trial()?;
             let mut harmful = self.harmful(&trial, harm);
@@ -59,21 +72,13 @@ impl Search<'_> {
                 self.left_out_by_held_out.extend(harmful.iter().map(|&place| self.specs[place].clone()));
             }
             if harmful.is_empty() {
-                break trial;
+                return Ok(trial);
             }
             for place in harmful.into_iter().rev() {
                 self.remove(place)?;
             }
             self.refine()?;
-        };
-        self.bent = self.bent()?;
-        let levels = self.levels(&trial);
-        let simpler = self.simpler(&levels)?;
-        let mut judged = self.judge_all(&trial, &levels, &simpler)?;
-        if self.take_for_noise(&trial, &judged)? {
-            judged = self.judge_all(&trial, &levels, &simpler)?;
         }
-        self.in_order(&trial, judged)
     }
 
     /// The effects that were found, with or without a name, beside the noise as it is known.

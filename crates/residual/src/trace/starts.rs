@@ -1,5 +1,6 @@
 //! Where the search starts, whatever was declared, and how what was declared joins its end.
 
+use super::harm::Harm;
 use super::search::Search;
 use super::tracing::Tracing;
 use crate::selection::LEAST_STEP;
@@ -11,7 +12,8 @@ impl Search<'_> {
     /// - Where the declared model lacks anything, the start has what the textbook has of every joint,
     ///   declared by nobody, and nothing of what was declared. What is chosen early, beside all that is still
     ///   missing, may stand for something else to the end; the more is there at the start, the less can be
-    ///   taken for it. And the end is the same whatever was declared: that joins it afterwards.
+    ///   taken for it. And the end is the same whatever was declared: that joins it afterwards, once what does
+    ///   harm has left.
     /// - That start has the limits of drives beyond which a command was logged (`limits.rs`).
     /// - Where the torques agree better once one of them is a multiple of what is logged, and still do in the
     ///   end, another start has that in force, too: to first order a factor of two is no factor, and other
@@ -66,13 +68,19 @@ impl Search<'_> {
     }
 
     /// An end that was reached with nothing declared, with what was declared put into it: what that does the
-    /// work of leaves, and nothing enters.
+    /// work of leaves, and nothing enters. What does harm leaves before that: with what was declared beside
+    /// it, another effect may look harmful in its place.
     fn with_declared(&self, mut end: Self) -> Result<Self, IdentificationError> {
         if self.declared > 0 {
+            end.refine_together()?;
+            end.without_harm(Harm::EachTorque)?;
+            let found = end.specs.len();
             end.put_in_front(&self.specs[..self.declared])?;
-            end.grows = false;
-            end = end.searched()?;
-            end.grows = true;
+            if end.specs.len() > found {
+                end.grows = false;
+                end = end.searched()?;
+                end.grows = true;
+            }
         }
         Ok(end)
     }
