@@ -12,8 +12,8 @@ impl Search<'_> {
     /// - Where the declared model lacks anything, the start has what the textbook has of every joint,
     ///   declared by nobody, and nothing of what was declared. What is chosen early, beside all that is still
     ///   missing, may stand for something else to the end; the more is there at the start, the less can be
-    ///   taken for it. And the end is the same whatever was declared: that joins it afterwards, once what does
-    ///   harm has left.
+    ///   taken for it. And the end is the same whatever was declared: that joins it afterwards, once what
+    ///   does harm has left.
     /// - That start has the limits of drives beyond which a command was logged (`limits.rs`).
     /// - Where the torques agree better once one of them is a multiple of what is logged, and still do in the
     ///   end, another start has that in force, too: to first order a factor of two is no factor, and other
