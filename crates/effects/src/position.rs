@@ -58,7 +58,12 @@ impl EffectKind for JointSpring {
     }
 }
 
-/// k·sin(q − q0), as k·cos q0·sin q − k·sin q0·cos q.
+/// k·sin(q − q0), as k·cos q0·sin q − k·sin q0·cos q, with one or two `harmonics` of it.
+///
+/// A spring between two levers of lengths a and r, q − q0 between them, makes
+/// k·a·r·sin(q − q0)·(1 − l/√(a² + r² − 2·a·r·cos(q − q0))): a sine where its rest length l is nought, and
+/// where it is not about −½·k·l·r²/a·sin 2(q − q0) more. The rigid body takes up the sine where the joint
+/// carries weight, but not the second harmonic. With a third one it would be any curve.
 pub struct GravityBalancer;
 
 impl EffectKind for GravityBalancer {
@@ -74,28 +79,34 @@ impl EffectKind for GravityBalancer {
     fn acts_on(&self) -> &'static str {
         "one joint that turns"
     }
+    fn scan(&self, _site: &[usize], _ranges: &SignalRanges) -> Vec<Constants> {
+        [vec![Constants::new()], values(HARMONICS, [2.0])].concat()
+    }
     fn telling_motion(&self) -> &'static str {
         "slow motion over the whole range, in several poses of the joints behind"
     }
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
         let (joint, amplitude) = (found.joints(), found.amplitude());
-        format!("{joint} is counterbalanced: up to {amplitude} as a sine of its angle.")
+        let sine = format!("{joint} is counterbalanced: up to {amplitude} as a sine of its angle");
+        if found.named_values().count() == 2 {
+            return format!("{sine}.");
+        }
+        let second = found.in_unit_of(2, found.value(2).hypot(found.value(3)));
+        format!("{sine}, and {second} of twice that, as by a spring that has a length at rest.")
     }
     fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
-        found.own_torque(|joint| wave(found, 0, Expression::position(joint)))
+        waves(found, 1.0)
     }
     fn seen_against(&self) -> Signal {
         Signal::Position
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
-        let columns =
-            move |sample: &Sample<'_>, out: &mut [f64]| (out[0], out[1]) = sample.q()[joint].sin_cos();
-        let parameters = [
-            ("sine", ParameterKind::Torque, f64::NEG_INFINITY),
-            ("cosine", ParameterKind::Torque, f64::NEG_INFINITY),
-        ];
-        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
+        let harmonics = constant(constants, HARMONICS, 1.0).clamp(1.0, 2.0) as usize;
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| sines(sample.q()[joint], harmonics, out);
+        let free = |name: &'static str| (name, ParameterKind::Torque, f64::NEG_INFINITY);
+        let parameters = ["sine", "cosine", "second_sine", "second_cosine"].map(free);
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters[..2 * harmonics], columns))
     }
 }
 
@@ -136,13 +147,7 @@ impl EffectKind for TorqueRipple {
         format!("The torque of {joints} ripples by {amplitude}, {frequency:.1} times a turn.")
     }
     fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
-        let frequency = constant(found.constants(), FREQUENCY, 1.0);
-        let harmonics = found.named_values().count() / 2;
-        let angle =
-            |harmonic: usize, joint: &str| ((harmonic + 1) as f64 * frequency) * Expression::position(joint);
-        let harmonic =
-            |harmonic: usize| found.own_torque(|joint| wave(found, 2 * harmonic, angle(harmonic, joint)));
-        (0..harmonics).flat_map(harmonic).collect()
+        waves(found, constant(found.constants(), FREQUENCY, 1.0))
     }
     fn seen_against(&self) -> Signal {
         Signal::Position
@@ -152,10 +157,7 @@ impl EffectKind for TorqueRipple {
         let frequency = constant(constants, FREQUENCY, 1.0);
         let harmonics = constant(constants, HARMONICS, 1.0).clamp(1.0, 3.0) as usize;
         let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
-            for harmonic in 0..harmonics {
-                let angle = (harmonic + 1) as f64 * frequency * sample.q()[joint];
-                (out[2 * harmonic], out[2 * harmonic + 1]) = angle.sin_cos();
-            }
+            sines(frequency * sample.q()[joint], harmonics, out);
         };
         let free = |name: &'static str| (name, ParameterKind::Torque, f64::NEG_INFINITY);
         let parameters = [free("a1"), free("b1"), free("a2"), free("b2"), free("a3"), free("b3")];
@@ -163,10 +165,22 @@ impl EffectKind for TorqueRipple {
     }
 }
 
-/// A sine and a cosine, with the values at `place` and behind it as amplitudes.
-fn wave(found: &FittedEffect<'_>, place: usize, angle: Expression) -> Expression {
-    let sine = found.value(place) * angle.clone().of(Function::Sine);
-    sine + found.value(place + 1) * angle.of(Function::Cosine)
+/// Sine and cosine of an angle, of twice it, and so on.
+fn sines(angle: f64, harmonics: usize, out: &mut [f64]) {
+    for harmonic in 0..harmonics {
+        (out[2 * harmonic], out[2 * harmonic + 1]) = ((harmonic + 1) as f64 * angle).sin_cos();
+    }
+}
+
+/// The torque of sines and cosines of `frequency` times the position and its multiples.
+fn waves(found: &FittedEffect<'_>, frequency: f64) -> Vec<JointTorque> {
+    let wave = |harmonic: usize, joint: &str| {
+        let angle = ((harmonic + 1) as f64 * frequency) * Expression::position(joint);
+        let sine = found.value(2 * harmonic) * angle.clone().of(Function::Sine);
+        sine + found.value(2 * harmonic + 1) * angle.of(Function::Cosine)
+    };
+    let harmonics = found.named_values().count() / 2;
+    (0..harmonics).flat_map(|harmonic| found.own_torque(|joint| wave(harmonic, joint))).collect()
 }
 
 /// A stiff torque that sets in near a limit: k·d^`exponent` at the depth d = q − `stop` beyond it, on the

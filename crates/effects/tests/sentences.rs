@@ -35,7 +35,10 @@ const SENTENCES: &[(&str, &str)] = &[
         "The friction of shoulder grows with its load: 0.500 of the torque that it carries.",
     ),
     ("joint_spring", "A spring pulls shoulder back: 0.500 N·m/rad."),
-    ("gravity_balancer", "shoulder is counterbalanced: up to 0.559 N·m as a sine of its angle."),
+    (
+        "gravity_balancer",
+        "shoulder is counterbalanced: up to 0.559 N·m as a sine of its angle, and 0.140 N·m of twice that, as by a spring that has a length at rest.",
+    ),
     ("torque_ripple", "The torque of shoulder ripples by 0.559 N·m, 12.0 times a turn."),
     ("end_stop", "shoulder runs into something stiff at -0.400: 0.500 N·m/rad."),
     (
@@ -129,6 +132,15 @@ fn the_ripple_of_a_slide_is_said_in_millimetres() {
     let effect = catalogue.kind("torque_ripple").unwrap().build(&tree, &[1], &constants);
     let words = catalogue.sentence(&effect.spec(), &effect.parameters(), &[3.0, 4.0]);
     assert_eq!(words, "The force of elbow ripples by 5.00 N, once in 5.00 mm.");
+}
+
+#[test]
+fn a_balancer_whose_spring_has_no_length_at_rest_is_a_sine() {
+    let tree = read_urdf(ARM, &UrdfOptions::default()).unwrap().tree;
+    let catalogue = Catalogue::default();
+    let effect = catalogue.kind("gravity_balancer").unwrap().build(&tree, &[0], &Constants::new());
+    let words = catalogue.sentence(&effect.spec(), &effect.parameters(), &[3.0, 4.0]);
+    assert_eq!(words, "shoulder is counterbalanced: up to 5.00 N·m as a sine of its angle.");
 }
 
 /// What is in force was left out: a transmission of 3.66·10⁻⁷ rad/(N·m) was said to give −7.27·10⁻⁸.

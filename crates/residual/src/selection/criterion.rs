@@ -20,7 +20,12 @@ pub(super) fn criterion(problem: &Problem, members: &[Member], fit: &Fit, rows: 
     likelihood + fit.prior_squares(problem) + columns + choices(problem, members)
 }
 
-/// What the columns and constants of a member cost; columns that `fit` does not determine cost nothing.
+/// What a column costs that the fit does not determine: of two effects that do the same to the last digit, a
+/// balancer of the first joint and a force on its link, the one with fewer parameters is the better.
+const UNDETERMINED: f64 = 0.01;
+
+/// What the columns and constants of a member cost; columns that `fit` does not determine cost next to
+/// nothing.
 pub(super) fn price(problem: &Problem, member: Member, fit: Option<&Fit>, rows: &[f64]) -> f64 {
     let hypothesis = &problem.hypotheses[member.hypothesis];
     let variant = problem.variant(member);
@@ -29,8 +34,9 @@ pub(super) fn price(problem: &Problem, member: Member, fit: Option<&Fit>, rows: 
     };
     let columns = variant.parameters.iter().filter(determined).count();
     let constants = if hypothesis.declared || columns == 0 { 0 } else { variant.constants };
+    let undetermined = UNDETERMINED * (variant.parameters.len() - columns) as f64;
     let columns = if hypothesis.declared { 0 } else { columns };
-    price_of(hypothesis.torques.iter().map(|&torque| rows[torque]).sum(), columns + constants)
+    price_of(hypothesis.torques.iter().map(|&torque| rows[torque]).sum(), columns + constants) + undetermined
 }
 
 /// What `count` numbers cost that were fitted to `rows` effective rows.

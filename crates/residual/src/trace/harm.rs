@@ -7,6 +7,9 @@ use phiw_identification::IdentificationError;
 use phiw_identification::fitting::{OwnTorqueFit, TorqueError, torque_error};
 use rayon::prelude::*;
 
+/// Effects of which it is asked at once whether the model as it is fitted is better without them.
+const ASKED_OF: usize = 4;
+
 /// What speaks against an effect.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Harm {
@@ -73,11 +76,37 @@ impl Search<'_> {
         left_out
     }
 
-    /// The place of the effect that makes the errors on motion held out larger by most, if that is by more
-    /// than `same_error`: in their geometric mean over the torques, or all together. A drift that one log
-    /// seems to show may be a disaster in the next. But where an effect makes the errors on training motion
-    /// that is foretold smaller by more, motion held out is foretold badly for another reason.
-    pub(super) fn misleading(&self, trial: &Trial) -> Option<usize> {
+    /// The model without the effect that makes the errors on motion held out larger by most, if any does by
+    /// more than [`Self::least_growth`]: in their geometric mean over the torques, or all together. A drift
+    /// that one log seems to show may be a disaster in the next. It does so on trial, beside the others as
+    /// they are, and in the model as it is fitted, whose other constants may make up for it.
+    pub(super) fn without_what_misleads(&self, trial: &Trial) -> Result<Option<Self>, IdentificationError> {
+        let misleading = self.misleading(trial);
+        if misleading.is_empty() {
+            return Ok(None);
+        }
+        let share = self.options.thresholds.negligible_share();
+        let with = self.held_out_error_as_fitted()?;
+        for place in misleading.into_iter().take(ASKED_OF) {
+            let mut branch = self.clone();
+            branch.remove(place)?;
+            branch.refine()?;
+            let without = branch.held_out_error_as_fitted()?;
+            let mean = with.mean_logarithm_from(share) - without.mean_logarithm_from(share);
+            let together = (self.counted(&with) / self.counted(&without)).ln();
+            if mean.max(together) > self.least_growth() {
+                branch.held_out_had_a_say = true;
+                branch.left_out_by_held_out.push(self.specs[place].clone());
+                return Ok(Some(branch));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The places of the effects that make the errors on motion held out larger on trial, that which does by
+    /// most first. But where an effect makes the errors on training motion that is foretold smaller by more,
+    /// motion held out is foretold badly for another reason.
+    fn misleading(&self, trial: &Trial) -> Vec<usize> {
         let present = trial.held_out_squares(&trial.fit);
         let rows: f64 = trial.held_out.iter().map(Products::rows).sum();
         let together = |squares: &[f64]| self.counted_squares(trial, squares);
@@ -92,42 +121,30 @@ impl Search<'_> {
             let mean = (0..present.len()).map(of_torque).sum::<f64>() / rows.max(1.0);
             (mean.max((together(&present) / together(&without)).ln()), member, place)
         });
-        let least = 2.0 * self.options.thresholds.same_error.ln();
+        let least = 2.0 * self.least_growth();
         let mut grown: Vec<(f64, Member, usize)> = growth.filter(|(growth, ..)| *growth > least).collect();
         grown.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.2.cmp(&b.2)));
         let foretelling = trial.foretelling(&trial.fit);
         let foretold = foretelling.squares();
         let trained: f64 = (0..foretold.len()).map(|torque| trial.torque(torque).rows()).sum();
-        let misleads = |(growth, member, _): &(f64, Member, usize)| {
+        grown.retain(|(growth, member, _)| {
             growth * trained > trial.gain(&foretelling.squares_without(*member), &foretold)
-        };
-        grown.into_iter().find(misleads).map(|(.., place)| place)
+        });
+        grown.into_iter().map(|(.., place)| place).collect()
     }
 
-    /// Whether an effect that is [`Self::misleading`] on trial makes the errors on motion held out larger in
-    /// the model as it will be fitted, too. Where training motion hardly tells some parameters, that draws
-    /// them to nothing and the fit on trial does not: there any parameter moves these, and they the errors.
-    pub(super) fn is_misleading_as_fitted(&self, place: usize) -> Result<bool, IdentificationError> {
-        let (is_drawn, with) = self.held_out_error_as_fitted()?;
-        if !is_drawn {
-            return Ok(true);
-        }
-        let mut branch = self.clone();
-        branch.remove(place)?;
-        branch.refine()?;
-        let (_, without) = branch.held_out_error_as_fitted()?;
-        let share = self.options.thresholds.negligible_share();
-        let mean = with.mean_logarithm_from(share) - without.mean_logarithm_from(share);
-        let together = (self.counted(&with) / self.counted(&without)).ln();
-        Ok(mean.max(together) > self.options.thresholds.same_error.ln())
+    /// By how much, as a logarithm, an error on motion held out must grow with an effect that is to leave for
+    /// it: by `same_error`, so that this motion has no say about what it hardly tells. Once anything has left,
+    /// that motion does not judge blindly any more, and any growth counts.
+    fn least_growth(&self) -> f64 {
+        if self.left_out_by_held_out.is_empty() { self.options.thresholds.same_error.ln() } else { 0.0 }
     }
 
-    /// The error on motion held out of the model as it is fitted in the end, and whether the fit draws its
-    /// parameters to nothing.
-    fn held_out_error_as_fitted(&self) -> Result<(bool, TorqueError), IdentificationError> {
+    /// The error on motion held out of the model as it is fitted in the end.
+    fn held_out_error_as_fitted(&self) -> Result<TorqueError, IdentificationError> {
         let OwnTorqueFit { fit, folds, .. } = self.final_fit(false)?;
         let held_out = &folds.moving[self.whole.train.len()..];
-        Ok((fit.is_drawn, torque_error(held_out, &fit.parameters)?))
+        Ok(torque_error(held_out, &fit.parameters)?)
     }
 
     /// The sum of what is left of the torques held out, where what is as good as none counts as the largest

@@ -61,18 +61,13 @@ impl Search<'_> {
         loop {
             self.call_by_the_frictions_name()?;
             let trial = self.trial()?;
-            let mut harmful = self.harmful(&trial, harm);
+            let harmful = self.harmful(&trial, harm);
             if harmful.is_empty() {
-                if let Some(place) = self.misleading(&trial)
-                    && self.is_misleading_as_fitted(place)?
-                {
-                    harmful.push(place);
+                match self.without_what_misleads(&trial)? {
+                    Some(without) => *self = without,
+                    None => return Ok(trial),
                 }
-                self.held_out_had_a_say |= !harmful.is_empty();
-                self.left_out_by_held_out.extend(harmful.iter().map(|&place| self.specs[place].clone()));
-            }
-            if harmful.is_empty() {
-                return Ok(trial);
+                continue;
             }
             for place in harmful.into_iter().rev() {
                 self.remove(place)?;

@@ -20,7 +20,8 @@ impl Search<'_> {
     ///   effects would stand for it.
     /// - Where the end leaves structure, another search from the same start seeks what makes frictions vary
     ///   at once (`variation.rs`): many effects together had stood for that, and left it no work. Whether
-    ///   there is structure is asked of all logs, which end is the better one of the training logs alone.
+    ///   there is structure is asked of all logs, which end is the better one of the training logs alone,
+    ///   unless it leaves more of the motion held out.
     pub(super) fn run(self) -> Result<Tracing, IdentificationError> {
         let start = if self.fixed.prior.is_none() { self.textbook_start()? } else { None };
         let end_of = |search: Self| match &start {
@@ -42,7 +43,13 @@ impl Search<'_> {
             return Ok(tracing);
         }
         let other = end_of(Search { asks_of_variation: true, ..beginning.clone() })?;
-        if other.is_better_than(&best)? { other.finish() } else { Ok(tracing) }
+        if !other.is_better_than(&best)? {
+            return Ok(tracing);
+        }
+        let other = other.finish()?;
+        let [own, before] = [&other, &tracing].map(|end| self.counted(&end.model.held_out));
+        let is_no_worse = own <= before * self.options.thresholds.same_error;
+        Ok(if is_no_worse { other } else { tracing })
     }
 
     /// The start that has what the textbook has of every joint and limits of drives, all of it declared by

@@ -253,6 +253,20 @@ fn a_stop_that_stiffens_is_a_stop_and_no_map() {
     assert_eq!(named(&tracing), [("end_stop".to_owned(), vec!["elbow".to_owned()])]);
 }
 
+/// A spring between two levers makes more than a sine of the angle where it has a length at rest. A map of
+/// the position was named for it, which says nothing beyond the arc that the training shows.
+#[test]
+fn a_counterbalance_spring_with_a_length_at_rest_is_a_balancer() {
+    for (lever, rest) in [(0.3, 0.0), (0.2, 0.3), (0.3, 0.3)] {
+        let spring = |state: &State<'_>, torque: &mut [f64]| {
+            let (sine, cosine) = (state.q[1] - 0.9).sin_cos();
+            let length = (1.0_f64 + lever * lever - 2.0 * lever * cosine).sqrt();
+            torque[1] += 20.0 * (1.0 - rest / length) * sine;
+        };
+        check(spring, &[("gravity_balancer", &["elbow"])]);
+    }
+}
+
 /// A spring and a balancer that cancel each other mended what a long soft stop is not in the catalogue's
 /// form, and both had names beside it; where the stop began beyond the fifth of the range that was looked
 /// through, they had its name.
