@@ -133,9 +133,9 @@ impl Search<'_> {
         grown.into_iter().map(|(.., place)| place).collect()
     }
 
-    /// By how much, as a logarithm, an error on motion held out must grow with an effect that is to leave for
-    /// it: by `same_error`, so that this motion has no say about what it hardly tells. Once anything has left,
-    /// that motion does not judge blindly any more, and any growth counts.
+    /// By how much, as a logarithm, an error on motion held out must grow with an effect that is to leave
+    /// for it: by `same_error`, so that this motion has no say about what it hardly tells. Once anything has
+    /// left for it, the error there is not blind any more, and any growth counts.
     fn least_growth(&self) -> f64 {
         if self.left_out_by_held_out.is_empty() { self.options.thresholds.same_error.ln() } else { 0.0 }
     }
