@@ -266,6 +266,29 @@ fn a_residual_below_what_is_as_good_as_none_still_counts() {
     assert!(torque.variance(0.5 * rows) > 1.2 * torque.variance(0.2 * rows));
 }
 
+/// A force on the first link has three parameters, of which the logs tell two at most, and makes the torque
+/// of a balancer of the first joint, which has two: it was named for it.
+#[test]
+fn of_two_that_do_the_same_the_one_with_fewer_parameters_is_chosen() {
+    for (seed, larger) in (0..20).flat_map(|seed| [(seed, 0), (seed, 1)]) {
+        let mut random = RandomNumbers::new(seed);
+        let turned = |columns: &mut [f64]| {
+            let (sine, cosine) = (seed as f64).sin_cos();
+            columns[2] = cosine * columns[0] - sine * columns[1];
+            columns[3] = sine * columns[0] + cosine * columns[1];
+            columns[4] = 0.0;
+        };
+        let mut problem = problem_with(&mut random, 1, 5, &[(0, 0, 1.0), (0, 1, 0.7)], 0.0, turned);
+        problem.hypotheses.truncate(2);
+        for (kind, hypothesis) in problem.hypotheses.iter_mut().enumerate() {
+            let variant = &mut hypothesis.variants[0];
+            variant.parameters = if kind == larger { vec![3, 4, 5] } else { vec![1, 2] };
+            variant.bounds = vec![(f64::NEG_INFINITY, f64::INFINITY); variant.parameters.len()];
+        }
+        assert_eq!(chosen(&problem, Vec::new()), [(0, 1 - larger)], "{seed}");
+    }
+}
+
 /// An offset and a ripple stood for an end stop: taking either away leads nowhere, only both at once.
 #[test]
 fn one_that_does_the_work_of_two_takes_their_place() {
