@@ -63,7 +63,7 @@ impl EffectKind for JointSpring {
 /// A spring between two levers of lengths a and r, q − q0 between them, makes
 /// k·a·r·sin(q − q0)·(1 − l/√(a² + r² − 2·a·r·cos(q − q0))): a sine where its rest length l is nought, and
 /// where it is not about −½·k·l·r²/a·sin 2(q − q0) more. The rigid body takes up the sine where the joint
-/// carries weight, but not the second harmonic. With a third one it would be any curve.
+/// carries weight, but not the second harmonic. With a third one it would fit curves of other origin, too.
 pub struct GravityBalancer;
 
 impl EffectKind for GravityBalancer {
@@ -92,7 +92,7 @@ impl EffectKind for GravityBalancer {
             return format!("{sine}.");
         }
         let second = found.in_unit_of(2, found.value(2).hypot(found.value(3)));
-        format!("{sine}, and {second} of twice that, as by a spring that has a length at rest.")
+        format!("{sine}, and {second} as a sine of twice it, as by a spring that has a length at rest.")
     }
     fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
         waves(found, 1.0)

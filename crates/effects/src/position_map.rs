@@ -13,8 +13,8 @@ use std::f64::consts::TAU;
 /// they show all of it. Its parameters are the torques at the knots.
 ///
 /// Between two knots it is a constant, a slope, and a sine and a cosine of the position
-/// ([`TrigonometricSpline`]), so what an offset, a spring, a balancer or gravity adds is in it exactly and
-/// never twice in a model. Beyond the arc the torque at its end goes on.
+/// ([`TrigonometricSpline`]), so what an offset, a spring, a balancer's first sine or gravity adds is in it
+/// exactly and never twice in a model. Beyond the arc the torque at its end goes on.
 pub struct PositionMap;
 
 /// Number of knots.

@@ -37,7 +37,7 @@ const SENTENCES: &[(&str, &str)] = &[
     ("joint_spring", "A spring pulls shoulder back: 0.500 N·m/rad."),
     (
         "gravity_balancer",
-        "shoulder is counterbalanced: up to 0.559 N·m as a sine of its angle, and 0.140 N·m of twice that, as by a spring that has a length at rest.",
+        "shoulder is counterbalanced: up to 0.559 N·m as a sine of its angle, and 0.140 N·m as a sine of twice it, as by a spring that has a length at rest.",
     ),
     ("torque_ripple", "The torque of shoulder ripples by 0.559 N·m, 12.0 times a turn."),
     ("end_stop", "shoulder runs into something stiff at -0.400: 0.500 N·m/rad."),

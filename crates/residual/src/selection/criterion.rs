@@ -3,6 +3,10 @@
 use super::fit::Fit;
 use super::problem::{Member, Problem};
 
+/// What a column costs that the fit does not determine: of two effects that do the same to the last digit, a
+/// balancer of the first joint and a force on its link, the one with fewer parameters is the better.
+const UNDETERMINED: f64 = 0.01;
+
 /// Σ n_e·log(rss/n) + Σ log n_e over columns and scanned constants + 2·log K for each choice, the smaller the
 /// better; twice a negative log-likelihood.
 ///
@@ -19,10 +23,6 @@ pub(super) fn criterion(problem: &Problem, members: &[Member], fit: &Fit, rows: 
     let columns: f64 = members.iter().map(|&member| price(problem, member, Some(fit), rows)).sum();
     likelihood + fit.prior_squares(problem) + columns + choices(problem, members)
 }
-
-/// What a column costs that the fit does not determine: of two effects that do the same to the last digit, a
-/// balancer of the first joint and a force on its link, the one with fewer parameters is the better.
-const UNDETERMINED: f64 = 0.01;
 
 /// What the columns and constants of a member cost; columns that `fit` does not determine cost next to
 /// nothing.

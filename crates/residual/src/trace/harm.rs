@@ -95,7 +95,6 @@ impl Search<'_> {
             let mean = with.mean_logarithm_from(share) - without.mean_logarithm_from(share);
             let together = (self.counted(&with) / self.counted(&without)).ln();
             if mean.max(together) > self.least_growth() {
-                branch.held_out_had_a_say = true;
                 branch.left_out_by_held_out.push(self.specs[place].clone());
                 return Ok(Some(branch));
             }

@@ -53,7 +53,6 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
         bent: Vec::new(),
         refined: Vec::new(),
         noise: input.noise_floor.clone(),
-        held_out_had_a_say: false,
         left_out_by_held_out: Vec::new(),
         input: &input,
         options,
@@ -119,9 +118,7 @@ pub(super) struct Search<'a> {
     pub refined: Vec<Refined>,
     /// What counts as noise of each torque where names are judged, RMS \[N·m, N\].
     pub noise: Vec<f64>,
-    /// Whether motion held out had a say.
-    pub held_out_had_a_say: bool,
-    /// What was left out for that.
+    /// What was left out since motion held out had a say.
     pub left_out_by_held_out: Vec<EffectSpec>,
     pub input: &'a TraceInput<'a>,
     pub options: &'a TraceOptions,

@@ -49,7 +49,8 @@ impl Search<'_> {
         let other = other.finish()?;
         let [own, before] = [&other, &tracing].map(|end| self.counted(&end.model.held_out));
         let is_no_worse = own <= before * self.options.thresholds.same_error;
-        Ok(if is_no_worse { other } else { tracing })
+        // Motion held out had its say here, too.
+        Ok(if is_no_worse { other } else { Tracing { held_out_had_a_say: true, ..tracing } })
     }
 
     /// The start that has what the textbook has of every joint and limits of drives, all of it declared by
@@ -120,6 +121,10 @@ impl Search<'_> {
         self.reorder(&order)?;
         self.chosen.alternatives.drain(..declared.len());
         self.declared = declared.len();
+        // What had left is back with what was declared.
+        let specs = &self.specs;
+        self.left_out_by_held_out
+            .retain(|out| !specs.iter().any(|own| own.kind == out.kind && own.joints == out.joints));
         Ok(())
     }
 }

@@ -9,8 +9,8 @@ use thiserror::Error;
 /// prints for every value what is named falsely, what is called sufficient, and how many effects are named.
 ///
 /// What a probe must foretell (`probe/`), how much error parameters may make (`remaining.rs`), when an effect
-/// is a rival (`order.rs`) and when a drive's limit is one (`limits.rs`) stand as constants where they are
-/// used.
+/// is a rival (`order.rs`), when a drive's limit is one (`limits.rs`) and what a parameter costs that nothing
+/// tells (`selection/criterion.rs`) stand as constants where they are used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {
     /// Probability of naming anything on a right model, for all candidates of a run together; that at which
