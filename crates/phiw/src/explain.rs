@@ -116,7 +116,7 @@ fn results_knowing(
         return results_knowing(&others, console, &known);
     }
     let known = &OfTheLogs { compared: true, ..known.clone() };
-    let Traced { start, declared, floor, mut tracing } = traced(arguments, &excluded, &session, &data)?;
+    let Traced { start, declared, mut tracing } = traced(arguments, &excluded, &session, &data)?;
     let least_share = thresholds(arguments)?.least_share;
     if let Some(corner_hz) = low_passed_in_band(arguments, &session, &tracing, least_share) {
         let corner = significant(corner_hz, 3);
@@ -178,7 +178,7 @@ fn results_knowing(
         let differs = changes_in(arguments, model, odd).ok().flatten();
         analysis.warnings.push(odd_log::warning(odd, differs.as_deref()));
     }
-    analysis.noise_floor = with_disturbances(floor, &tracing);
+    analysis.noise_floor.clone_from(&tracing.remaining.noise_floor);
     analysis.warnings.extend(known.low_passed.clone());
     analysis.warnings.extend(known.disturbed.warning(&session));
     if let Some(zeros) = &known.torque_zeros {
@@ -210,17 +210,6 @@ fn results_knowing(
     let mut summary = story(&analysis, &tracing, in_draws);
     summary.push_str(&summary::summary(&analysis, &arguments.session.out, &files));
     Ok(Results { files, summary, warnings: analysis.warnings, report })
-}
-
-/// The noise floor of torques whose disturbance follows nothing that was measured is what the model leaves of
-/// them in training: noise that hangs together over time is far less from sample to sample than in the band
-/// of the motion.
-fn with_disturbances(mut floor: Vec<f64>, tracing: &Tracing) -> Vec<f64> {
-    let Tracing { model, remaining, .. } = tracing;
-    for disturbance in &remaining.disturbances {
-        floor[disturbance.row] = floor[disturbance.row].max(model.fit.residual_std[disturbance.row]);
-    }
-    floor
 }
 
 /// The corner of the filter that the torque went through before it was logged \[Hz\], if that is below the
@@ -267,11 +256,10 @@ pub fn command_line(arguments: &ExplainArguments) -> String {
     line
 }
 
-/// A model to start from, the declared one where none is held, the noise floor, and what was traced.
+/// A model to start from, the declared one where none is held, and what was traced.
 struct Traced {
     start: Model,
     declared: Option<Identified>,
-    floor: Vec<f64>,
     tracing: Tracing,
 }
 
@@ -301,13 +289,13 @@ fn traced(
         parameters: start.parameters,
         residual_std: start.model.residual_std.clone(),
         held: start.held,
-        noise_floor: floor.clone(),
+        noise_floor: floor,
         rows_per_independent: (plan.output_rate_hz() / (2.0 * conditioning.parallel_cutoff_hz)).max(1.0),
     };
     let mut options = TraceOptions { excluded, ..TraceOptions::default() };
     options.thresholds = thresholds(arguments)?;
     let tracing = trace(input, &options)?;
-    Ok(Traced { start: start.model, declared: start.declared, floor, tracing })
+    Ok(Traced { start: start.model, declared: start.declared, tracing })
 }
 
 /// The thresholds that are asked for, or else their defaults.

@@ -87,7 +87,7 @@ impl Search<'_> {
         self.judge_beside_forms(trial, &mut judged);
         self.judge_small(trial, &mut judged)?;
         self.judge_interchangeable(trial, &mut judged);
-        self.name_families(&mut judged);
+        self.name_families(trial, &mut judged);
         Ok(judged)
     }
 
@@ -197,13 +197,22 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Names with a kind of the textbook what is as certain of it on other joints, however small, where it
-    /// has a name on most of them: where joints rub, all do that are seen to.
-    fn name_families(&self, judged: &mut [Judged]) {
+    /// Names with a kind of the textbook what is as certain of it on other joints, and not as good as nothing
+    /// beside their torques, where it has a name on most of them: where joints rub, all do that are seen to.
+    fn name_families(&self, trial: &Trial, judged: &mut [Judged]) {
+        let least = self.options.thresholds.negligible_share().powi(2);
+        let is_there = |place: usize, torque: usize| {
+            let whole = trial.torque(torque).right_hand_side();
+            trial.member(place).is_some_and(|member| trial.size_beside(member, &[], torque) >= least * whole)
+        };
         for kind in self.fixed.catalogue.kinds().filter(|kind| kind.joint_property().is_some()) {
             let is_member = |judged: &&mut Judged| {
                 let is_of_kind = self.specs[judged.place].kind == kind.name();
-                judged.certain && is_of_kind && self.may_have_a_name(judged.place)
+                let mut torques = 0..trial.problem.torques.len();
+                judged.certain
+                    && is_of_kind
+                    && self.may_have_a_name(judged.place)
+                    && torques.any(|torque| is_there(judged.place, torque))
             };
             let members: Vec<&mut Judged> = judged.iter_mut().filter(is_member).collect();
             let named = members.iter().filter(|member| member.named).count();

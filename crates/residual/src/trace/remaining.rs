@@ -36,22 +36,36 @@ impl Search<'_> {
         let worse_than_none: Vec<usize> = error.torques_worse_than_none().collect();
         let large: Vec<usize> =
             (0..error.rmse.len()).filter(|&row| is_large(row) || worse_than_none.contains(&row)).collect();
-        let mut remaining =
-            Remaining { unidentifiable: self.chosen.unidentifiable.clone(), ..Remaining::default() };
-        if large.is_empty() {
+        let small: Vec<usize> = (0..error.rmse.len())
+            .filter(|row| !large.contains(row) && self.is_above_floor(*row, training.rmse[*row]))
+            .collect();
+        let mut remaining = Remaining {
+            unidentifiable: self.chosen.unidentifiable.clone(),
+            noise_floor: self.input.noise_floor.clone(),
+            ..Remaining::default()
+        };
+        if large.is_empty() && small.is_empty() {
             return Ok(remaining);
         }
         let data = self.fixed.data;
         let folds = [data.train.as_slice(), &data.held_out].concat();
         let shape = self.shape_of_residual(&folds)?;
-        let fit = self.probed(&folds, &shape);
-        let following = probe::following(fit, &large)?;
+        let probed = self.probed(&folds, &shape);
         let wanders = |row: usize| self.wanders(&shape, row);
+        let of_small = probe::following(probed, &small)?;
+        let following = probe::following(probed, &large)?;
         let differs = |row: usize| changes.iter().any(|change| change.row == row);
         let is_structured = |row: &usize| {
             following.contains(row) || wanders(*row) || differs(*row) || worse_than_none.contains(row)
         };
         let (structured, colour): (Vec<usize>, Vec<usize>) = large.into_iter().partition(is_structured);
+        // Noise that hangs together over time is far less from sample to sample than in the band of the
+        // motion.
+        let of_noise = small.into_iter().filter(|row| !of_small.contains(row) && !wanders(*row));
+        for row in of_noise.chain(colour.iter().copied()) {
+            let left = if self.fixed.prior.is_some() { training.rmse[row] } else { fit.residual_std[row] };
+            remaining.noise_floor[row] = remaining.noise_floor[row].max(left);
+        }
         let name = |row: usize| self.fixed.tree.joint(row).joint.clone();
         let disturbance = |&row: &usize| Disturbance {
             row,
@@ -61,7 +75,7 @@ impl Search<'_> {
             autocorrelation: shape.autocorrelation[row],
         };
         remaining.disturbances = colour.iter().map(disturbance).collect();
-        remaining.depends_on = probe::probe(fit, &structured)?;
+        remaining.depends_on = probe::probe(probed, &structured)?;
         remaining.by_log = structured.iter().copied().filter(|&row| differs(row)).map(name).collect();
         remaining.joints = structured.into_iter().map(name).collect();
         Ok(remaining)
@@ -95,9 +109,14 @@ impl Search<'_> {
     /// of this motion.
     fn is_large(&self, row: usize, rmse: f64, expected: Expected) -> bool {
         let left = (rmse * rmse - expected.of_parameters).max(0.0).sqrt();
-        left > self.options.thresholds.same_error * self.input.noise_floor[row]
+        self.is_above_floor(row, left)
             && left > self.options.thresholds.least_visible * expected.torque.sqrt()
             && !self.is_as_it_was(row, rmse)
+    }
+
+    /// Whether an error (RMS) is more than what sensors' white noise makes.
+    fn is_above_floor(&self, row: usize, rmse: f64) -> bool {
+        rmse > self.options.thresholds.same_error * self.input.noise_floor[row]
     }
 
     /// Of each torque on motion held out: its mean square, and that of the error that parameters make which

@@ -88,6 +88,9 @@ pub struct Remaining {
     pub by_log: Vec<String>,
     /// Residuals larger than noise that follow nothing measured: no structure.
     pub disturbances: Vec<Disturbance>,
+    /// Of each torque the RMS of what no model can foretell \[N·m, N\]: white noise, or what the model leaves
+    /// in training where that is more and follows nothing measured.
+    pub noise_floor: Vec<f64>,
     /// The best candidates that were not good enough.
     pub ranking: Vec<Ranked>,
     /// What these logs cannot tell: candidates of which the motion leaves nothing beside the model's own

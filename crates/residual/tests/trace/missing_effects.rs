@@ -58,6 +58,25 @@ fn a_small_effect_that_leaves_noise_only_has_a_name_where_nothing_is_declared() 
     assert_eq!(tracing.verdict, Verdict::Explained);
 }
 
+/// Beside a viscous friction that rises a little less than its speed, a Coulomb friction of four thousandths
+/// of the torque was named, with those of the other joints. It is certain, and as good as nothing.
+#[test]
+fn what_is_as_good_as_nothing_is_not_named_with_its_family() {
+    for (friction, expected) in [(0.005, vec![["shoulder"]]), (0.1, vec![["elbow"], ["shoulder"]])] {
+        let secret = |state: &State<'_>, torque: &mut [f64]| {
+            torque[1] += (friction - 0.6) * (state.qd[1] / 0.01).tanh();
+        };
+        let tracing = traced_on(folds().0, &[], 11, &secret, false);
+        let named = named(&tracing);
+        let rubs: Vec<&Vec<String>> =
+            named.iter().filter(|(kind, _)| kind == "coulomb_friction").map(|(_, joints)| joints).collect();
+        assert_eq!(rubs, expected.iter().collect::<Vec<_>>(), "{friction} N·m");
+        let is_in =
+            tracing.specs.iter().any(|spec| spec.kind == "coulomb_friction" && spec.joints == ["elbow"]);
+        assert!(is_in, "{friction} N·m");
+    }
+}
+
 /// Right models whose friction turned as an arctangent does were given a Stribeck friction: how slowly a sign
 /// turns is no effect of its own.
 #[test]
