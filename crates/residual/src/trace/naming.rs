@@ -184,7 +184,7 @@ impl Search<'_> {
             }
             let mut branch = self.clone();
             branch.remove(judged.place)?;
-            branch.refine()?;
+            branch.refine_those(|spec| spec.joints.iter().any(|joint| own.joints.contains(joint)))?;
             let refined = branch.trial()?;
             let squares = Squares {
                 initial: initial.clone(),

@@ -52,7 +52,7 @@ impl Search<'_> {
         let shape = self.shape_of_residual(&folds)?;
         let probed = self.probed(&folds, &shape);
         let wanders = |row: usize| self.wanders(&shape, row);
-        let of_small = probe::following(probed, &small)?;
+        let of_small = probe::following_own_signal(probed, &small)?;
         let following = probe::following(probed, &large)?;
         let differs = |row: usize| changes.iter().any(|change| change.row == row);
         let is_structured = |row: &usize| {
@@ -60,7 +60,7 @@ impl Search<'_> {
         };
         let (structured, colour): (Vec<usize>, Vec<usize>) = large.into_iter().partition(is_structured);
         // Noise that hangs together over time is far less from sample to sample than in the band of the
-        // motion.
+        // motion. What is small beside its torque accuses nobody, and one signal at a time is asked of it.
         let of_noise = small.into_iter().filter(|row| !of_small.contains(row) && !wanders(*row));
         for row in of_noise.chain(colour.iter().copied()) {
             let left = if self.fixed.prior.is_some() { training.rmse[row] } else { fit.residual_std[row] };

@@ -60,11 +60,14 @@ pub(super) struct Fit<'a> {
 
 /// Which signals the residuals of the torques `rows` follow, strongest first.
 pub(super) fn probe(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<Dependence>, IdentificationError> {
-    let all = |row: usize| (0..fit.fixed.tree.joint_count()).filter(|&other| other != row).collect();
+    let all = |row: usize| -> Vec<usize> {
+        (0..fit.fixed.tree.joint_count()).filter(|&other| other != row).collect()
+    };
     let joint = |row: usize| fit.fixed.tree.joint(row).joint.clone();
     let of_probe =
         |probe: Probe| Dependence { joint: joint(probe.row), signals: probe.signals, share: probe.share };
-    let mut found: Vec<Dependence> = probes(fit, rows, all)?.into_iter().map(of_probe).collect();
+    let mut found: Vec<Dependence> =
+        probes(fit, rows, |row| shapes(fit, row, &all(row)))?.into_iter().map(of_probe).collect();
     found.sort_by(|a, b| b.share.total_cmp(&a.share));
     Ok(found)
 }
@@ -72,10 +75,21 @@ pub(super) fn probe(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<Dependence>, Ide
 /// Those of the torques `rows` whose residual follows the motion of the joint or of its neighbours, or a
 /// torque. Noise that does not know the motion foretells nothing, whatever its colour.
 pub(super) fn following(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<usize>, IdentificationError> {
-    let probes = probes(fit, rows, |row| others::neighbours(fit.fixed.tree, row))?;
+    let neighbours = |row: usize| others::neighbours(fit.fixed.tree, row);
+    Ok(rows_of(&probes(fit, rows, |row| shapes(fit, row, &neighbours(row)))?))
+}
+
+/// Those of the torques `rows` whose residual follows one signal of its own joint: an eighth of the work of
+/// [`following`].
+pub(super) fn following_own_signal(fit: Fit<'_>, rows: &[usize]) -> Result<Vec<usize>, IdentificationError> {
+    Ok(rows_of(&probes(fit, rows, |row| own::single(&torque(fit, row)))?))
+}
+
+/// The torques of the probes, which are in their order.
+fn rows_of(probes: &[Probe]) -> Vec<usize> {
     let mut rows: Vec<usize> = probes.iter().map(|probe| probe.row).collect();
     rows.dedup();
-    Ok(rows)
+    rows
 }
 
 /// Shapes over some signals that foretell a residual.
@@ -85,9 +99,13 @@ struct Probe {
     share: f64,
 }
 
+fn torque(fit: Fit<'_>, row: usize) -> Torque<'_> {
+    Torque { fixed: fit.fixed, row, ranges: fit.ranges, peaks: fit.peaks }
+}
+
 /// All shapes in the torque of `row`, those over the motion of the `moving` joints among them.
 fn shapes(fit: Fit<'_>, row: usize, moving: &[usize]) -> Vec<Shape> {
-    let torque = Torque { fixed: fit.fixed, row, ranges: fit.ranges, peaks: fit.peaks };
+    let torque = torque(fit, row);
     let mut shapes = own::single(&torque);
     shapes.extend(own::products(&torque));
     shapes.extend(swings::swings(&torque));
@@ -97,18 +115,18 @@ fn shapes(fit: Fit<'_>, row: usize, moving: &[usize]) -> Vec<Shape> {
     shapes
 }
 
-/// The shapes that foretell something, torque by torque.
+/// Those of the `shapes` of each torque that foretell something, torque by torque.
 fn probes(
     fit: Fit<'_>,
     rows: &[usize],
-    moving: impl Fn(usize) -> Vec<usize>,
+    shapes: impl Fn(usize) -> Vec<Shape>,
 ) -> Result<Vec<Probe>, IdentificationError> {
     if rows.is_empty() {
         return Ok(Vec::new());
     }
     let (mut effects, mut looked_at) = (Vec::new(), Vec::new());
     for &row in rows {
-        for Shape { signals, effect, least_share } in shapes(fit, row, &moving(row)) {
+        for Shape { signals, effect, least_share } in shapes(row) {
             effects.push(effect);
             looked_at.push((row, signals, least_share));
         }
