@@ -37,13 +37,15 @@ const SENTENCES: &[(&str, &str)] = &[
     ("joint_spring", "A spring pulls shoulder back: 0.500 N·m/rad."),
     (
         "gravity_balancer",
-        "shoulder is counterbalanced: up to 0.559 N·m as a sine of its angle, and 0.140 N·m as a sine of twice it, as by a spring that has a length at rest.",
+        "shoulder is counterbalanced: up to 0.559 N·m as a sine of its angle, and 0.140 N·m as a sine \
+         of twice it, as by a spring that has a length at rest.",
     ),
     ("torque_ripple", "The torque of shoulder ripples by 0.559 N·m, 12.0 times a turn."),
     ("end_stop", "shoulder runs into something stiff at -0.400: 0.500 N·m/rad."),
     (
         "transmission_coupling",
-        "shoulder and elbow share a transmission: 0.500 N·m·s/rad of viscous friction of the first on the second, 0.250 N·m of Coulomb friction of the first on the second.",
+        "shoulder and elbow share a transmission: 0.500 N·m·s/rad of viscous friction of the first on \
+         the second, 0.250 N·m of Coulomb friction of the first on the second.",
     ),
     ("time_delay", "The torque of shoulder is stamped 500.00 ms late."),
     ("encoder_offset", "The zero of shoulder's encoder is off by 0.500 rad."),
@@ -69,7 +71,8 @@ const SENTENCES: &[(&str, &str)] = &[
     ),
     (
         "position_map",
-        "The torque of shoulder depends on its position in no simple form (a cable, a hose, cogging): it varies by 0.159 N·m RMS from -1.000 to 1.000 rad.",
+        "The torque of shoulder depends on its position in no simple form (a cable, a hose, cogging): \
+         it varies by 0.159 N·m RMS from -1.000 to 1.000 rad.",
     ),
     (
         "position_dependent_friction",

@@ -32,7 +32,7 @@ pub struct Thresholds {
     /// turns is no effect of its own.
     pub least_of_others: f64,
     /// RMS of what an effect takes over the RMS of its torque, at least, to have a name. Half of it is as
-    /// good as nothing ([`Self::negligible_share`]).
+    /// good as nothing ([`Self::negligible_share`]), also for a member of a family that has a name.
     pub least_size: f64,
     /// Share of a torque (RMS) that is seen by itself: what an effect is, beyond what others of its signal
     /// that were found could do, where the other parameters have taken up most of it, to have a name; what
@@ -89,8 +89,8 @@ impl Thresholds {
         Err(UnknownThreshold { name: name.to_owned(), known })
     }
 
-    /// A residual below this share of its torque (RMS) is as good as none: nothing is sought in it, and it
-    /// does no harm to be larger than it was. What is left of an effect of `least_size` where the other
+    /// A residual, or an effect, below this share of its torque (RMS) is as good as none: nothing is sought
+    /// in such a residual, and it does no harm to be larger than it was. What is left of an effect of `least_size` where the other
     /// parameters have taken up a part of it is above.
     pub fn negligible_share(&self) -> f64 {
         0.5 * self.least_size

@@ -1,6 +1,6 @@
 //! What is noise, and what is structure that no effect accounts for.
 
-use super::robot::{RATE, State, named, traced};
+use super::robot::{DECLARED, RATE, State, folds, named, traced, traced_on};
 use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_residual::trace::Verdict;
 use std::cell::RefCell;
@@ -52,15 +52,13 @@ fn coloured_noise_is_no_structure() {
 /// noise: two thirds of what it left here, a sixtieth on other robots.
 #[test]
 fn the_floor_is_what_noise_of_any_colour_and_size_leaves() {
-    for rms in [0.02, 0.3] {
+    for (rms, held) in [(0.02, false), (0.3, false), (0.02, true), (0.3, true)] {
         let noise = coloured_noise_of(rms);
-        let tracing = traced(11, &|_, torque| noise(torque));
+        let tracing = traced_on(folds().0, &DECLARED, 11, &|_, torque| noise(torque), held);
         assert_eq!(tracing.verdict, Verdict::Sufficient, "{:?}", tracing.remaining.depends_on);
         for (floor, left) in tracing.remaining.noise_floor.iter().zip(&tracing.model.held_out.rmse) {
-            assert!(
-                (0.8..1.25).contains(&(floor / left)),
-                "noise of {rms} N·m: {floor} N·m, left {left} N·m"
-            );
+            let is_all = (0.8..1.25).contains(&(floor / left));
+            assert!(is_all, "noise of {rms} N·m, held {held}: {floor} N·m, left {left} N·m");
         }
     }
 }
