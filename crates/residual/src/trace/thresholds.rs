@@ -90,8 +90,8 @@ impl Thresholds {
     }
 
     /// A residual, or an effect, below this share of its torque (RMS) is as good as none: nothing is sought
-    /// in such a residual, and it does no harm to be larger than it was. What is left of an effect of `least_size` where the other
-    /// parameters have taken up a part of it is above.
+    /// in such a residual, and it does no harm to be larger than it was. What is left of an effect of
+    /// `least_size` where the other parameters have taken up a part of it is above.
     pub fn negligible_share(&self) -> f64 {
         0.5 * self.least_size
     }
