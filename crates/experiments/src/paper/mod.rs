@@ -43,6 +43,7 @@ mod method;
 mod motions;
 mod numbers;
 mod page;
+mod reasons;
 mod reliability;
 mod report;
 mod run_file;

@@ -1,8 +1,8 @@
 //! The paper's numbers, and ours beside them.
 
-use super::arguments::RelaxationName;
 use super::arm::{Arm, Footing};
 use super::ending::Savings;
+use super::reasons;
 use super::reliability;
 use super::report::Results;
 use super::run_file::RunFile;
@@ -86,8 +86,7 @@ impl Table<'_> {
                 name,
                 "…, 0.243",
                 medians(&series[1..], 3),
-                "the noise moves the robot, and is not in the log: the columns of Φ are correlated with \
-                 it, which (4) takes for physics; more logs do not help",
+                reasons::of_least_squares(results.settings.noise_in),
             );
         }
     }
@@ -140,14 +139,7 @@ impl Table<'_> {
             "α, median by iteration",
             "0.74, …, 0.3",
             medians(&alpha, 2),
-            match results.settings.relaxation {
-                RelaxationName::Condition => {
-                    "α_max by the share of motions; a such that the second α is 0.8 α_max, as cond has another scale here"
-                }
-                RelaxationName::Uncertainty => {
-                    "α_max by the share of motions; then in proportion to how uncertain the torques of all motions are, the second α 0.8 α_max"
-                }
-            },
+            reasons::of_alpha(results.settings.relaxation, results.settings.method),
         );
         let motions = results.settings.dataset.len() as f64;
         let share = results.records(home, Curriculum, |record| Some(100.0 * record.allowed as f64 / motions));
@@ -220,7 +212,7 @@ impl Table<'_> {
                     ),
                     "none reported",
                     format!("{outside}, {tipping} of {}; {time:.1}", kept.len()),
-                    "the base is bolted down; the noise of the torques shakes the ZMP at every instant",
+                    reasons::of_balance(results.settings.noise_in),
                 );
             }
         }

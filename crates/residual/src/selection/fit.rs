@@ -1,6 +1,6 @@
 //! A weighted fit of some parameters, from products.
 
-use super::cholesky::{TOGETHER, factor_rows, substitute, substitute_together};
+use super::blocks::Blocks;
 use super::problem::{Problem, Torque};
 
 /// A column of the model with less than this share of its squared norm left beside those before it is
@@ -35,8 +35,8 @@ pub(crate) struct Fit {
     absent: Vec<Vec<(usize, f64)>>,
     /// Whether the rows determine it beside those before it.
     pub determined: Vec<bool>,
-    /// L of the system's Cholesky factor, row-major.
-    triangle: Vec<f64>,
+    /// The system's Cholesky factor.
+    system: Blocks,
     /// L⁻¹ of the right-hand side.
     pub half: Vec<f64>,
     /// The value of every parameter: those that are not in the fit are absent.
@@ -108,7 +108,7 @@ impl Fit {
             own: self.own.clone(),
             absent: self.absent.clone(),
             determined: self.determined.clone(),
-            triangle: Vec::new(),
+            system: Blocks::default(),
             half: Vec::new(),
             values,
             rss: Vec::new(),
@@ -171,7 +171,7 @@ impl Fit {
             determined: vec![true; active.len()],
             active,
             place,
-            triangle: Vec::new(),
+            system: Blocks::default(),
             half: Vec::new(),
             values: problem.absent.clone(),
             rss: match start {
@@ -232,14 +232,9 @@ impl Fit {
             self.active.iter().zip(&start.active).take_while(|(own, other)| own == other).count()
         };
         let kept = start.map_or(0, same);
-        let mut system = vec![0.0; size * size];
+        let mut system = self.of_zeros(problem);
         if let Some(start) = start {
-            let other = start.active.len();
-            for row in 0..kept {
-                system[row * size..row * size + row + 1]
-                    .copy_from_slice(&start.triangle[row * other..row * other + row + 1]);
-            }
-            self.determined[..kept].copy_from_slice(&start.determined[..kept]);
+            system.keep(&start.system, kept);
         }
         let mut right = vec![0.0; size];
         let given = if left_out.is_empty() { Vec::new() } else { problem.given() };
@@ -270,11 +265,15 @@ impl Fit {
                     }
                     products = &fewer;
                 }
-                if place >= kept {
-                    // What is above the diagonal is not looked at.
-                    let row = &mut system[place * size..place * size + place + 1];
+                // What is above the diagonal is not looked at, but a link is beside all blocks.
+                if system.is_link(place) {
+                    let others =
+                        self.own[torque].iter().filter(|(_, at)| *at <= place || !system.is_link(*at));
+                    let others: Vec<(usize, usize)> = others.copied().collect();
+                    others.iter().for_each(|&(other, at)| system.add(place, at, weight * products[other]));
+                } else if place >= kept {
                     let below = self.own[torque].iter().filter(|(_, at)| *at <= place);
-                    below.for_each(|&(other, at)| row[at] += weight * products[other]);
+                    below.for_each(|&(other, at)| system.add(place, at, weight * products[other]));
                 }
                 let absent: f64 =
                     self.absent[torque].iter().map(|&(other, value)| products[other] * value).sum();
@@ -288,16 +287,16 @@ impl Fit {
                 let products = prior.products.column(a);
                 right[at] += self.prior_weight * products[last];
                 for (b, other) in prior.parameters.iter().enumerate().filter(|_| at >= kept) {
-                    if let Some(other) = self.place[*other] {
-                        system[at * size + other] += self.prior_weight * products[b];
+                    if let Some(other) = self.place[*other].filter(|other| *other <= at) {
+                        system.add(at, other, self.prior_weight * products[b]);
                     }
                 }
             }
         }
         let model = problem.model.len();
         let least = |row: usize| if row < model { DEPENDENT } else { ABSORBED };
-        factor_rows(&mut system, kept, &mut self.determined, least);
-        self.triangle = system;
+        system.factor(kept, &mut self.determined, least);
+        self.system = system;
         self.half = self.forward(&right);
         let solution = self.backward(self.half.clone());
         self.values.clone_from(&problem.absent);
@@ -306,44 +305,33 @@ impl Fit {
         }
     }
 
+    /// A system of zeros, in blocks of limbs. What was known before is of the whole robot.
+    fn of_zeros(&self, problem: &Problem) -> Blocks {
+        let size = self.active.len();
+        if problem.prior.is_some() {
+            return Blocks::of_zeros(size, size, &[(0..size).collect()]);
+        }
+        let of_torque = |(own, rows): (&Vec<(usize, usize)>, &Torque)| {
+            let acts = |column: usize| rows.whole.column(column)[column] != 0.0;
+            own.iter().filter(|(column, _)| acts(*column)).map(|&(_, place)| place).collect()
+        };
+        let of_torques: Vec<Vec<usize>> = self.own.iter().zip(&problem.torques).map(of_torque).collect();
+        Blocks::of_zeros(size, problem.model.len(), &of_torques)
+    }
+
     /// L⁻¹·x.
     pub fn forward(&self, x: &[f64]) -> Vec<f64> {
-        let mut y = vec![0.0; self.active.len()];
-        substitute(&self.triangle, &self.determined, x, &mut y);
-        y
+        self.system.forward(x)
     }
 
     /// L⁻¹·x for several x.
     pub fn forward_all(&self, all: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let together = |several: &[Vec<f64>]| -> Vec<Vec<f64>> {
-            // Of two the numbers are not worth putting side by side.
-            if several.len() <= 2 {
-                return several.iter().map(|x| self.forward(x)).collect();
-            }
-            let mut sides = vec![[0.0; TOGETHER]; self.active.len()];
-            for (lane, x) in several.iter().enumerate() {
-                sides.iter_mut().zip(x).for_each(|(side, x)| side[lane] = *x);
-            }
-            substitute_together(&self.triangle, &self.determined, &mut sides);
-            (0..several.len()).map(|lane| sides.iter().map(|side| side[lane]).collect()).collect()
-        };
-        all.chunks(TOGETHER).flat_map(together).collect()
+        self.system.forward_all(all)
     }
 
     /// L⁻ᵀ·y.
-    pub fn backward(&self, mut y: Vec<f64>) -> Vec<f64> {
-        let size = self.active.len();
-        for row in (0..size).rev() {
-            if !self.determined[row] {
-                y[row] = 0.0;
-                continue;
-            }
-            let own = &self.triangle[row * size..row * size + row + 1];
-            y[row] /= own[row];
-            let value = y[row];
-            y[..row].iter_mut().zip(own).for_each(|(y, entry)| *y -= entry * value);
-        }
-        y
+    pub fn backward(&self, y: Vec<f64>) -> Vec<f64> {
+        self.system.backward(y)
     }
 
     /// What the prior says against the values: its weighted squares.

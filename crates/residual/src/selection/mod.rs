@@ -10,6 +10,7 @@
 
 mod admissible;
 mod anew;
+mod blocks;
 mod cholesky;
 mod criterion;
 mod cross_validation;
