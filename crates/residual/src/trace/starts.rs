@@ -18,7 +18,9 @@ impl Search<'_> {
     /// - Where the torques agree better once one of them is a multiple of what is logged, and still do in the
     ///   end, another start has that in force, too: to first order a factor of two is no factor, and other
     ///   effects would stand for it.
-    /// - Where the end leaves structure, another search from the same start seeks what makes frictions vary
+    /// - Where the end leaves structure, it is searched again from there, with nothing refuted any more: what
+    ///   was refuted beside all that was still missing may be right beside what was found since.
+    /// - Where that leaves structure, too, another search from the same start seeks what makes frictions vary
     ///   at once (`variation.rs`): many effects together had stood for that, and left it no work. Whether
     ///   there is structure is asked of all logs, which end is the better one of the training logs alone,
     ///   unless it leaves more of the motion held out.
@@ -38,19 +40,34 @@ impl Search<'_> {
                 best = other;
             }
         }
-        let tracing = best.clone().finish()?;
+        let mut tracing = best.clone().finish()?;
+        if tracing.remaining.joints.is_empty() {
+            return Ok(tracing);
+        }
+        let mut again = Search { refuted: Vec::new(), ..best.clone() }.searched()?;
+        again.forget_what_came_back();
+        (best, tracing) = best.or_better((tracing, again))?;
         if tracing.remaining.joints.is_empty() || !beginning.may_vary() {
             return Ok(tracing);
         }
-        let other = end_of(Search { asks_of_variation: true, ..beginning.clone() })?;
-        if !other.is_better_than(&best)? {
-            return Ok(tracing);
+        let varying = end_of(Search { asks_of_variation: true, ..beginning.clone() })?;
+        Ok(best.or_better((tracing, varying))?.1)
+    }
+
+    /// This end and what came of it, or another and what comes of that, where the training logs say that it is
+    /// better and it leaves no more of the motion held out.
+    fn or_better(self, (tracing, other): (Tracing, Self)) -> Result<(Self, Tracing), IdentificationError> {
+        if !other.is_better_than(&self)? {
+            return Ok((self, tracing));
         }
-        let other = other.finish()?;
-        let [own, before] = [&other, &tracing].map(|end| self.counted(&end.model.held_out));
-        let is_no_worse = own <= before * self.options.thresholds.same_error;
-        // Motion held out had its say here, too.
-        Ok(if is_no_worse { other } else { Tracing { held_out_had_a_say: true, ..tracing } })
+        let of_other = other.clone().finish()?;
+        let [own, before] = [&of_other, &tracing].map(|end| self.counted(&end.model.held_out));
+        Ok(if own <= before * self.options.thresholds.same_error {
+            (other, of_other)
+        } else {
+            // Motion held out had its say here, too.
+            (self, Tracing { held_out_had_a_say: true, ..tracing })
+        })
     }
 
     /// The start that has what the textbook has of every joint and limits of drives, all of it declared by
@@ -121,10 +138,14 @@ impl Search<'_> {
         self.reorder(&order)?;
         self.chosen.alternatives.drain(..declared.len());
         self.declared = declared.len();
-        // What had left is back with what was declared.
+        self.forget_what_came_back();
+        Ok(())
+    }
+
+    /// What had left for what it does to motion held out, and is in the model again, has not left.
+    fn forget_what_came_back(&mut self) {
         let specs = &self.specs;
         self.left_out_by_held_out
             .retain(|out| !specs.iter().any(|own| own.kind == out.kind && own.joints == out.joints));
-        Ok(())
     }
 }
