@@ -92,8 +92,8 @@ fn limb(of: &[usize], mut torque: usize) -> usize {
 }
 
 impl Blocks {
-    /// Zeros for a system of `size` places, `of_torques` of which act on each torque. The first `model` places
-    /// say which torques are of one limb.
+    /// Zeros for a system of `size` places, `of_torques` of which act on each torque. The first `model`
+    /// places say which torques are of one limb.
     pub fn of_zeros(size: usize, model: usize, of_torques: &[Vec<usize>]) -> Self {
         let mut limbs: Vec<usize> = (0..of_torques.len()).collect();
         let mut torque_of: Vec<Option<usize>> = vec![None; size];

@@ -54,8 +54,8 @@ impl Search<'_> {
         Ok(best.or_better((tracing, varying))?.1)
     }
 
-    /// This end and what came of it, or another and what comes of that, where the training logs say that it is
-    /// better and it leaves no more of the motion held out.
+    /// This end and what came of it, or another and what comes of that, where the training logs say that it
+    /// is better and it leaves no more of the motion held out.
     fn or_better(self, (tracing, other): (Tracing, Self)) -> Result<(Self, Tracing), IdentificationError> {
         if !other.is_better_than(&self)? {
             return Ok((self, tracing));
