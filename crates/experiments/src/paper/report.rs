@@ -128,10 +128,11 @@ pub fn page(results: &Results) -> String {
     if !secrets.is_empty() {
         page.heading("Effects that nobody declared");
         page.say(
-            "After the last iteration, medians over the seeds: without and with the loop closed. “Found” is the right kind on the right \
-             joints; another name is any effect beside that one. Where a secret is and how large follows from the seed: it takes 12 to 30 % of the RMS torque that \
-             the references ask of its joint. How many standard deviations it is from nothing, over all logs of a run with the loop closed, is √(2·gain) of its kind \
-             on its joints in the score test.",
+            "After the last iteration, medians over the seeds: without and with the loop closed. “Found” is the \
+             right kind on the right joints; another name is any effect beside that one. Where a secret is and \
+             how large follows from the seed: it takes 12 to 30 % of the RMS torque that the references ask of \
+             its joint. How many standard deviations it is from nothing, over all logs of a run with the loop \
+             closed, is √(2·gain) of its kind on its joints in the score test.",
         );
         page.table(&secrets::HEAD, &secrets);
     }

@@ -83,7 +83,7 @@ impl Block {
     }
 }
 
-/// The torque that stands for all of a limb, of those that `of` leads to.
+/// The torque that stands for the limb of `torque`: the last that `of` leads to, which leads to itself.
 fn limb(of: &[usize], mut torque: usize) -> usize {
     while of[torque] != torque {
         torque = of[torque];
@@ -111,7 +111,7 @@ impl Blocks {
                 is_link[place] |= limb(&limbs, first) != limb(&limbs, torque);
             }
         }
-        // What acts on no torque is in a block of its own kind, the last.
+        // What acts on no torque is in the last block.
         let mut of_blocks: Vec<Vec<usize>> = vec![Vec::new(); of_torques.len() + 1];
         let mut blocks = Blocks::default();
         for place in 0..size {

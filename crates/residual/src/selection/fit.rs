@@ -267,10 +267,11 @@ impl Fit {
                 }
                 // What is above the diagonal is not looked at, but a link is beside all blocks.
                 if system.is_link(place) {
-                    let others =
-                        self.own[torque].iter().filter(|(_, at)| *at <= place || !system.is_link(*at));
-                    let others: Vec<(usize, usize)> = others.copied().collect();
-                    others.iter().for_each(|&(other, at)| system.add(place, at, weight * products[other]));
+                    for &(other, at) in &self.own[torque] {
+                        if at <= place || !system.is_link(at) {
+                            system.add(place, at, weight * products[other]);
+                        }
+                    }
                 } else if place >= kept {
                     let below = self.own[torque].iter().filter(|(_, at)| *at <= place);
                     below.for_each(|&(other, at)| system.add(place, at, weight * products[other]));

@@ -55,7 +55,7 @@ impl Search<'_> {
     }
 
     /// This end and what came of it, or another and what comes of that, where the training logs say that it
-    /// is better and it leaves no more of the motion held out.
+    /// is better and motion held out is no worse ([`super::Thresholds::same_error`]).
     fn or_better(self, (tracing, other): (Tracing, Self)) -> Result<(Self, Tracing), IdentificationError> {
         if !other.is_better_than(&self)? {
             return Ok((self, tracing));
