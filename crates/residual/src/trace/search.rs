@@ -35,28 +35,9 @@ pub fn trace(input: TraceInput<'_>, options: &TraceOptions) -> Result<Tracing, I
     let sample = Sample::of(input.data, input.ranges.period)?;
     let data = sample.data(&input.data.rest_speeds);
     let fixed = Fixed::new(&input, &data, options)?;
-    let search = Search {
-        fixed: &fixed,
-        whole: if data.train == input.data.train { &data } else { input.data },
-        specs: input.declared.clone(),
-        parameters: input.parameters.clone(),
-        declared: input.declared.len(),
-        declared_stays: fixed.prior.is_some(),
-        withdrawn: Vec::new(),
-        folds: split_by_motion(&fixed, split(&data.train, 1))?,
-        grows: true,
-        chosen: Chosen::default(),
-        asks_of_logs: false,
-        asks_of_variation: false,
-        refuted: Vec::new(),
-        uncertain: Vec::new(),
-        bent: Vec::new(),
-        refined: Vec::new(),
-        noise: input.noise_floor.clone(),
-        left_out_by_held_out: Vec::new(),
-        input: &input,
-        options,
-    };
+    // Pieces of long logs are searched, and all of them fitted in the end.
+    let whole = if data.train == input.data.train { &data } else { input.data };
+    let search = Search::of_declared(&fixed, whole, &input, options)?;
     let tracing = search.clone().run()?;
     if tracing.withdrawn.is_empty() || search.is_no_worse_than_declared(&tracing) {
         return Ok(tracing);
@@ -120,8 +101,44 @@ pub(super) struct Search<'a> {
     pub noise: Vec<f64>,
     /// What was left out since motion held out had a say.
     pub left_out_by_held_out: Vec<EffectSpec>,
+    /// Whether this end was taken before another since that leaves more of the motion held out.
+    pub held_out_had_a_say: bool,
     pub input: &'a TraceInput<'a>,
     pub options: &'a TraceOptions,
+}
+
+impl<'a> Search<'a> {
+    /// The declared (or held) model, before anything is sought.
+    pub(super) fn of_declared(
+        fixed: &'a Fixed<'a>,
+        whole: &'a Data<'a>,
+        input: &'a TraceInput<'a>,
+        options: &'a TraceOptions,
+    ) -> Result<Self, IdentificationError> {
+        Ok(Search {
+            fixed,
+            whole,
+            specs: input.declared.clone(),
+            parameters: input.parameters.clone(),
+            declared: input.declared.len(),
+            declared_stays: fixed.prior.is_some(),
+            withdrawn: Vec::new(),
+            folds: split_by_motion(fixed, split(&fixed.data.train, 1))?,
+            grows: true,
+            chosen: Chosen::default(),
+            asks_of_logs: false,
+            asks_of_variation: false,
+            refuted: Vec::new(),
+            uncertain: Vec::new(),
+            bent: Vec::new(),
+            refined: Vec::new(),
+            noise: input.noise_floor.clone(),
+            left_out_by_held_out: Vec::new(),
+            held_out_had_a_say: false,
+            input,
+            options,
+        })
+    }
 }
 
 impl Search<'_> {

@@ -26,32 +26,34 @@ impl Search<'_> {
     ///   unless it leaves more of the motion held out.
     pub(super) fn run(self) -> Result<Tracing, IdentificationError> {
         let start = if self.fixed.prior.is_none() { self.textbook_start()? } else { None };
-        let end_of = |search: Self| match &start {
-            Some(_) => self.with_declared(search.searched()?),
-            None => search.searched(),
-        };
-        let beginning = start.as_ref().unwrap_or(&self);
-        let mut best = end_of(beginning.clone())?;
-        if let Some(with_multiples) = beginning.with_multiples()?
-            && best.still_asks_for(&with_multiples.specs[beginning.specs.len()..])?
+        let joins = start.is_some() && self.declared > 0;
+        let (end, tracing) = start.unwrap_or_else(|| self.clone()).best_end()?;
+        if joins { self.with_declared(end)?.finish() } else { Ok(tracing) }
+    }
+
+    /// The best end that is found from this start, and what comes of it.
+    fn best_end(self) -> Result<(Self, Tracing), IdentificationError> {
+        let mut best = self.clone().searched()?;
+        if let Some(with_multiples) = self.with_multiples()?
+            && best.still_asks_for(&with_multiples.specs[self.specs.len()..])?
         {
-            let other = end_of(with_multiples)?;
+            let other = with_multiples.searched()?;
             if other.is_better_than(&best)? {
                 best = other;
             }
         }
         let mut tracing = best.clone().finish()?;
         if tracing.remaining.joints.is_empty() {
-            return Ok(tracing);
+            return Ok((best, tracing));
         }
         let mut again = Search { refuted: Vec::new(), ..best.clone() }.searched()?;
         again.forget_what_came_back();
         (best, tracing) = best.or_better((tracing, again))?;
-        if tracing.remaining.joints.is_empty() || !beginning.may_vary() {
-            return Ok(tracing);
+        if tracing.remaining.joints.is_empty() || !self.may_vary() {
+            return Ok((best, tracing));
         }
-        let varying = end_of(Search { asks_of_variation: true, ..beginning.clone() })?;
-        Ok(best.or_better((tracing, varying))?.1)
+        let varying = Search { asks_of_variation: true, ..self }.searched()?;
+        best.or_better((tracing, varying))
     }
 
     /// This end and what came of it, or another and what comes of that, where the training logs say that it
@@ -65,8 +67,8 @@ impl Search<'_> {
         Ok(if own <= before * self.options.thresholds.same_error {
             (other, of_other)
         } else {
-            // Motion held out had its say here, too.
-            (self, Tracing { held_out_had_a_say: true, ..tracing })
+            let end = Search { held_out_had_a_say: true, ..self };
+            (end, Tracing { held_out_had_a_say: true, ..tracing })
         })
     }
 
@@ -93,19 +95,20 @@ impl Search<'_> {
     }
 
     /// An end that was reached with nothing declared, with what was declared put into it: what that does the
-    /// work of leaves, and nothing enters. What does harm leaves before that: with what was declared beside
-    /// it, another effect may look harmful in its place.
+    /// work of leaves, and nothing enters. Before that leaves
+    ///
+    /// - what does harm: with what was declared beside it, another effect may look harmful in its place;
+    /// - what was declared and is certain to be impossible, since nothing else is missing any more: what it
+    ///   did the work of would be missing after it.
     fn with_declared(&self, mut end: Self) -> Result<Self, IdentificationError> {
-        if self.declared > 0 {
-            end.refine_together()?;
-            end.without_harm(Harm::EachTorque)?;
-            let found = end.specs.len();
-            end.put_in_front(&self.specs[..self.declared])?;
-            if end.specs.len() > found {
-                end.grows = false;
-                end = end.searched()?;
-                end.grows = true;
-            }
+        end.refine_together()?;
+        end.without_harm(Harm::EachTorque)?;
+        let found = end.names();
+        end.put_in_front(&self.specs[..self.declared])?;
+        while end.withdraw()? {}
+        if end.names() != found {
+            end = Search { grows: false, ..end }.searched()?;
+            end.grows = true;
         }
         Ok(end)
     }
@@ -147,5 +150,92 @@ impl Search<'_> {
         let specs = &self.specs;
         self.left_out_by_held_out
             .retain(|out| !specs.iter().any(|own| own.kind == out.kind && own.joints == out.joints));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Search, Tracing};
+    use crate::trace::stage::Fixed;
+    use crate::trace::{TraceInput, TraceOptions, noise_floor};
+    use phiw_dynamics::random_tree::{RandomNumbers, RandomTreeOptions, random_tree};
+    use phiw_dynamics::{Tree, Workspace};
+    use phiw_effects::{Catalogue, SignalRanges};
+    use phiw_identification::{BlockSource, Data, EffectSpec, Fold, identify};
+    use phiw_telemetry::{Conditioning, ConditioningOptions, Recording};
+
+    /// Two joints of which the speed of each brakes the other.
+    fn coupled(tree: &Tree) -> Recording {
+        let mut random = RandomNumbers::new(7);
+        let mut workspace = Workspace::new(tree);
+        let joints = tree.joint_names().map(str::to_owned).collect();
+        let mut recording = Recording { joints, ..Recording::default() };
+        for row in 0..9000 {
+            let t = 0.004 * f64::from(row);
+            let (mut q, mut qd, mut qdd) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+            for sine in 0..8 {
+                let omega = 1.3 + 1.17 * f64::from(sine);
+                let (phase, joint) = (0.7 * f64::from(sine * sine), sine as usize % 2);
+                let (sine, cosine) = (omega * t + phase).sin_cos();
+                q[joint] += 0.3 * sine;
+                qd[joint] += 0.3 * omega * cosine;
+                qdd[joint] -= 0.3 * omega * omega * sine;
+            }
+            let mut torque = [0.0; 2];
+            tree.inverse_dynamics(&q, &qd, &qdd, &mut workspace, &mut torque).unwrap();
+            for joint in 0..2 {
+                torque[joint] += 8.0 * qd[joint] + 5.0 * qd[1 - joint] + 0.5 * random.uniform(-1.0, 1.0);
+            }
+            recording.t.push(t);
+            recording.q.extend(q);
+            recording.tau.extend(torque);
+        }
+        recording
+    }
+
+    /// What was refuted beside all that was still missing was not asked of again: it is, where the end leaves
+    /// structure.
+    #[test]
+    fn what_was_refuted_is_asked_of_again_where_the_end_leaves_structure() {
+        let tree = random_tree(5, &RandomTreeOptions { joints: 2, ..Default::default() }).unwrap();
+        let log = coupled(&tree);
+        let surveys = [log.survey().unwrap()];
+        let conditioning = Conditioning::choose(&surveys, &ConditioningOptions::default()).unwrap();
+        let blocks = log.blocks(&conditioning).unwrap();
+        let sources: Vec<&dyn BlockSource> = vec![&blocks];
+        let folds = |pieces: std::ops::Range<u8>| -> Vec<Fold> {
+            let fold = |start: f64| Fold { log: 0, start, end: start + 3.0 };
+            pieces.map(|piece| fold(3.0 * f64::from(piece))).collect()
+        };
+        let data = Data { train: folds(0..8), held_out: folds(8..12), sources, rest_speeds: vec![0.01; 2] };
+        let (catalogue, ranges) = (Catalogue::default(), SignalRanges::of_surveys(&surveys));
+        let viscous = catalogue.declare("viscous_friction", &tree, &ranges).unwrap();
+        let start = identify(&tree, viscous, &data).unwrap();
+        let input = TraceInput {
+            tree: &tree,
+            catalogue: &catalogue,
+            data: &data,
+            declared: start.design.effects().iter().map(|effect| effect.spec()).collect(),
+            parameters: start.fit.parameters.clone(),
+            residual_std: start.fit.residual_std.clone(),
+            held: None,
+            noise_floor: noise_floor(&tree, &[0.0; 2], &surveys, &conditioning, &data.sources).unwrap(),
+            rows_per_independent: 1.0,
+            ranges,
+        };
+        let options = TraceOptions::default();
+        let fixed = Fixed::new(&input, &data, &options).unwrap();
+        let declared = Search::of_declared(&fixed, &data, &input, &options).unwrap();
+        let joints: Vec<&str> = tree.joint_names().collect();
+        let coupling = EffectSpec::new("transmission_coupling", &joints);
+        let is_found = |tracing: &Tracing| {
+            tracing.specs.iter().any(|own| (&own.kind, &own.joints) == (&coupling.kind, &coupling.joints))
+        };
+        let without = TraceOptions { excluded: vec![coupling.clone()], ..options.clone() };
+        let excluded = Search { options: &without, ..declared.clone() }.best_end().unwrap().1;
+        let remaining = &excluded.remaining;
+        assert!(!is_found(&excluded) && !remaining.joints.is_empty(), "{:?} {remaining:?} {:?}", excluded.specs, excluded.model.held_out);
+        let refuted = Search { refuted: vec![coupling.clone()], ..declared }.best_end().unwrap().1;
+        assert!(is_found(&refuted) && refuted.remaining.joints.is_empty(), "{:?}", refuted.specs);
     }
 }

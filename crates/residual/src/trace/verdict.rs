@@ -176,7 +176,7 @@ impl Search<'_> {
             effects,
             refinements,
             remaining,
-            held_out_had_a_say: !self.left_out_by_held_out.is_empty(),
+            held_out_had_a_say: self.held_out_had_a_say || !self.left_out_by_held_out.is_empty(),
             left_out_by_held_out: self.left_out_by_held_out,
             not_judged,
         })
