@@ -4,8 +4,11 @@
 use phiw_identification::{BlockSource, Data, Fold, IdentificationError, KeptBlocks};
 use phiw_telemetry::{Block, WARM_UP_S};
 
-/// Samples that the search looks at, at most: a minute or two of motion.
+/// Samples that the search looks at, at most, unless they are less than [`SEARCHED_S`] of motion.
 const SEARCHED_SAMPLES: f64 = 30_000.0;
+/// Time that the search looks at where there is as much, however fast it is logged \[s\]: what is missing is
+/// told by motion, and many samples of a little of it leave out the rest of the joints' ranges.
+const SEARCHED_S: f64 = 100.0;
 /// Length of a piece \[s\]: long against a residual's correlation and against the filters' reach.
 const PIECE_S: f64 = 5.0;
 /// Blocks that short logs are cut into, at least, so that every processor has one; none is shorter than what
@@ -31,7 +34,8 @@ impl<'a> Sample<'a> {
     pub fn of(data: &Data<'a>, period_s: f64) -> Result<Self, IdentificationError> {
         let length = |folds: &[Fold]| folds.iter().map(|fold| fold.end - fold.start).sum::<f64>();
         let samples = (length(&data.train) + length(&data.held_out)) / period_s;
-        if samples.is_nan() || samples <= SEARCHED_SAMPLES {
+        let searched = SEARCHED_SAMPLES.max(SEARCHED_S / period_s);
+        if samples.is_nan() || samples <= searched {
             let warm_up = (WARM_UP_S / period_s).round() as usize;
             let wanted = LEAST_BLOCKS.div_ceil(data.sources.len().max(1));
             let kept = KeptBlocks::keep_parts(&data.sources, KEPT_BYTES, |block| {
@@ -40,7 +44,7 @@ impl<'a> Sample<'a> {
             })?;
             return Ok(Sample { train: data.train.clone(), held_out: data.held_out.clone(), kept });
         }
-        let share = SEARCHED_SAMPLES / samples;
+        let share = searched / samples;
         let (train, held_out) = (pieces(&data.train, share), pieces(&data.held_out, share));
         let warm_up = (WARM_UP_S / period_s).round() as usize;
         let within = |block: Block| {

@@ -79,6 +79,14 @@ impl<'a> Fixed<'a> {
         })
     }
 
+    /// Forgets the columns of earlier passes. Which of them are at hand decides about the last digits of
+    /// others, and where two models are as good as each other, these decide about the path.
+    pub fn forget_columns(&self) {
+        if let Ok(mut kept) = self.kept.lock() {
+            *kept = KeptColumns::default();
+        }
+    }
+
     pub fn build(&self, specs: &[EffectSpec]) -> Result<Vec<Box<dyn Effect>>, IdentificationError> {
         Ok(specs.iter().map(|spec| self.catalogue.build(spec, self.tree)).collect::<Result<_, _>>()?)
     }
