@@ -79,8 +79,7 @@ impl<'a> Fixed<'a> {
         })
     }
 
-    /// Forgets the columns of earlier passes. Which of them are at hand decides about the last digits of
-    /// others, and where two models are as good as each other, these decide about the path.
+    /// Forgets the columns of earlier passes, so that a search does not depend on which are at hand.
     pub fn forget_columns(&self) {
         if let Ok(mut kept) = self.kept.lock() {
             *kept = KeptColumns::default();
