@@ -1,20 +1,16 @@
 //! A fitted model with everything that the report says of it.
 
+use crate::noise_floor::{NOISE_MARGIN, noise_floor};
 use crate::possible_bodies::PossibleBodies;
 use crate::session::Session;
 use crate::traces::Traces;
 use crate::{Error, conventions, fingerprint, told, warnings};
 use phiw_identification::bandwidth::Bandwidth;
-use phiw_identification::effect::JointProperty;
 use phiw_identification::fitting::{held_out_change, log_changes, merge};
 use phiw_identification::model::DataFingerprint;
-use phiw_identification::{Data, EffectCatalogue, EffectSpec, Identified, Model, WithRests};
+use phiw_identification::{Data, Identified, Model, WithRests};
 use phiw_regressor::RegressorError;
 use phiw_report::json::InformationJson;
-use phiw_residual::trace;
-
-/// A residual up to this many times the noise floor is noise.
-pub const NOISE_MARGIN: f64 = 1.1;
 
 /// A fitted model with everything that the report says of it.
 pub struct Analysis<'a> {
@@ -184,29 +180,4 @@ pub enum Rows<'a> {
         /// Positions here and there in the logs \[rad, m\], one row after another.
         poses: &'a [f64],
     },
-}
-
-/// What the sensors' noise alone would leave under the model's inertia \[N·m, N\]; no more than the margin of
-/// noise above what the model left of the motion that it was identified from: inertias that few rows tell
-/// make any noise of the positions a large one.
-///
-/// # Errors
-/// A log cannot be read any more.
-pub fn noise_floor(session: &Session, rows: Rows<'_>, model: &Model) -> Result<Vec<f64>, Error> {
-    let tree = model.identified_tree(&session.tree)?;
-    let mut rotor = vec![0.0; tree.joint_count()];
-    let armature = Some(JointProperty::Armature);
-    let adds_inertia = |spec: &EffectSpec| session.catalogue.joint_property(spec) == armature;
-    for effect in model.effects.iter().filter(|effect| adds_inertia(&effect.spec)) {
-        let joint = effect.spec.joints.first().and_then(|joint| tree.joint_index(joint));
-        if let (Some(joint), Some(inertia)) = (joint, effect.parameters.first()) {
-            rotor[joint] += inertia.value;
-        }
-    }
-    let (surveys, conditioning) = (session.logs.surveys(), session.logs.conditioning());
-    let floor = match rows {
-        Rows::Logs(data) => trace::noise_floor(&tree, &rotor, surveys, conditioning, &data.sources)?,
-        Rows::Reduced { poses, .. } => trace::noise_floor_at(&tree, &rotor, surveys, conditioning, poses)?,
-    };
-    Ok(floor.iter().zip(&model.residual_std).map(|(floor, left)| floor.min(NOISE_MARGIN * left)).collect())
 }

@@ -1,6 +1,6 @@
 //! `phiw explain`: the declared model, what it lacks, and the error before and after.
 
-use crate::analysis::{Analysis, Rows, noise_floor};
+use crate::analysis::{Analysis, Rows};
 use crate::argument_values::quoted;
 use crate::arguments::ExplainArguments;
 use crate::console::Console;
@@ -11,6 +11,7 @@ use crate::held_out_reproduction::HeldOutReproduction;
 use crate::identify::{Outcome, Results, outputs};
 use crate::log_apart::{changes_in, what_differs};
 use crate::model_file::ModelFile;
+use crate::noise_floor::{noise_floor, noise_floor_with_textbook};
 use crate::odd_log::without_odd_log;
 use crate::output::take_folder;
 use crate::possible_bodies::PossibleBodies;
@@ -277,7 +278,12 @@ fn traced(
         start.held.is_none() && start.specs.iter().any(is_other)
     };
     let excluded = excluded.iter().filter(|other| !stays(other)).cloned().collect();
-    let floor = noise_floor(session, Rows::Logs(data), &start.model)?;
+    // The floor, and with it the search, is the same whatever is declared.
+    let with_textbook = if start.held.is_none() { noise_floor_with_textbook(session, data)? } else { None };
+    let floor = match with_textbook {
+        Some(floor) => floor,
+        None => noise_floor(session, Rows::Logs(data), &start.model)?,
+    };
     let conditioning = session.logs.conditioning();
     let plan = conditioning.plan(&session.logs.surveys()[0])?;
     let input = TraceInput {

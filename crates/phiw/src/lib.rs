@@ -37,6 +37,7 @@ mod mesh_extent;
 mod model_file;
 mod model_use;
 pub mod next;
+pub mod noise_floor;
 mod not_identified;
 mod odd_log;
 pub mod output;

@@ -240,19 +240,20 @@ impl Fit {
         let given = if left_out.is_empty() { Vec::new() } else { problem.given() };
         for (torque, rows) in problem.torques.iter().enumerate() {
             let weight = self.weights[torque];
-            let mut fewer = Vec::new();
+            // Most columns of a torque are candidates', which nothing here asks of.
+            let fitted = self.own[torque].iter().map(|(column, _)| *column);
+            let absent = self.absent[torque].iter().map(|(column, _)| *column);
+            let asked: Vec<usize> = fitted.chain(absent).chain([rows.parameters.len()]).collect();
+            let mut fewer = vec![0.0; if left_out.is_empty() { 0 } else { rows.parameters.len() + 1 }];
             for &(column, place) in &self.own[torque] {
                 let whole = rows.whole.column(column);
                 let mut products = whole;
                 if !left_out.is_empty() {
-                    fewer.clear();
-                    fewer.extend_from_slice(products);
                     let is_given = |place: usize| given[self.active[place]];
+                    asked.iter().for_each(|&other| fewer[other] = whole[other]);
                     for &fold in left_out {
-                        fewer
-                            .iter_mut()
-                            .zip(rows.folds[fold].column(column))
-                            .for_each(|(sum, own)| *sum -= own);
+                        let own = rows.folds[fold].column(column);
+                        asked.iter().for_each(|&other| fewer[other] -= own[other]);
                     }
                     for &(other, at) in &self.own[torque] {
                         let parameter = self.active[at];

@@ -79,13 +79,6 @@ impl<'a> Fixed<'a> {
         })
     }
 
-    /// Forgets the columns of earlier passes, so that a search does not depend on which are at hand.
-    pub fn forget_columns(&self) {
-        if let Ok(mut kept) = self.kept.lock() {
-            *kept = KeptColumns::default();
-        }
-    }
-
     pub fn build(&self, specs: &[EffectSpec]) -> Result<Vec<Box<dyn Effect>>, IdentificationError> {
         Ok(specs.iter().map(|spec| self.catalogue.build(spec, self.tree)).collect::<Result<_, _>>()?)
     }

@@ -27,8 +27,6 @@ impl Search<'_> {
     pub(super) fn run(self) -> Result<Tracing, IdentificationError> {
         let start = if self.fixed.prior.is_none() { self.textbook_start()? } else { None };
         let joins = start.is_some() && self.declared > 0;
-        // The search is the same whatever was looked at to see whether anything is lacking.
-        self.fixed.forget_columns();
         let (end, tracing) = start.unwrap_or_else(|| self.clone()).best_end()?;
         if joins { self.with_declared(end)?.finish() } else { Ok(tracing) }
     }
