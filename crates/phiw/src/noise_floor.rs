@@ -43,8 +43,7 @@ pub fn noise_floor(session: &Session, rows: Rows<'_>, model: &Model) -> Result<V
 /// A log cannot be read any more.
 pub fn noise_floor_with_textbook(session: &Session, data: &Data<'_>) -> Result<Option<Vec<f64>>, Error> {
     let ranges = SignalRanges::of_surveys(session.logs.training());
-    let is_textbook =
-        |kind: &&str| session.catalogue.joint_property(&EffectSpec::new(kind, &[])).is_some();
+    let is_textbook = |kind: &&str| session.catalogue.joint_property(&EffectSpec::new(kind, &[])).is_some();
     let kinds = session.catalogue.kinds().map(|kind| kind.name()).filter(is_textbook);
     let mut effects: Vec<Variants> = Vec::new();
     for kind in kinds {

@@ -164,8 +164,8 @@ mod tests {
     use phiw_identification::{BlockSource, Data, EffectSpec, Fold, identify};
     use phiw_telemetry::{Conditioning, ConditioningOptions, Recording};
 
-    /// Two joints of which the speed of each brakes the other.
-    fn coupled(tree: &Tree) -> Recording {
+    /// Two joints that move together under sines of their own, and what their drives do beside the bodies.
+    fn moved(tree: &Tree, drives: impl Fn(&[f64; 2], &mut [f64; 2])) -> Recording {
         let mut random = RandomNumbers::new(7);
         let mut workspace = Workspace::new(tree);
         let joints = tree.joint_names().map(str::to_owned).collect();
@@ -183,9 +183,8 @@ mod tests {
             }
             let mut torque = [0.0; 2];
             tree.inverse_dynamics(&q, &qd, &qdd, &mut workspace, &mut torque).unwrap();
-            for joint in 0..2 {
-                torque[joint] += 8.0 * qd[joint] + 5.0 * qd[1 - joint] + 0.5 * random.uniform(-1.0, 1.0);
-            }
+            drives(&qd, &mut torque);
+            torque.iter_mut().for_each(|torque| *torque += 0.5 * random.uniform(-1.0, 1.0));
             recording.t.push(t);
             recording.q.extend(q);
             recording.tau.extend(torque);
@@ -193,12 +192,14 @@ mod tests {
         recording
     }
 
-    /// What was refuted beside all that was still missing was not asked of again: it is, where the end leaves
-    /// structure.
-    #[test]
-    fn what_was_refuted_is_asked_of_again_where_the_end_leaves_structure() {
-        let tree = random_tree(5, &RandomTreeOptions { joints: 2, ..Default::default() }).unwrap();
-        let log = coupled(&tree);
+    /// The search that starts from what is declared, on three quarters of a log.
+    fn searching(
+        log: &Recording,
+        tree: &Tree,
+        declared: &[&str],
+        options: &TraceOptions,
+        ask: impl FnOnce(Search<'_>),
+    ) {
         let surveys = [log.survey().unwrap()];
         let conditioning = Conditioning::choose(&surveys, &ConditioningOptions::default()).unwrap();
         let blocks = log.blocks(&conditioning).unwrap();
@@ -209,38 +210,68 @@ mod tests {
         };
         let data = Data { train: folds(0..8), held_out: folds(8..12), sources, rest_speeds: vec![0.01; 2] };
         let (catalogue, ranges) = (Catalogue::default(), SignalRanges::of_surveys(&surveys));
-        let viscous = catalogue.declare("viscous_friction", &tree, &ranges).unwrap();
-        let start = identify(&tree, viscous, &data).unwrap();
+        let kinds = declared.iter().map(|kind| catalogue.declare(kind, tree, &ranges).unwrap());
+        let start = identify(tree, kinds.flatten().collect(), &data).unwrap();
         let input = TraceInput {
-            tree: &tree,
+            tree,
             catalogue: &catalogue,
             data: &data,
             declared: start.design.effects().iter().map(|effect| effect.spec()).collect(),
             parameters: start.fit.parameters.clone(),
             residual_std: start.fit.residual_std.clone(),
             held: None,
-            noise_floor: noise_floor(&tree, &[0.0; 2], &surveys, &conditioning, &data.sources).unwrap(),
+            noise_floor: noise_floor(tree, &[0.0; 2], &surveys, &conditioning, &data.sources).unwrap(),
             rows_per_independent: 1.0,
             ranges,
         };
+        let fixed = Fixed::new(&input, &data, options).unwrap();
+        ask(Search::of_declared(&fixed, &data, &input, options).unwrap());
+    }
+
+    /// What was refuted beside all that was still missing was not asked of again: it is, where the end leaves
+    /// structure.
+    #[test]
+    fn what_was_refuted_is_asked_of_again_where_the_end_leaves_structure() {
+        let tree = random_tree(5, &RandomTreeOptions { joints: 2, ..Default::default() }).unwrap();
+        // The speed of each joint brakes the other.
+        let log = moved(&tree, |qd, torque| {
+            (0..2).for_each(|joint| torque[joint] += 8.0 * qd[joint] + 5.0 * qd[1 - joint]);
+        });
         let options = TraceOptions::default();
-        let fixed = Fixed::new(&input, &data, &options).unwrap();
-        let declared = Search::of_declared(&fixed, &data, &input, &options).unwrap();
-        let joints: Vec<&str> = tree.joint_names().collect();
-        let coupling = EffectSpec::new("transmission_coupling", &joints);
-        let is_found = |tracing: &Tracing| {
-            tracing.specs.iter().any(|own| (&own.kind, &own.joints) == (&coupling.kind, &coupling.joints))
-        };
-        let without = TraceOptions { excluded: vec![coupling.clone()], ..options.clone() };
-        let excluded = Search { options: &without, ..declared.clone() }.best_end().unwrap().1;
-        let remaining = &excluded.remaining;
-        assert!(
-            !is_found(&excluded) && !remaining.joints.is_empty(),
-            "{:?} {remaining:?} {:?}",
-            excluded.specs,
-            excluded.model.held_out
-        );
-        let refuted = Search { refuted: vec![coupling.clone()], ..declared }.best_end().unwrap().1;
-        assert!(is_found(&refuted) && refuted.remaining.joints.is_empty(), "{:?}", refuted.specs);
+        searching(&log, &tree, &["viscous_friction"], &options, |declared| {
+            let joints: Vec<&str> = tree.joint_names().collect();
+            let coupling = EffectSpec::new("transmission_coupling", &joints);
+            let is_found = |tracing: &Tracing| {
+                tracing.specs.iter().any(|own| (&own.kind, &own.joints) == (&coupling.kind, &coupling.joints))
+            };
+            let without = TraceOptions { excluded: vec![coupling.clone()], ..options.clone() };
+            let excluded = Search { options: &without, ..declared.clone() }.best_end().unwrap().1;
+            let remaining = &excluded.remaining;
+            assert!(
+                !is_found(&excluded) && !remaining.joints.is_empty(),
+                "{:?} {remaining:?} {:?}",
+                excluded.specs,
+                excluded.model.held_out
+            );
+            let refuted = Search { refuted: vec![coupling.clone()], ..declared }.best_end().unwrap().1;
+            assert!(is_found(&refuted) && refuted.remaining.joints.is_empty(), "{:?}", refuted.specs);
+        });
+    }
+
+    /// Where nothing was found, an end that what was declared had yet to join was taken for the declared
+    /// model: it had effects that nothing counted, and the trace of a right model ended in a panic.
+    #[test]
+    fn an_end_that_the_declared_have_yet_to_join_is_no_declared_model() {
+        let tree = random_tree(5, &RandomTreeOptions { joints: 2, ..Default::default() }).unwrap();
+        let log = moved(&tree, |_, _| ());
+        searching(&log, &tree, &["viscous_friction"], &TraceOptions::default(), |declared| {
+            let parameters = vec![0.0; declared.fixed.base.count()];
+            let bare = Search { specs: Vec::new(), declared: 0, parameters: parameters.clone(), ..declared };
+            let end = bare.searched().unwrap();
+            assert!(end.specs.is_empty(), "{:?}", end.specs);
+            // Worse than the declared model.
+            let tracing = Search { parameters, ..end }.finish().unwrap();
+            assert!(tracing.specs.is_empty() && tracing.effects.is_empty(), "{:?}", tracing.specs);
+        });
     }
 }

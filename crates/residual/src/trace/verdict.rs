@@ -112,7 +112,9 @@ impl Search<'_> {
     ) -> Result<Tracing, IdentificationError> {
         let (mut effects, named) = self.name(harm)?;
         let mut refinements = effects.split_off(named);
-        let as_declared = effects.is_empty() && refinements.is_empty() && self.withdrawn.is_empty();
+        // An end that what was declared has yet to join is no declared model.
+        let has_all = self.withdrawn.is_empty() && self.declared == self.input.declared.len();
+        let as_declared = effects.is_empty() && refinements.is_empty() && has_all;
         if as_declared && self.is_worse_than(&before.1)? {
             self.specs.clone_from(&self.input.declared);
             self.parameters.clone_from(&self.input.parameters);
