@@ -60,7 +60,7 @@ impl Search<'_> {
             if broken.is_empty() {
                 let fit = fit.unwrap_or(fitted);
                 let value = criterion(self.problem, &members, &fit, &self.rows);
-                return Model { members, fit, value, settled: false };
+                return Model { members, fit, value, settled: false, foretold: None };
             }
             members.retain(|member| !broken.contains(member));
             let parameters =
@@ -68,7 +68,7 @@ impl Search<'_> {
             absent.extend(parameters.filter_map(|parameter| fitted.place[parameter]));
             fit = fitted.pinned(self.problem, &absent);
             if fit.is_none() {
-                return Model { members, fit: fitted, value: f64::INFINITY, settled: false };
+                return Model { members, fit: fitted, value: f64::INFINITY, settled: false, foretold: None };
             }
         }
     }
@@ -81,7 +81,7 @@ impl Search<'_> {
             let broken: Vec<Member> = members.iter().filter(|member| breaks(member)).copied().collect();
             if broken.is_empty() {
                 let value = criterion(self.problem, &members, &fit, &self.rows);
-                return Model { members, fit, value, settled: true };
+                return Model { members, fit, value, settled: true, foretold: None };
             }
             let depends = |other: &Member, on: &Member| {
                 let other = &self.problem.hypotheses[other.hypothesis];

@@ -60,6 +60,8 @@ pub(super) struct Model {
     pub value: f64,
     /// Whether it is fitted with its own weights, so that it may be taken; otherwise it has values only.
     pub settled: bool,
+    /// How well it foretells what it is not fitted to ([`cross_validated`]), once that was asked.
+    pub foretold: Option<f64>,
 }
 
 #[derive(Clone)]
@@ -108,7 +110,7 @@ impl<'a> Search<'a> {
     fn new(problem: &'a Problem, start: Vec<Member>, policy: Policy) -> Self {
         let rows = problem.independent_rows();
         let fit = Fit::new(problem, problem.active(&start), &rows, None);
-        let model = Model { members: start, fit, value: 0.0, settled: true };
+        let model = Model { members: start, fit, value: 0.0, settled: true, foretold: None };
         let mut search =
             Search { problem, policy, closed: vec![false; problem.hypotheses.len()], rows, model };
         search.renew();
@@ -226,8 +228,14 @@ impl<'a> Search<'a> {
         if models.is_empty() {
             return None;
         }
-        let present = cross_validated(self.problem, &self.model.fit, &self.rows);
-        models.into_iter().find(|model| cross_validated(self.problem, &model.fit, &self.rows) < present)
+        let foretold = |model: &Model| {
+            model.foretold.unwrap_or_else(|| cross_validated(self.problem, &model.fit, &self.rows))
+        };
+        let present = foretold(&self.model);
+        models.into_iter().find_map(|model| {
+            let value = foretold(&model);
+            (value < present).then_some(Model { foretold: Some(value), ..model })
+        })
     }
 
     /// Leaves out what the criterion is better without: one member, or all of a kind.

@@ -3,8 +3,8 @@
 use super::search::Search;
 use super::trial::Trial;
 use crate::selection::{Member, Products};
-use phiw_identification::IdentificationError;
 use phiw_identification::fitting::{OwnTorqueFit, TorqueError, torque_error};
+use phiw_identification::{EffectSpec, IdentificationError};
 use rayon::prelude::*;
 
 /// Effects of which it is asked at once whether the model as it is fitted is better without them.
@@ -19,6 +19,13 @@ pub(super) enum Harm {
     /// is there larger than `most_relative` of the torques (RMS); of each torque what is as good as none
     /// counts as the largest such.
     HeldOut { most_relative: f64 },
+}
+
+/// The error on motion held out of a model as it is fitted in the end.
+pub(super) struct ErrorAsFitted {
+    /// Its effects.
+    specs: Vec<EffectSpec>,
+    error: TorqueError,
 }
 
 impl Search<'_> {
@@ -80,13 +87,22 @@ impl Search<'_> {
     /// more than [`Self::least_growth`]: in their geometric mean over the torques, or all together. A drift
     /// that one log seems to show may be a disaster in the next. It does so on trial, beside the others as
     /// they are, and in the model as it is fitted, whose other constants may make up for it.
-    pub(super) fn without_what_misleads(&self, trial: &Trial) -> Result<Option<Self>, IdentificationError> {
+    ///
+    /// `as_fitted` is the error of the model as it was fitted last, so that it is not fitted again.
+    pub(super) fn without_what_misleads(
+        &self,
+        trial: &Trial,
+        as_fitted: &mut Option<ErrorAsFitted>,
+    ) -> Result<Option<Self>, IdentificationError> {
         let misleading = self.misleading(trial);
         if misleading.is_empty() {
             return Ok(None);
         }
         let share = self.options.thresholds.negligible_share();
-        let with = self.held_out_error_as_fitted()?;
+        let with = match as_fitted.take().filter(|known| known.specs == self.specs) {
+            Some(known) => known.error,
+            None => self.held_out_error_as_fitted()?,
+        };
         for place in misleading.into_iter().take(ASKED_OF) {
             let mut branch = self.clone();
             branch.remove(place)?;
@@ -96,6 +112,7 @@ impl Search<'_> {
             let together = (self.counted(&with) / self.counted(&without)).ln();
             if mean.max(together) > self.least_growth() {
                 branch.left_out_by_held_out.push(self.specs[place].clone());
+                *as_fitted = Some(ErrorAsFitted { specs: branch.specs.clone(), error: without });
                 return Ok(Some(branch));
             }
         }

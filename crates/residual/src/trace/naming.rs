@@ -58,12 +58,13 @@ impl Search<'_> {
 
     /// Leaves out what does harm, with the trial of what is left.
     pub(super) fn without_harm(&mut self, harm: Harm) -> Result<Trial, IdentificationError> {
+        let mut as_fitted = None;
         loop {
             self.call_by_the_frictions_name()?;
             let trial = self.trial()?;
             let harmful = self.harmful(&trial, harm);
             if harmful.is_empty() {
-                match self.without_what_misleads(&trial)? {
+                match self.without_what_misleads(&trial, &mut as_fitted)? {
                     Some(without) => *self = without,
                     None => return Ok(trial),
                 }
