@@ -312,9 +312,15 @@ impl<'a> Search<'a> {
         };
         let models = self.in_place_of(place).into_iter();
         let models = models.filter(|(model, entering)| model.settled && may_enter(model, entering));
-        let better = models.take_while(|(model, _)| model.value < self.model.value - LEAST_STEP);
         let parameters = |member: &Member| self.problem.variant(*member).parameters.len();
-        for (model, entering) in better {
+        // Of two that explain alike, the one with fewer parameters.
+        let is_simpler =
+            |entering: &[Member]| matches!(entering, [own] if parameters(own) < parameters(&member));
+        let better = |(model, entering): &(Model, Vec<Member>)| {
+            let step = if is_simpler(entering) { 0.0 } else { LEAST_STEP };
+            model.value < self.model.value - step
+        };
+        for (model, entering) in models.filter(better) {
             let is_more = match entering.as_slice() {
                 [own] => own.hypothesis == member.hypothesis && parameters(own) > parameters(&member),
                 _ => true,
