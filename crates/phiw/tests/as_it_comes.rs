@@ -3,13 +3,17 @@
 
 use crate::synthetic;
 
+use phiw::analysis::Rows;
 use phiw::arguments::{ExplainArguments, SessionArguments};
 use phiw::console::Console;
 use phiw::explain::explain;
 use phiw::identify::identify;
+use phiw::noise_floor::{noise_floor, noise_floor_with_textbook};
+use phiw::session::Session;
 use phiw_dynamics::random_tree::RandomNumbers;
 use phiw_dynamics::urdf::{UrdfOptions, read_urdf};
 use phiw_dynamics::{Tree, Workspace};
+use phiw_identification::{Identified, Model, identify as identify_model};
 use phiw_report::ReportJson;
 use phiw_report::json::Verdict;
 use phiw_telemetry::Recording;
@@ -297,9 +301,22 @@ fn the_noise_floor_is_the_same_whatever_was_declared() {
         log.q.iter_mut().for_each(|q| *q = (*q / ENCODER_STEP).round() * ENCODER_STEP);
         log
     });
-    let declared: [&[&str]; 2] = [&[], &["viscous_friction", "coulomb_friction"]];
-    let [nothing, frictions] = declared.map(|declared| explained(synthetic::URDF, &logs, declared));
-    assert_eq!(nothing.noise_floor, frictions.noise_floor);
+    let folder = TempDir::new().unwrap();
+    let floor = |declared: &[&str]| {
+        let arguments = session(folder.path(), synthetic::URDF, &logs, declared);
+        let session = Session::open(&arguments, &|_, _, _| ()).unwrap();
+        let sources = session.logs.sources(&|_, _, _| ());
+        let data = session.data(&sources);
+        let effects = session.effects(&data).unwrap();
+        let Identified { design, fit, .. } = identify_model(&session.tree, effects, &data).unwrap();
+        let model = Model::of_fit(&design, &fit, &[], &session.held, (10.0, 10.0)).unwrap();
+        let of_declared = noise_floor(&session, Rows::Logs(&data), &model).unwrap();
+        (noise_floor_with_textbook(&session, &data).unwrap().unwrap(), of_declared)
+    };
+    let (nothing, of_nothing) = floor(&[]);
+    let (two, of_two) = floor(&["viscous_friction", "coulomb_friction"]);
+    assert_eq!(nothing, two);
+    assert_ne!(of_nothing, of_two);
 }
 
 /// Logs of slow motion tell little of the bodies and do not tell viscous from Coulomb friction. Their model

@@ -56,10 +56,13 @@ impl Search<'_> {
         best.or_better((tracing, varying))
     }
 
-    /// This end and what came of it, or another and what comes of that, where the training logs say that it
-    /// is better and motion held out is no worse ([`super::Thresholds::same_error`]).
+    /// This end, which leaves structure, and what came of it, or another and what comes of that, where the
+    /// criterion is smaller there and motion held out is no worse ([`super::Thresholds::same_error`]). Of two
+    /// models that are both known to lack something the likelier is the better, whether or not it is so
+    /// throughout.
     fn or_better(self, (tracing, other): (Tracing, Self)) -> Result<(Self, Tracing), IdentificationError> {
-        if !other.is_better_than(&self)? {
+        let rows = &self.chosen.rows;
+        if other.value(rows)? >= self.value(rows)? - LEAST_STEP {
             return Ok((self, tracing));
         }
         let of_other = other.clone().finish()?;
