@@ -43,11 +43,10 @@ pub fn noise_floor(session: &Session, rows: Rows<'_>, model: &Model) -> Result<V
 /// A log cannot be read any more.
 pub fn noise_floor_with_textbook(session: &Session, data: &Data<'_>) -> Result<Option<Vec<f64>>, Error> {
     let ranges = SignalRanges::of_surveys(session.logs.training());
-    let is_textbook = |kind: &&str| session.catalogue.joint_property(&EffectSpec::new(kind, &[])).is_some();
-    let kinds = session.catalogue.kinds().map(|kind| kind.name()).filter(is_textbook);
+    let textbook = session.catalogue.kinds().filter(|kind| kind.joint_property().is_some());
     let mut effects: Vec<Variants> = Vec::new();
-    for kind in kinds {
-        let all = session.catalogue.declare(kind, &session.tree, &ranges)?;
+    for kind in textbook {
+        let all = session.catalogue.declare(kind.name(), &session.tree, &ranges)?;
         effects.extend(all.into_iter().map(|variants| variants.into_iter().take(1).collect()));
     }
     let Ok(identified) = identify(&session.tree, effects, data) else { return Ok(None) };
