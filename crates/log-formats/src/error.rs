@@ -128,8 +128,8 @@ pub enum FormatError {
     },
     /// A message is out of order by more than is sorted.
     #[error(
-        "{}, topic `{topic}`, message {message}: its stamp is earlier than that of a message more than {window} before it; sort the recording by stamp, \
-         or split it where the clock was set",
+        "{}, topic `{topic}`, message {message}: its stamp is earlier than that of a message more than {window} \
+         before it; sort the recording by stamp, or split it where the clock was set",
         path.display()
     )]
     OutOfOrder {
@@ -144,8 +144,8 @@ pub enum FormatError {
     },
     /// The joints that are asked for come in different messages.
     #[error(
-        "{}, topic `{topic}`: no message names all joints that are asked for; its messages name {}; hold the joints of the others (--hold), or record \
-         one topic for the robot",
+        "{}, topic `{topic}`: no message names all joints that are asked for; its messages name {}; \
+         hold the joints of the others (--hold), or record one topic for the robot",
         path.display(), listed(sets)
     )]
     SeparateMessages {

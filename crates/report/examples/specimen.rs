@@ -20,9 +20,17 @@ fn specimen(joints: usize, explain: bool) -> IdentificationPage {
     let sections = names.iter().enumerate().map(|(index, name)| joint(index, name)).collect();
     let mut page = IdentificationPage {
         robot: "specimen".into(),
-        inputs: [("URDF", "specimen.urdf", "6 moving joints, 1 held"), ("train", "train-1.csv", "60.1 s, 12 020 samples, 2 segments"), ("validate", "validate-1.csv", "20.0 s, 4 001 samples")]
-            .map(|(role, name, content)| InputFile { role: role.into(), name: name.into(), content: content.into() })
-            .into(),
+        inputs: [
+            ("URDF", "specimen.urdf", "6 moving joints, 1 held"),
+            ("train", "train-1.csv", "60.1 s, 12 020 samples, 2 segments"),
+            ("validate", "validate-1.csv", "20.0 s, 4 001 samples"),
+        ]
+        .map(|(role, name, content)| InputFile {
+            role: role.into(),
+            name: name.into(),
+            content: content.into(),
+        })
+        .into(),
         date: "2 March 2026, 14:05".into(),
         headline: vec![
             "Held-out torque error 24.1 % of RMS torque (rigid body + viscous + Coulomb friction).".into(),
@@ -42,7 +50,9 @@ fn specimen(joints: usize, explain: bool) -> IdentificationPage {
             told: vec!["mass of link_6: 2.310 ± 0.040 kg".into()],
             sums: vec!["Izz of link_1 + 0.250 · mass of link_2: 0.5120 ± 0.0030 kg·m²".into()],
             not_told: vec!["link_1: mass, Ixx, Iyy".into()],
-            motions: vec!["reach.csv: 3.2 nats of what is not told; 2 more directions, with them mass of link_2".into()],
+            motions: vec![
+                "reach.csv: 3.2 nats of what is not told; 2 more directions, with them mass of link_2".into(),
+            ],
         },
         not_identified: vec![
             "link_1: m, m·cx, m·cy, m·cz, Ixx, Ixy, Iyy, Ixz, Iyz: no motion of the robot shows them.".into(),
@@ -53,7 +63,9 @@ fn specimen(joints: usize, explain: bool) -> IdentificationPage {
             "link_5: the inertia violates the triangle inequality (Ixx + Iyy < Izz by 0.002 kg·m²).".into(),
         ],
         version: "phiw 0.1.0".into(),
-        command_line: "phiw explain --urdf specimen.urdf --train train-1.csv --validate validate-1.csv --declare viscous_friction,coulomb_friction --out out".into(),
+        command_line: "phiw explain --urdf specimen.urdf --train train-1.csv --validate validate-1.csv \
+             --declare viscous_friction,coulomb_friction --out out"
+            .into(),
         ..IdentificationPage::default()
     };
     if explain {
@@ -297,7 +309,9 @@ fn parameters(names: &[String]) -> ParametersSection {
     });
     ParametersSection {
         rows: rows.collect(),
-        note: "Weighted least squares; standard deviations from the residual of each joint, corrected for its autocorrelation. cond of the weighted regressor 71.".into(),
+        note: "Weighted least squares; standard deviations from the residual of each joint, \
+             corrected for its autocorrelation. cond of the weighted regressor 71."
+            .into(),
     }
 }
 

@@ -105,7 +105,8 @@ pub enum LogError {
     },
     /// No segment is long enough for the filter.
     #[error(
-        "{}: no stretch without a gap is long enough: the longest has {longest} samples, a cut-off of {cutoff_hz:.3} Hz needs {needed}; raise the cut-off or record longer",
+        "{}: no stretch without a gap is long enough: the longest has {longest} samples, \
+         a cut-off of {cutoff_hz:.3} Hz needs {needed}; raise the cut-off or record longer",
         path.display()
     )]
     NoLongSegment {
