@@ -3,7 +3,7 @@
 
 use crate::columns::ParameterKind;
 use crate::fitted::FittedEffect;
-use crate::kind::{Constants, EffectKind, Refinement, SignalRanges, constant, product, values};
+use crate::kind::{Constants, EffectKind, Refinement, SignalRanges, around, constant, product, values};
 use crate::mechanism::{Mechanism, Mechanisms};
 use crate::sign::{WIDTH, smooth_sign};
 use phiw_codegen::{Expression, JointTorque};
@@ -16,11 +16,15 @@ use phiw_identification::{Effect, EffectSpec};
 /// Torque at one joint from the motion of another, both ways or one way.
 ///
 /// Motors that turn with the sum q_i + q_j feel viscous friction, Coulomb friction and inertia of the sum;
-/// what the joints' own friction and rotor inertia do not take up is the part that crosses over.
+/// what the joints' own friction and rotor inertia do not take up is the part that crosses over. Gears between
+/// them make it q_i + `ratio`·q_j, which Coulomb friction alone tells from a sum: of viscous friction and
+/// inertia, the joints' own take up the rest of any.
 pub struct TransmissionCoupling;
 
 /// Which terms a coupling has: one bit for each of [`TERMS`].
 const TERMS_CONSTANT: &str = "terms";
+/// How often the second joint's speed counts in the shaft's.
+const RATIO: &str = "ratio";
 
 /// Joints further apart than this along the tree do not share a transmission.
 const LARGEST_DISTANCE: usize = 2;
@@ -42,14 +46,15 @@ struct Motion {
     velocity: [f64; 2],
     acceleration: [f64; 2],
     width: f64,
+    ratio: f64,
 }
 
 impl Motion {
     fn sign_of_sum(&self) -> f64 {
-        smooth_sign(self.velocity[0] + self.velocity[1], self.width)
+        smooth_sign(self.velocity[0] + self.ratio * self.velocity[1], self.width)
     }
     fn sign_of_difference(&self) -> f64 {
-        smooth_sign(self.velocity[0] - self.velocity[1], self.width)
+        smooth_sign(self.velocity[0] - self.ratio * self.velocity[1], self.width)
     }
 }
 
@@ -70,13 +75,16 @@ const TERMS: [Term; 8] = [
         name: "fc_sum",
         dimension: ParameterKind::Torque,
         lower: 0.0,
-        columns: [Some(Motion::sign_of_sum), Some(Motion::sign_of_sum)],
+        columns: [Some(Motion::sign_of_sum), Some(|motion| motion.ratio * motion.sign_of_sum())],
     },
     Term {
         name: "fc_difference",
         dimension: ParameterKind::Torque,
         lower: 0.0,
-        columns: [Some(Motion::sign_of_difference), Some(|motion| -motion.sign_of_difference())],
+        columns: [
+            Some(Motion::sign_of_difference),
+            Some(|motion| -motion.ratio * motion.sign_of_difference()),
+        ],
     },
     Term {
         name: "fv_of_second_on_first",
@@ -140,7 +148,9 @@ impl EffectKind for TransmissionCoupling {
         if constant(found, TERMS_CONSTANT, 0.0) as u32 & 0b1100_1100 == 0 {
             return Vec::new();
         }
-        crate::kind::around(found, WIDTH, step)
+        let mut own = found.clone();
+        own.entry(RATIO.to_owned()).or_insert(1.0);
+        [around(found, WIDTH, step), around(&own, RATIO, step)].concat()
     }
     fn with_other_parameters(&self, found: &Constants) -> Vec<Constants> {
         let own = constant(found, TERMS_CONSTANT, 0.0) as u32;
@@ -159,7 +169,12 @@ impl EffectKind for TransmissionCoupling {
                 .map(move |(_, value)| format!("{value} {words}"))
         });
         let terms: Vec<String> = terms.collect();
-        format!("{} share a transmission: {}.", found.joints(), terms.join(", "))
+        let (ratio, second) = (ratio(found.constants()), found.joint_names().get(1));
+        let gears = match second {
+            Some(second) if ratio != 1.0 => format!(" (the speed of {second} counts {ratio:.2} times)"),
+            _ => String::new(),
+        };
+        format!("{} share a transmission: {}{gears}.", found.joints(), terms.join(", "))
     }
     /// A transmission that turns with the sum or the difference of the two; what is felt one way only is the
     /// work of none.
@@ -180,7 +195,7 @@ impl EffectKind for TransmissionCoupling {
             };
             mechanisms.parts.push(Mechanism::Transmission {
                 joints: [first.clone(), second.clone()],
-                factors: [1.0, sign],
+                factors: [1.0, if crossing_only { sign } else { sign * ratio(found.constants()) }],
                 property,
                 value: if crossing_only { value.abs() } else { value },
                 crossing_only,
@@ -192,12 +207,13 @@ impl EffectKind for TransmissionCoupling {
     fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
         let [first, second] = found.joint_names() else { return Vec::new() };
         let (v, a) = (Expression::velocity, Expression::acceleration);
+        let ratio = ratio(found.constants());
         let sign = |factor: f64| (v(first) + factor * v(second)).sign(found.constant(WIDTH));
         let of_term = |name: &str| match name {
             "fv_cross" => [Some(v(second)), Some(v(first))],
             "Ia_cross" => [Some(a(second)), Some(a(first))],
-            "fc_sum" => [Some(sign(1.0)), Some(sign(1.0))],
-            "fc_difference" => [Some(sign(-1.0)), Some(-sign(-1.0))],
+            "fc_sum" => [Some(sign(ratio)), Some(ratio * sign(ratio))],
+            "fc_difference" => [Some(sign(-ratio)), Some(-ratio * sign(-ratio))],
             "fv_of_second_on_first" => [Some(v(second)), None],
             "fv_of_first_on_second" => [None, Some(v(first))],
             "fc_of_second_on_first" => [Some(found.sign_of_velocity(second)), None],
@@ -236,6 +252,10 @@ impl EffectKind for TransmissionCoupling {
             },
         })
     }
+}
+
+fn ratio(constants: &Constants) -> f64 {
+    constant(constants, RATIO, 1.0)
 }
 
 /// Steps from one joint to another along the tree.
@@ -280,9 +300,10 @@ impl Effect for Coupling {
     /// Friction of the shaft that turns with the sum or with the difference.
     fn turns_with(&self, parameter: usize) -> Option<VelocitySum> {
         let [first, second] = self.site;
+        let ratio = ratio(&self.spec.constants);
         let of_second = match self.terms.get(parameter)?.name {
-            "fc_sum" => 1.0,
-            "fc_difference" => -1.0,
+            "fc_sum" => ratio,
+            "fc_difference" => -ratio,
             _ => return None,
         };
         Some(VelocitySum { terms: vec![(first, 1.0), (second, of_second)] })
@@ -304,6 +325,7 @@ impl Effect for Coupling {
         Box::new(CouplingColumns {
             site: self.site,
             width: constant(&self.spec.constants, WIDTH, 0.0),
+            ratio: ratio(&self.spec.constants),
             formulas: self.terms.iter().flat_map(|term| term.columns).flatten().collect(),
         })
     }
@@ -313,14 +335,19 @@ struct CouplingColumns {
     site: [usize; 2],
     /// Velocity over which a sign turns \[rad/s, m/s\].
     width: f64,
+    ratio: f64,
     formulas: Vec<MotionColumn>,
 }
 
 impl Evaluator for CouplingColumns {
     fn evaluate(&mut self, sample: &Sample<'_>, columns: &mut [f64]) {
         let both = |values: &[f64]| self.site.map(|joint| values[joint]);
-        let motion =
-            Motion { velocity: both(sample.qd()), acceleration: both(sample.qdd()), width: self.width };
+        let motion = Motion {
+            velocity: both(sample.qd()),
+            acceleration: both(sample.qdd()),
+            width: self.width,
+            ratio: self.ratio,
+        };
         for (column, formula) in columns.iter_mut().zip(&self.formulas) {
             *column = formula(&motion);
         }
@@ -337,7 +364,7 @@ mod tests {
     #[test]
     fn the_quadratic_form_of_a_coupling_is_the_power_of_its_columns() {
         let speeds = [0.7, -1.3];
-        let motion = Motion { velocity: speeds, acceleration: speeds, width: 0.1 };
+        let motion = Motion { velocity: speeds, acceleration: speeds, width: 0.1, ratio: 0.6 };
         let mut counted = 0;
         for term in TERMS {
             let effect = Coupling {

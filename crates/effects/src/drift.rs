@@ -4,7 +4,7 @@ use crate::bristles::{Bristles, DEFLECTION, bristles_near, with_bristles};
 use crate::columns::{Formula, OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{
-    Constants, EffectKind, Refinement, Signal, SignalRanges, SpecialCase, around, constant, values,
+    Constants, EffectKind, Refinement, Signal, SignalRanges, SpecialCase, around, constant, product, values,
 };
 use crate::sign::Sign;
 use phiw_dynamics::Tree;
@@ -13,14 +13,23 @@ use phiw_identification::effect::Sample;
 
 /// Viscous and Coulomb friction times a factor that falls from one to zero: exp(−t / `time_constant`), or
 /// with the temperature where the log has one (`time_constant` zero).
+///
+/// t counts from `cold_at`, a time of the session, whose logs were recorded one after the other; it is no less
+/// than zero. Where `from_log_start` is one it counts from the start of each log: the robot was cold again
+/// before each.
 pub struct ThermalDrift;
 
 const TIME_CONSTANT: &str = "time_constant";
+const COLD_AT: &str = "cold_at";
+const FROM_LOG_START: &str = "from_log_start";
 /// Shortest time constant that a refinement leads to \[s\]: what is over sooner is how a log begins, and no
 /// warming.
 const SHORTEST_S: f64 = 1.0;
-/// Longest time constant that a refined one may have, in sessions: an exponential falls by 28 % in one then.
+/// Longest time constant that a refined one may have, in sessions or logs: an exponential falls by 28 % in
+/// one then.
 const LONGEST: f64 = 3.0;
+/// Time constants to try, as shares of the session, or of the longest log.
+const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 /// Temperatures enter over this span \[K\], so that the parameters are torques at a change that is usual.
 const TEMPERATURE_SPAN: f64 = 10.0;
 const ROOM_TEMPERATURE: f64 = 20.0;
@@ -30,8 +39,20 @@ impl EffectKind for ThermalDrift {
         "thermal_drift"
     }
     fn scan(&self, _site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
-        let duration = ranges.session.1 - ranges.session.0;
-        let mut variants = values(TIME_CONSTANT, [1.0, 0.5, 0.25, 0.125].map(|share| share * duration));
+        // Stamps may count from anywhere; long before the session all would be warm.
+        let of_session = product(
+            &values(TIME_CONSTANT, SHARES.map(|share| share * session(ranges))),
+            &values(COLD_AT, [ranges.session.0]),
+        );
+        let of_logs = product(
+            &values(TIME_CONSTANT, SHARES.map(|share| share * ranges.longest_log)),
+            &values(FROM_LOG_START, [1.0]),
+        );
+        let mut variants = of_session;
+        // A single log is the session.
+        if ranges.logs > 1 {
+            variants.extend(of_logs);
+        }
         if ranges.temperature {
             variants.extend(values(TIME_CONSTANT, [0.0]));
         }
@@ -40,11 +61,25 @@ impl EffectKind for ThermalDrift {
     fn refine(&self, &Refinement { found, step, ranges, .. }: &Refinement<'_>) -> Vec<Constants> {
         let mut near = around(found, TIME_CONSTANT, step);
         // Over many times the session it is no drift any more but a friction that stays.
-        let longest = LONGEST * (ranges.session.1 - ranges.session.0);
+        let of_log = counts_from_log_start(found);
+        let longest = LONGEST * if of_log { ranges.longest_log } else { session(ranges) };
         let time = |constants: &Constants| constant(constants, TIME_CONSTANT, SHORTEST_S);
         near.retain(|constants| (SHORTEST_S..=longest).contains(&time(constants)));
         near.extend(bristles_near(found, step));
         near
+    }
+    fn alike_within_one_log(&self, found: &Constants, ranges: &SignalRanges) -> Option<Constants> {
+        if constant(found, TIME_CONSTANT, 0.0) == 0.0 {
+            return None;
+        }
+        let mut other = found.clone();
+        if other.remove(FROM_LOG_START).is_some() {
+            other.insert(COLD_AT.to_owned(), ranges.session.0);
+        } else {
+            other.remove(COLD_AT);
+            other.insert(FROM_LOG_START.to_owned(), 1.0);
+        }
+        Some(other)
     }
     fn turned_over_a_way(&self, found: &Constants, way: Option<f64>) -> Option<Constants> {
         Some(with_bristles(found, way))
@@ -56,7 +91,8 @@ impl EffectKind for ThermalDrift {
         let (joint, time) = (found.joints(), found.constant(TIME_CONSTANT));
         let falls = [0, 1].iter().all(|&place| found.value(place) >= 0.0);
         let what = if falls { "falls as it warms up" } else { "changes with time" };
-        format!("The friction of {joint} {what}, over {time:.0} s.")
+        let from = if found.constant(FROM_LOG_START) == 1.0 { " from the start of each log" } else { "" };
+        format!("The friction of {joint} {what}, over {time:.0} s{from}.")
     }
     /// Over many times the session it is a friction that stays.
     fn special_case(&self) -> Option<SpecialCase> {
@@ -65,16 +101,19 @@ impl EffectKind for ThermalDrift {
     fn seen_against(&self) -> Signal {
         Signal::Time
     }
-    fn needs_session_time(&self) -> bool {
-        true
+    fn needs_session_time(&self, constants: &Constants) -> bool {
+        !counts_from_log_start(constants)
     }
     fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
         let joint = site[0];
         let time_constant = constant(constants, TIME_CONSTANT, 60.0);
         let sign = Sign::of(constants);
+        let of_log = counts_from_log_start(constants);
+        let cold_at = constant(constants, COLD_AT, 0.0);
         let falling = move |sample: &Sample<'_>| {
             if time_constant > 0.0 {
-                return (-sample.time() / time_constant).exp();
+                let time = if of_log { sample.time_in_log() } else { sample.time() - cold_at };
+                return (-time.max(0.0) / time_constant).exp();
             }
             let temperature = sample.temperature().get(joint).copied().unwrap_or(f64::NAN);
             let cold = (ROOM_TEMPERATURE - temperature) / TEMPERATURE_SPAN;
@@ -90,6 +129,15 @@ impl EffectKind for ThermalDrift {
         ];
         Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns))
     }
+}
+
+/// How long the session is \[s\].
+fn session(ranges: &SignalRanges) -> f64 {
+    ranges.session.1 - ranges.session.0
+}
+
+fn counts_from_log_start(constants: &Constants) -> bool {
+    constant(constants, FROM_LOG_START, 0.0) == 1.0
 }
 
 /// A viscous and a dry friction, each in a column of its own.

@@ -223,15 +223,21 @@ pub trait EffectKind: Send + Sync {
         false
     }
 
+    /// Constants with which it is the same within any one log and other from log to log, if there are such: of
+    /// a single training log only other motion can tell them.
+    fn alike_within_one_log(&self, _found: &Constants, _ranges: &SignalRanges) -> Option<Constants> {
+        None
+    }
+
     /// Whether its parameters belong to the training logs and say nothing of any other motion: it cannot be
     /// declared, and motion held out is no judge of it.
     fn is_of_training_logs(&self) -> bool {
         false
     }
 
-    /// Whether it changes with the time since the session began, so that logs whose clocks each begin anew
-    /// cannot tell it.
-    fn needs_session_time(&self) -> bool {
+    /// Whether it changes, with these constants, with the time since the session began, so that logs whose
+    /// clocks each begin anew cannot tell it.
+    fn needs_session_time(&self, _constants: &Constants) -> bool {
         false
     }
 
@@ -293,6 +299,8 @@ pub struct SignalRanges {
     pub temperature: bool,
     /// Number of training logs.
     pub logs: usize,
+    /// Duration of the longest of them \[s\].
+    pub longest_log: f64,
 }
 
 impl SignalRanges {
@@ -318,6 +326,10 @@ impl SignalRanges {
                 .map(|survey| pick(survey.time_range()) + survey.session.offset)
                 .fold(f64::NAN, fold)
         };
+        let duration = |survey: &Survey| {
+            let (first, last) = survey.time_range();
+            last - first
+        };
         SignalRanges {
             joints: (0..count).map(joint).collect(),
             session: (moment(|range| range.0, f64::min), moment(|range| range.1, f64::max)),
@@ -326,6 +338,7 @@ impl SignalRanges {
             friction_frequencies: vec![Vec::new(); count],
             temperature: surveys.iter().any(|survey| survey.joints.iter().any(|joint| joint.temperature)),
             logs: surveys.len(),
+            longest_log: surveys.iter().map(duration).fold(0.0, f64::max),
         }
     }
 }

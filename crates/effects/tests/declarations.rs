@@ -56,6 +56,7 @@ impl Zoo {
             friction_frequencies: vec![vec![5.0]; joints],
             temperature: true,
             logs: 2,
+            longest_log: 30.0,
         };
         let (mut effects, mut kinds) = (Vec::new(), Vec::new());
         for kind in Catalogue::default().kinds() {

@@ -85,6 +85,7 @@ fn every_formula_is_its_effect() {
         friction_frequencies: vec![vec![5.0]; joints],
         temperature: false,
         logs: 2,
+        longest_log: 30.0,
     };
     let mut random = RandomNumbers::new(7);
     let mut with = Vec::new();

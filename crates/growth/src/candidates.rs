@@ -20,7 +20,7 @@ pub(crate) fn candidates(
     let tree = robot.tree();
     let mut specs = Vec::new();
     let can_be_identified = |kind: &&dyn EffectKind| {
-        kind.varies().is_none() && !kind.needs_held_model() && !kind.needs_session_time()
+        kind.varies().is_none() && !kind.needs_held_model() && !kind.needs_session_time(&Constants::new())
     };
     for kind in catalogue.kinds().filter(can_be_identified) {
         for site in kind.sites(tree) {
@@ -61,14 +61,16 @@ pub(crate) fn ranges(robot: &Robot, logs: &[MotionLog]) -> SignalRanges {
             residual_rms: 0.0,
         }
     };
+    let session = (0.0, logs.iter().map(MotionLog::duration_s).fold(0.0, f64::max));
     SignalRanges {
         joints: (0..joints).map(joint).collect(),
-        session: (0.0, logs.iter().map(MotionLog::duration_s).fold(0.0, f64::max)),
+        session,
         period: logs.first().map_or(0.0, |log| log.period_s),
         ripple_frequencies: vec![Vec::new(); joints],
         friction_frequencies: vec![Vec::new(); joints],
         temperature: false,
         // A simulated or real loop zeroes no torque between motions.
         logs: 1,
+        longest_log: session.1,
     }
 }

@@ -192,6 +192,7 @@ fn results_knowing(
     if tracing.held_out_had_a_say {
         analysis.warnings.push(warnings::held_out_had_a_say(&tracing.left_out_by_held_out));
     }
+    analysis.warnings.extend(warnings::told_by_held_out(&tracing.told_by_held_out));
     let reproduction = HeldOutReproduction::of(&analysis)?;
     analysis.warnings.extend(reproduction.warnings());
     let declared_design = start.design(&session.tree, &session.catalogue)?;

@@ -7,11 +7,11 @@ use crate::output::check_file;
 use crate::summary::write_table;
 use crate::warnings::of_log;
 use crate::{Error, session};
-use phiw_effects::{Catalogue, EffectKind};
+use phiw_effects::Catalogue;
 use phiw_identification::prediction::{
     CovarianceSource, PredictionErrors, PredictionParts, predict_in_parts,
 };
-use phiw_identification::{BlockSource, Prediction};
+use phiw_identification::{BlockSource, EffectSpec, Prediction};
 use phiw_report::number::{percent, significant};
 use phiw_result_folder::{Disk, Lock, StreamedFile, check_inputs};
 use std::fmt::Write as _;
@@ -311,12 +311,12 @@ fn warnings(used: &ModelUse) -> Vec<String> {
 /// Effects that count the time of their session: it begins with the first of the logs that are given.
 fn of_session_time(used: &ModelUse) -> Option<String> {
     let catalogue = Catalogue::default();
-    let counts = |kind: &str| catalogue.kind(kind).is_ok_and(EffectKind::needs_session_time);
+    let counts = |spec: &EffectSpec| {
+        catalogue.kind(&spec.kind).is_ok_and(|kind| kind.needs_session_time(&spec.constants))
+    };
     let specs = used.design.effects().iter().map(|effect| effect.spec());
-    let of: Vec<String> = specs
-        .filter(|spec| counts(&spec.kind))
-        .map(|spec| format!("{} of {}", spec.kind, spec.joints.join("+")))
-        .collect();
+    let of: Vec<String> =
+        specs.filter(counts).map(|spec| format!("{} of {}", spec.kind, spec.joints.join("+"))).collect();
     (!of.is_empty()).then(|| {
         format!(
             "{} counts the time since its session began, which is taken to be with the first log: give the logs that came before as well, in their order, or the errors are other than in the report",

@@ -136,22 +136,41 @@ const JOINTS_NAMED: usize = 3;
 
 /// What is said where motion held out decided what is in the model.
 pub fn held_out_had_a_say(left_out: &[EffectSpec]) -> String {
-    let mut named: Vec<String> =
-        left_out.iter().map(|spec| format!("{} of {}", spec.kind, spec.joints.join("+"))).collect();
-    let more = named.len().saturating_sub(MOST_LEFT_OUT);
-    named.truncate(MOST_LEFT_OUT);
-    if more > 0 {
-        named.push(format!("{more} more"));
-    }
-    let named = if named.is_empty() { String::new() } else { format!(" ({})", named.join(", ")) };
+    let named = match left_out {
+        [] => String::new(),
+        some => format!(" ({})", some_of(some)),
+    };
     format!(
         "of what the training logs alone would have chosen, something made the error on the motion held out larger \
          and was left out{named}: the error after is not blind, and training logs with more kinds of motion would help"
     )
 }
 
-/// Effects that are named of those that were left out.
-const MOST_LEFT_OUT: usize = 6;
+/// What is said where motion held out told how effects are from log to log; nothing of none.
+pub fn told_by_held_out(effects: &[EffectSpec]) -> Option<String> {
+    (!effects.is_empty()).then(|| {
+        format!(
+            "whether the robot was cold again before each log can not be told from one training log: motion held out has \
+             told it ({}), and the error after is not blind to that; a second training log would tell",
+            some_of(effects)
+        )
+    })
+}
+
+/// Kinds and joints of the first effects, and how many more there are.
+fn some_of(effects: &[EffectSpec]) -> String {
+    let mut named: Vec<String> =
+        effects.iter().map(|spec| format!("{} of {}", spec.kind, spec.joints.join("+"))).collect();
+    let more = named.len().saturating_sub(MOST_NAMED);
+    named.truncate(MOST_NAMED);
+    if more > 0 {
+        named.push(format!("{more} more"));
+    }
+    named.join(", ")
+}
+
+/// Effects that a warning names.
+const MOST_NAMED: usize = 6;
 
 /// File name of a log.
 pub fn file_name(path: &Path) -> String {

@@ -5,6 +5,7 @@ mod as_it_comes;
 mod check;
 mod control;
 mod dependencies;
+mod drifts;
 mod explain;
 mod export;
 mod fleet;

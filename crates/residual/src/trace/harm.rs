@@ -157,7 +157,7 @@ impl Search<'_> {
     }
 
     /// The error on motion held out of the model as it is fitted in the end.
-    fn held_out_error_as_fitted(&self) -> Result<TorqueError, IdentificationError> {
+    pub(super) fn held_out_error_as_fitted(&self) -> Result<TorqueError, IdentificationError> {
         let OwnTorqueFit { fit, folds, .. } = self.final_fit(false)?;
         let held_out = &folds.moving[self.whole.train.len()..];
         Ok(torque_error(held_out, &fit.parameters)?)

@@ -7,6 +7,7 @@
 //! the errors that are reported.
 
 mod bent;
+mod between_logs;
 mod constants;
 mod constants_together;
 mod floor;

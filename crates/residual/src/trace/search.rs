@@ -101,6 +101,8 @@ pub(super) struct Search<'a> {
     pub noise: Vec<f64>,
     /// What was left out since motion held out had a say.
     pub left_out_by_held_out: Vec<EffectSpec>,
+    /// Effects whose constants were told by motion held out, since the training log could not.
+    pub told_by_held_out: Vec<EffectSpec>,
     /// Whether this end was taken before another since that leaves more of the motion held out.
     pub held_out_had_a_say: bool,
     pub input: &'a TraceInput<'a>,
@@ -134,6 +136,7 @@ impl<'a> Search<'a> {
             refined: Vec::new(),
             noise: input.noise_floor.clone(),
             left_out_by_held_out: Vec::new(),
+            told_by_held_out: Vec::new(),
             held_out_had_a_say: false,
             input,
             options,

@@ -22,6 +22,7 @@ impl Search<'_> {
     /// the result says so.
     pub(super) fn finish(mut self) -> Result<Tracing, IdentificationError> {
         self.refine_together()?;
+        self.settle_between_logs()?;
         let before = self.declared_error()?;
         let most = self.counted(&before.1) * (1.0 + ROUNDING);
         let tracing = self.clone().finish_with(before.clone(), Harm::EachTorque)?;
@@ -180,6 +181,7 @@ impl Search<'_> {
             remaining,
             held_out_had_a_say: self.held_out_had_a_say || !self.left_out_by_held_out.is_empty(),
             left_out_by_held_out: self.left_out_by_held_out,
+            told_by_held_out: self.told_by_held_out,
             not_judged,
         })
     }
