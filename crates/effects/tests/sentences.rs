@@ -57,7 +57,7 @@ const SENTENCES: &[(&str, &str)] = &[
         "hysteresis",
         "The torque of shoulder depends on the way since the last reversal: 0.500 N·m over 0.0047 rad.",
     ),
-    ("thermal_drift", "The friction of shoulder falls as it warms up, over 4 s from the start of each log."),
+    ("thermal_drift", "The friction of shoulder falls as it warms up, over 8 s from the start of each log."),
     ("joint_elasticity", "The transmission of shoulder gives: 5.000e-1 rad/(N·m)."),
     ("gravity_tilt", "The base is not level: gravity leans by 3.27 degrees."),
     ("payload", "The link behind shoulder carries 0.500 kg more than the model knows."),

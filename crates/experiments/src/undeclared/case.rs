@@ -1,6 +1,6 @@
 //! One case: a robot, its motions, its secrets and its sensors, all from one seed.
 
-use super::draw::{Survey, catalogue, outside};
+use super::draw::{Survey, catalogue, outside, renewed};
 use super::friction::{Friction, Sign};
 use super::kind::{Kind, Name};
 use super::plant::{Ordinary, Record, States, record, rigid_torque};
@@ -8,7 +8,7 @@ use super::rng::{CaseRng, Stream};
 use super::robot::Robot;
 use super::secret::{Form, Secret};
 use super::sensors::Sensors;
-use super::suite::{Spec, Suite};
+use super::suite::{NewForm, Spec, Suite};
 use super::trajectory::{JointMotion, Reach, Trajectory};
 use super::visibility::Absorber;
 
@@ -16,6 +16,8 @@ use super::visibility::Absorber;
 pub const DURATION: f64 = 20.0;
 /// When the logs of a session start \[s\].
 pub const STARTS: [f64; 3] = [0.0, 25.0, 50.0];
+/// What the stamps of a session count from long before it \[s\].
+const LONG_SINCE: f64 = 20_000.0;
 /// Smallest and largest size of an effect.
 pub const SIZES: [f64; 2] = [0.05, 0.3];
 /// Factors of a torque in [`Suite::LargeGains`], and as often one over them.
@@ -141,6 +143,10 @@ impl<'a> Case<'a> {
             Name::Catalogue(kind) => catalogue(kind, joint, survey, rng)?,
             Name::Outside(stranger) => outside(stranger, joint, survey, rng)?,
         };
+        let form = match self.spec.new_form() {
+            Some(new) if self.secrets.is_empty() => renewed(form, new, rng)?,
+            _ => form,
+        };
         joints.sort_unstable();
         let wanted = rng.log_uniform(SIZES[0], SIZES[1]);
         let mut secret = Secret { name, joints, form, scale };
@@ -224,7 +230,13 @@ impl<'a> Case<'a> {
         let secrets: Vec<&Secret> =
             self.plant.iter().chain(self.secrets.iter().map(|drawn| &drawn.secret)).collect();
         let mut log = |motion: &Trajectory, secrets: &[&Secret]| {
-            let [times, stamps] = self.sensors.times(motion.start, motion.duration, &mut rng);
+            let [times, mut stamps] = self.sensors.times(motion.start, motion.duration, &mut rng);
+            let since = match self.spec.new_form() {
+                Some(NewForm::ColdAgain) => -motion.start,
+                Some(NewForm::LongSince) => LONG_SINCE,
+                _ => 0.0,
+            };
+            stamps.iter_mut().for_each(|stamp| *stamp += since);
             let record = record(&self.robot.tree, &self.ordinary, secrets, motion, &times);
             match &self.sensors.logging {
                 Some(logging) => {

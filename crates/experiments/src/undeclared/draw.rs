@@ -8,6 +8,7 @@ use super::mechanism::Mechanism;
 use super::pull::{Carried, Pull};
 use super::rng::CaseRng;
 use super::secret::Form;
+use super::suite::NewForm;
 use super::trajectory::Reach;
 use phiw_dynamics::{JointType, Tree};
 use std::f64::consts::{PI, TAU};
@@ -133,6 +134,7 @@ pub fn catalogue(
         Kind::ThermalDrift => one(Friction::Thermal {
             time_constant: rng.log_uniform(10.0, 60.0),
             viscous: rng.uniform(0.2, 2.0) / speed,
+            cold_again: false,
         }),
         Kind::Hysteresis => one(hysteresis(joint, survey, rng)),
         Kind::RotorInertia => mechanism(Mechanism::Rotor, 1.0),
@@ -350,7 +352,7 @@ fn coupling(survey: &Survey, rng: &mut CaseRng) -> Option<(Vec<usize>, Form, f64
     let (mechanism, sign) = match rng.index(4) {
         0 | 1 if alike => {
             let share = rng.pick(&[0.0, 0.3, 0.6, 1.0]);
-            (Mechanism::SumFriction { viscous: (1.0 - share) / speed, coulomb: share }, 1.0)
+            (Mechanism::SumFriction { viscous: (1.0 - share) / speed, coulomb: share, ratio: 1.0 }, 1.0)
         }
         2 => (Mechanism::AccelerationCoupling, rng.sign()),
         _ => {
@@ -361,6 +363,27 @@ fn coupling(survey: &Survey, rng: &mut CaseRng) -> Option<(Vec<usize>, Form, f64
     };
     Some((pair, Form::Mechanism(mechanism), sign))
 }
+
+/// What makes the form of a kind a new one, if the kind has it here.
+pub fn renewed(form: Form, new: NewForm, rng: &mut CaseRng) -> Option<Form> {
+    match (new, form) {
+        (NewForm::ColdAgain, Form::Friction(Friction::Thermal { viscous, .. })) => {
+            let time_constant = rng.log_uniform(5.0, 15.0);
+            Some(Form::Friction(Friction::Thermal { time_constant, viscous, cold_again: true }))
+        }
+        (NewForm::LongSince, form @ Form::Friction(Friction::Thermal { .. })) => Some(form),
+        (NewForm::GearedSum, Form::Mechanism(Mechanism::SumFriction { viscous, coulomb, .. })) => {
+            let ratio = rng.sign() * rng.log_uniform(0.5, 2.0);
+            // Viscous friction of any such shaft is that of the sum and of each joint by itself.
+            let coulomb = coulomb.max(LEAST_OF_GEARED);
+            Some(Form::Mechanism(Mechanism::SumFriction { viscous, coulomb, ratio }))
+        }
+        _ => None,
+    }
+}
+
+/// Share of Coulomb friction in that of a geared shaft, at least.
+const LEAST_OF_GEARED: f64 = 0.3;
 
 fn held_body(body: usize, rng: &mut CaseRng) -> HeldBody {
     let radius = rng.uniform(0.02, 0.07);

@@ -51,8 +51,9 @@ pub enum Friction {
     /// The torque of the rigid body over the one efficiency where it drives, times the other where it is
     /// driven, less that torque itself; of one unit the losses are as they are.
     Efficiency { driving: f64, driven: f64 },
-    /// exp(−t/T) of viscous over a speed \[s/rad\] and Coulomb friction, over the session's time.
-    Thermal { time_constant: f64, viscous: f64 },
+    /// exp(−t/T) of viscous over a speed \[s/rad\] and Coulomb friction, over the session's time, or that of
+    /// each motion (`cold_again`).
+    Thermal { time_constant: f64, viscous: f64, cold_again: bool },
     /// Maxwell slip: springs that slip, each with its yield distance \[rad\] and its share of the force.
     Maxwell { elements: Vec<[f64; 2]> },
     /// Dahl (1968), with the distance over which it rises \[rad\] and its exponent.
@@ -101,8 +102,10 @@ impl Friction {
                             let motor = if load * v > 0.0 { load / driving } else { load * driven };
                             (motor - load) * sign(v).abs()
                         }
-                        Friction::Thermal { time_constant, viscous } => {
-                            (-scene.times[sample] / time_constant).exp() * (viscous * v + sign(v))
+                        Friction::Thermal { time_constant, viscous, cold_again } => {
+                            let since = if *cold_again { scene.motion.start } else { 0.0 };
+                            let time = scene.times[sample] - since;
+                            (-time / time_constant).exp() * (viscous * v + sign(v))
                         }
                         _ => sign(v),
                     };

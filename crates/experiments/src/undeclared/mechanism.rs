@@ -17,8 +17,9 @@ pub enum Mechanism {
     Balancer { zero: f64, arm: f64, rest: f64 },
     /// Cogging, with a second harmonic.
     Ripple { cycles: f64, phase: f64, second: f64, second_phase: f64 },
-    /// Friction of what turns with the sum of two joints, felt by both: viscous over a speed, and Coulomb.
-    SumFriction { viscous: f64, coulomb: f64 },
+    /// Friction of what turns with the first of two joints and `ratio` times the second, felt by both: viscous
+    /// over a speed, and Coulomb.
+    SumFriction { viscous: f64, coulomb: f64, ratio: f64 },
     /// Each of two joints feels the other's acceleration (a rotor geared to both).
     AccelerationCoupling,
     /// The first feels the second's speed (`coulomb`: its sign).
@@ -69,9 +70,10 @@ impl Mechanism {
             Mechanism::Ripple { cycles, phase, second, second_phase } => {
                 (cycles * q + phase).sin() + second * (2.0 * cycles * q + second_phase).sin()
             }
-            Mechanism::SumFriction { viscous, coulomb } => {
-                let speed = sum(super::plant::States::v);
-                viscous * speed + coulomb * scene.ordinary.sign(speed)
+            Mechanism::SumFriction { viscous, coulomb, ratio } => {
+                let geared = |own: usize| if own == joints[0] { 1.0 } else { *ratio };
+                let speed: f64 = joints.iter().map(|&own| geared(own) * states.v(sample, own)).sum();
+                geared(joint) * (viscous * speed + coulomb * scene.ordinary.sign(speed))
             }
             Mechanism::AccelerationCoupling => sum(super::plant::States::a) - states.a(sample, joint),
             Mechanism::OneWay { driven, driver, coulomb } if joint == *driven => {

@@ -14,7 +14,9 @@
 //! on.
 //! `new_kinds` has the kinds that came to the catalogue last, so that the cases of the other suites stay
 //! what they were, and `large_gains` torques that are logged at a third to three times what they are.
-//! `new_strangers` and `later_strangers` have what no catalogue has and came last. A case follows from its
+//! `new_strangers` and `later_strangers` have what no catalogue has and came last, `new_forms` forms of older
+//! kinds: drifts of a robot that is cold again before each log or whose stamps count from long before, and
+//! shafts that turn with one joint and a multiple of another. A case follows from its
 //! seed alone. Seeds for developing the tracer and seeds for reporting are disjoint.
 //!
 //! The tracer is a separate program that sees files only. What is true stays here, or in a `truth.json`
@@ -104,7 +106,8 @@ pub struct Arguments {
     #[arg(long)]
     all: bool,
     /// Suites, separated by commas: one, two, three, control, outside (together: old), wide_right,
-    /// wide_effects, wide_outside (together: wide), new_kinds, large_gains, new_strangers, later_strangers.
+    /// wide_effects, wide_outside (together: wide), new_kinds, large_gains, new_strangers,
+    /// later_strangers, new_forms.
     #[arg(long, value_name = "SUITE", default_value = "old", value_parser = suites)]
     suite: std::sync::Arc<Suites>,
     /// Only cases in this situation (wide suites).
@@ -177,7 +180,7 @@ fn suites(text: &str) -> Result<std::sync::Arc<Suites>, String> {
                 format!(
                     "no suite {name:?}; there are old and wide, or single ones of them: one, two, \
                      three, control, outside, wide_right, wide_effects, wide_outside, new_kinds, \
-                     large_gains, new_strangers, later_strangers"
+                     large_gains, new_strangers, later_strangers, new_forms"
                 )
             })?),
         }

@@ -113,7 +113,8 @@ fn run_one(spec: &Spec, robots: &[Robot], tracer: &Tracer, options: &Options) ->
         | Suite::NewKinds
         | Suite::LargeGains
         | Suite::NewStrangers
-        | Suite::LaterStrangers => tracer
+        | Suite::LaterStrangers
+        | Suite::NewForms => tracer
             .remainder(&case.without_secrets(), &temporary.path().join("twin"))
             .inspect_err(|error| eprintln!("{}: no noise floor: {error:#}", spec.seed))
             .ok(),

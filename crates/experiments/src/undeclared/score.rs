@@ -86,7 +86,12 @@ impl Score {
             }
             Suite::Control => self.named.is_empty() && self.is_sufficient(),
             Suite::Outside => matches!(self.verdict.as_str(), "unexplained" | "partly_explained"),
-            Suite::One | Suite::Two | Suite::Three | Suite::NewKinds | Suite::LargeGains => {
+            Suite::One
+            | Suite::Two
+            | Suite::Three
+            | Suite::NewKinds
+            | Suite::LargeGains
+            | Suite::NewForms => {
                 self.outcomes.iter().all(|outcome| *outcome == Outcome::Right) && self.false_names.is_empty()
             }
         }

@@ -36,6 +36,32 @@ pub enum Suite {
     NewStrangers,
     /// One of [`Stranger::LATER`].
     LaterStrangers,
+    /// One of [`NewForm::ALL`], forms of older kinds that came last, in one case of three beside another
+    /// effect.
+    NewForms,
+}
+
+/// A form of an older kind that the other suites do not have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NewForm {
+    /// A drift of a robot that is cold again before each log; all stamps begin at nought.
+    ColdAgain,
+    /// A drift of a session whose stamps count from long before it.
+    LongSince,
+    /// A friction of a shaft that turns with one joint and a multiple of the other.
+    GearedSum,
+}
+
+impl NewForm {
+    /// All of them.
+    pub const ALL: [NewForm; 3] = [NewForm::ColdAgain, NewForm::LongSince, NewForm::GearedSum];
+
+    fn kind(self) -> Kind {
+        match self {
+            NewForm::ColdAgain | NewForm::LongSince => Kind::ThermalDrift,
+            NewForm::GearedSum => Kind::TransmissionCoupling,
+        }
+    }
 }
 
 /// Development seeds are for looking at; reporting seeds only for reporting.
@@ -50,7 +76,7 @@ pub enum Seeds {
 
 impl Suite {
     /// All suites.
-    pub const ALL: [Suite; 12] = [
+    pub const ALL: [Suite; 13] = [
         Suite::One,
         Suite::Two,
         Suite::Three,
@@ -63,6 +89,7 @@ impl Suite {
         Suite::LargeGains,
         Suite::NewStrangers,
         Suite::LaterStrangers,
+        Suite::NewForms,
     ];
     /// One to three effects on an otherwise right model, well excited.
     pub const OLD: [Suite; 5] = [Suite::One, Suite::Two, Suite::Three, Suite::Control, Suite::Outside];
@@ -89,6 +116,7 @@ impl Suite {
             Suite::LargeGains => 120,
             Suite::NewStrangers => 120,
             Suite::LaterStrangers => 40,
+            Suite::NewForms => 90,
         }
     }
 
@@ -173,6 +201,11 @@ impl Spec {
                 let turns = Kind::NEW.len();
                 spec.robot = index / turns % robots;
                 spec.draw_first(Kind::NEW[index % turns], index / turns, rng);
+            }
+            Suite::NewForms => {
+                let turns = NewForm::ALL.len();
+                spec.robot = index / turns % robots;
+                spec.draw_first(NewForm::ALL[index % turns].kind(), index / turns, rng);
             }
             Suite::LargeGains => {
                 // The second effect comes with every third case of each robot.
@@ -260,6 +293,12 @@ impl Spec {
                 kinds.push(kind);
             }
         }
+    }
+
+    /// The new form that its first secret has.
+    pub fn new_form(&self) -> Option<NewForm> {
+        let index = self.seed as usize % 100_000;
+        (self.suite == Suite::NewForms).then(|| NewForm::ALL[index % NewForm::ALL.len()])
     }
 
     /// Whether one of the secrets is this effect.

@@ -78,6 +78,26 @@ fn every_kind_is_drawn_in_its_size() {
     check(Suite::LargeGains, 0..4);
     check(Suite::NewStrangers, 0..6);
     check(Suite::LaterStrangers, 0..4);
+    check(Suite::NewForms, 0..6);
+}
+
+/// Stamps of all other cases count from the start of the session.
+#[test]
+fn stamps_of_new_forms_begin_with_each_log_or_count_from_long_before() {
+    let robots = models();
+    let first_stamps = |index| -> Vec<f64> {
+        let case = draw(&spec(Suite::NewForms, index), &robots);
+        let first = |(_, log): &(&str, String)| {
+            log.lines().nth(1).unwrap().split(',').next().unwrap().parse().unwrap()
+        };
+        case.logs().iter().map(first).collect()
+    };
+    let near = |stamps: Vec<f64>, expected: [f64; 3]| {
+        assert!(stamps.iter().zip(expected).all(|(stamp, start)| (stamp - start).abs() < 0.1), "{stamps:?}");
+    };
+    near(first_stamps(0), [0.0; 3]);
+    near(first_stamps(1), [20_000.0, 20_025.0, 20_050.0]);
+    near(first_stamps(2), [0.0, 25.0, 50.0]);
 }
 
 /// Small gains are drawn in the other suites; what is linear about one is not about a half or two.
@@ -99,7 +119,7 @@ fn large_gains_are_of_a_third_to_three_beside_another_effect_in_one_case_of_thre
 
 #[test]
 fn several_secrets_are_distinct_and_not_nested() {
-    for suite in [Suite::Two, Suite::Three, Suite::NewKinds, Suite::LargeGains] {
+    for suite in [Suite::Two, Suite::Three, Suite::NewKinds, Suite::LargeGains, Suite::NewForms] {
         for index in 0..300 {
             let kinds: Vec<Kind> = spec(suite, index)
                 .secrets
@@ -126,7 +146,7 @@ fn suites_and_seeds_do_not_overlap() {
             }
         }
     }
-    assert_eq!(seen.len(), 2 * (1000 + 1170 + 120 + 120 + 120 + 40 + 782));
+    assert_eq!(seen.len(), 2 * (1000 + 1170 + 120 + 120 + 120 + 40 + 90 + 782));
 }
 
 /// Kinds that came to the catalogue later took the places of others in all cases that were drawn before.

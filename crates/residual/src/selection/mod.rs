@@ -21,6 +21,7 @@ mod fit;
 mod moves;
 mod multiple;
 mod one_for_several;
+mod one_for_two;
 mod problem;
 mod products;
 mod screening;

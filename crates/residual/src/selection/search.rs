@@ -155,6 +155,9 @@ impl<'a> Search<'a> {
             if self.one_for_several() {
                 self.sweep();
             }
+            while self.one_for_two() {
+                self.sweep();
+            }
             while self.prune() {}
             self.renew();
             self.doubt();

@@ -292,6 +292,23 @@ fn of_two_that_do_the_same_the_one_with_fewer_parameters_is_chosen() {
     }
 }
 
+/// A Coulomb friction that turned over the wrong speed had a friction of the load beside it, whose own speed
+/// was right, and was named: neither could leave alone, and other constants of the one were no gain beside
+/// the other.
+#[test]
+fn one_with_other_constants_takes_the_place_of_two() {
+    for seed in 0..20 {
+        let both = |columns: &mut [f64]| columns[2] = columns[0] + 0.5 * columns[1];
+        let mut problem = problem_with(&mut RandomNumbers::new(seed), 1, 3, &[(0, 0, 2.0)], 0.0, both);
+        let right = problem.hypotheses.remove(0).variants.remove(0);
+        problem.hypotheses[0].textbook = true;
+        problem.hypotheses[0].variants.push(right);
+        let [wrong, beside] = [0, 1].map(|hypothesis| Member { hypothesis, variant: 0 });
+        let outcome = select(&problem, vec![wrong, beside], POLICY);
+        assert_eq!(outcome.members, [Member { variant: 1, ..wrong }], "seed {seed}");
+    }
+}
+
 /// An offset and a ripple stood for an end stop: taking either away leads nowhere, only both at once.
 #[test]
 fn one_that_does_the_work_of_two_takes_their_place() {

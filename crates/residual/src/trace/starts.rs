@@ -240,14 +240,18 @@ mod tests {
         let log = moved(&tree, |qd, torque| {
             (0..2).for_each(|joint| torque[joint] += 8.0 * qd[joint] + 5.0 * qd[1 - joint]);
         });
-        let options = TraceOptions::default();
+        // A saturation stood for the coupling, too, and left it no work.
+        let saturation = |joint| EffectSpec::new("actuator_saturation", &[joint]);
+        let excluded = tree.joint_names().map(saturation).collect();
+        let options = TraceOptions { excluded, ..TraceOptions::default() };
         searching(&log, &tree, &["viscous_friction"], &options, |declared| {
             let joints: Vec<&str> = tree.joint_names().collect();
             let coupling = EffectSpec::new("transmission_coupling", &joints);
             let is_found = |tracing: &Tracing| {
                 tracing.specs.iter().any(|own| (&own.kind, &own.joints) == (&coupling.kind, &coupling.joints))
             };
-            let without = TraceOptions { excluded: vec![coupling.clone()], ..options.clone() };
+            let mut without = options.clone();
+            without.excluded.push(coupling.clone());
             let excluded = Search { options: &without, ..declared.clone() }.best_end().unwrap().1;
             let remaining = &excluded.remaining;
             assert!(
