@@ -1,5 +1,6 @@
 //! Friction with memory: presliding and backlash.
 
+use crate::bristles::LONGEST_BRISTLES;
 use crate::columns::{Formula, OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{Constants, EffectKind, Refinement, SignalRanges, around, constant, product, values};
@@ -31,8 +32,9 @@ impl EffectKind for Hysteresis {
     }
     fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
         let mut near = around(found, PRESLIDING, step);
-        if step == 0 {
-            let own = constant(found, PRESLIDING, 0.05);
+        let own = constant(found, PRESLIDING, 0.05);
+        // A shorter one is of bristles, whose exponent is one.
+        if step == 0 && own > LONGEST_BRISTLES {
             let ways = values(PRESLIDING, LONGER.map(|longer| longer * own));
             near.extend(product(&values(EXPONENT, EXPONENTS), &ways));
         }

@@ -8,7 +8,7 @@ use phiw_identification::fitting::{
     Fit, OwnTorqueFit, Rests, TorqueError, accumulate, accumulate_folds, fit, fit_with_own_torque,
     log_changes, torque_error,
 };
-use phiw_identification::{Design, EffectSpec, IdentificationError, Identified};
+use phiw_identification::{Design, Effect, EffectSpec, IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
 
 /// Times that the bound for the error on trial is lowered, before all that was found leaves.
@@ -121,6 +121,7 @@ impl Search<'_> {
             self.parameters.clone_from(&self.input.parameters);
         }
         let data = self.whole;
+        let searched = self.parameters.clone();
         let OwnTorqueFit { design, fit: final_fit, folds } =
             self.final_fit(effects.is_empty() && refinements.is_empty())?;
         let mut train_folds = folds.moving;
@@ -135,7 +136,9 @@ impl Search<'_> {
             let uncertain = self.uncertain(&model, effects.len())?;
             let untold = untold(&model.design, &model.fit, self.declared);
             if impossible.is_empty() && !untold.is_empty() {
-                untold.into_iter().rev().try_for_each(|place| self.remove(place))?;
+                for place in untold.into_iter().rev() {
+                    self.put_in_force_or_remove(place, &model.design, &searched)?;
+                }
                 self.refine()?;
                 return self.finish_with(before, harm);
             }
@@ -184,6 +187,31 @@ impl Search<'_> {
             told_by_held_out: self.told_by_held_out,
             not_judged,
         })
+    }
+
+    /// Puts a factor of a torque in force that the search has found, which is exact however large it is, and
+    /// removes any other effect. Beside the frictions of the same fit nothing tells a torque that is half of
+    /// what it is from one that is made of half of each parameter, until that torque is another.
+    fn put_in_force_or_remove(
+        &mut self,
+        place: usize,
+        design: &Design,
+        searched: &[f64],
+    ) -> Result<(), IdentificationError> {
+        let own = design.effect_parameters(place);
+        let is_material = |effect: &Box<dyn Effect>| {
+            effect
+                .logged_factor()
+                .is_some_and(|(_, factor)| (factor - 1.0).abs() >= self.options.thresholds.least_size)
+        };
+        match design.effects()[place].with_logged_factor(&searched[own.clone()]).filter(is_material) {
+            Some(in_force) => {
+                self.specs[place] = in_force.spec();
+                self.parameters[own].fill(0.0);
+                Ok(())
+            }
+            None => self.remove(place),
+        }
     }
 
     /// The model fitted to all training motion; a held one as it is held, if `nothing_was_found`, or as the
