@@ -357,7 +357,24 @@ impl Evaluator for CouplingColumns {
 #[cfg(test)]
 mod tests {
     use super::{Coupling, Motion, TERMS};
+    use crate::sign::smooth_sign;
     use phiw_identification::{Effect, EffectSpec};
+
+    /// Friction of a shaft takes the power that its sign has over the speed that it turns with.
+    #[test]
+    fn a_geared_shaft_brakes_the_speed_that_it_turns_with() {
+        let velocity = [0.7, -1.3];
+        for ratio in [-0.6, 0.4, 1.0, 1.7] {
+            let motion = Motion { velocity, acceleration: [0.0; 2], width: 0.1, ratio };
+            for (name, of_second) in [("fc_sum", ratio), ("fc_difference", -ratio)] {
+                let speed = velocity[0] + of_second * velocity[1];
+                let term = TERMS.iter().find(|term| term.name == name).unwrap();
+                let columns = velocity.iter().zip(term.columns);
+                let power: f64 = columns.map(|(speed, column)| speed * column.unwrap()(&motion)).sum();
+                assert!((power - speed * smooth_sign(speed, 0.1)).abs() < 1e-12, "{name} {ratio}: {power}");
+            }
+        }
+    }
 
     /// The power of a term's columns is what its entries of the matrix say: twice the entry times both
     /// speeds.

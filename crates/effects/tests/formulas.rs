@@ -3,7 +3,7 @@
 use phiw_codegen::{Expression, Function};
 use phiw_dynamics::random_tree::{RandomNumbers, RandomState, RandomTreeOptions, random_state, random_tree};
 use phiw_dynamics::{Tree, Workspace};
-use phiw_effects::{Catalogue, JointRange, Refinement, SignalRanges};
+use phiw_effects::{Catalogue, Constants, JointRange, Refinement, SignalRanges};
 use phiw_identification::effect::ReferenceModel;
 use phiw_identification::{Design, predict};
 use phiw_regressor::BaseParameters;
@@ -93,10 +93,8 @@ fn every_formula_is_its_effect() {
         let mut count = 0;
         for site in kind.sites(&tree) {
             let scanned = kind.scan(&site, &ranges);
-            let refined = scanned
-                .last()
-                .map(|found| kind.refine(&Refinement { found, site: &site, ranges: &ranges, step: 0 }))
-                .unwrap_or_default();
+            let near = |found| kind.refine(&Refinement { found, site: &site, ranges: &ranges, step: 0 });
+            let refined: Vec<Constants> = scanned.iter().flat_map(near).collect();
             for constants in scanned.into_iter().chain(refined) {
                 let effect = kind.build(&tree, &site, &constants);
                 let (spec, parameters) = (effect.spec(), effect.parameters());
