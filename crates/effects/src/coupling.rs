@@ -16,9 +16,9 @@ use phiw_identification::{Effect, EffectSpec};
 /// Torque at one joint from the motion of another, both ways or one way.
 ///
 /// Motors that turn with the sum q_i + q_j feel viscous friction, Coulomb friction and inertia of the sum;
-/// what the joints' own friction and rotor inertia do not take up is the part that crosses over. Gears between
-/// them make it q_i + `ratio`·q_j, which Coulomb friction alone tells from a sum: of viscous friction and
-/// inertia, the joints' own take up the rest of any.
+/// what the joints' own friction and rotor inertia do not take up is the part that crosses over. Gears
+/// between them make it q_i + `ratio`·q_j, which Coulomb friction alone tells from a sum: of viscous friction
+/// and inertia, the joints' own take up the rest of any.
 pub struct TransmissionCoupling;
 
 /// Which terms a coupling has: one bit for each of [`TERMS`].

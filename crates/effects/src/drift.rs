@@ -14,9 +14,9 @@ use phiw_identification::effect::Sample;
 /// Viscous and Coulomb friction times a factor that falls from one to zero: exp(−t / `time_constant`), or
 /// with the temperature where the log has one (`time_constant` zero).
 ///
-/// t counts from `cold_at`, a time of the session, whose logs were recorded one after the other; it is no less
-/// than zero. Where `from_log_start` is one it counts from the start of each log: the robot was cold again
-/// before each.
+/// t counts from `cold_at`, a time of the session, whose logs were recorded one after the other; it is no
+/// less than zero. Where `from_log_start` is one it counts from the start of each log: the robot was cold
+/// again before each.
 pub struct ThermalDrift;
 
 /// Which of the two frictions falls.
@@ -185,8 +185,8 @@ mod tests {
     use crate::kind::{EffectKind, Refinement, SignalRanges};
     use phiw_identification::EffectSpec;
 
-    /// A drift over 0.27 s was refined from one over 1.25 s: the first moments of a log of ten seconds. Drifts
-    /// over 1 to 2.5 s from the start of each log of twenty were named on five joints of a robot.
+    /// A drift over 0.27 s was refined from one over 1.25 s: the first moments of a log of ten seconds.
+    /// Drifts over 1 to 2.5 s from the start of each log of twenty were named on five joints of a robot.
     #[test]
     fn a_drift_is_not_refined_to_the_first_moments_of_a_log() {
         let found = EffectSpec::new("thermal_drift", &["elbow"]).with("time_constant", 2.5).constants;

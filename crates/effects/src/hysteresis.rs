@@ -8,12 +8,12 @@ use phiw_dynamics::Tree;
 use phiw_identification::Effect;
 use phiw_identification::effect::Sample;
 
-/// A torque that depends on the way since the last reversal (Dahl 1968): dz = (1 − sign(q̇)·z)^`exponent`·dq /
-/// `presliding`.
+/// A torque that depends on the way since the last reversal (Dahl 1968):
+/// dz = (1 − sign(q̇)·z)^`exponent`·dq / `presliding`.
 ///
-/// z runs to ±1: within the presliding distance where the exponent is zero (a spring that slips, backlash that
-/// is taken up), ever more slowly where it is one or more. With Coulomb friction declared beside it, the fit
-/// shares the torque between the two.
+/// z runs to ±1: within the presliding distance where the exponent is zero (a spring that slips, backlash
+/// that is taken up), ever more slowly where it is one or more. With Coulomb friction declared beside it, the
+/// fit shares the torque between the two.
 pub struct Hysteresis;
 
 const PRESLIDING: &str = "presliding";

@@ -223,8 +223,8 @@ pub trait EffectKind: Send + Sync {
         false
     }
 
-    /// Constants with which it is the same within any one log and other from log to log, if there are such: of
-    /// a single training log only other motion can tell them.
+    /// Constants with which it is the same within any one log and other from log to log, if there are such:
+    /// of a single training log only other motion can tell them.
     fn alike_within_one_log(&self, _found: &Constants, _ranges: &SignalRanges) -> Option<Constants> {
         None
     }

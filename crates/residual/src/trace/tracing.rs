@@ -142,7 +142,8 @@ pub struct Tracing {
     pub held_out_had_a_say: bool,
     /// What was left out for that.
     pub left_out_by_held_out: Vec<EffectSpec>,
-    /// Effects of which motion held out has told how they are from log to log, since there is one training log.
+    /// Effects of which motion held out has told how they are from log to log, since there is one training
+    /// log.
     pub told_by_held_out: Vec<EffectSpec>,
     /// Kinds and joints of which some constants could not be judged, since their columns are not finite on
     /// these logs.
