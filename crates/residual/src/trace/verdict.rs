@@ -8,7 +8,7 @@ use phiw_identification::fitting::{
     Fit, OwnTorqueFit, Rests, TorqueError, accumulate, accumulate_folds, fit, fit_with_own_torque,
     log_changes, torque_error,
 };
-use phiw_identification::{Design, Effect, EffectSpec, IdentificationError, Identified};
+use phiw_identification::{Design, EffectSpec, IdentificationError, Identified};
 use phiw_regressor::least_squares::GroupedFactor;
 
 /// Times that the bound for the error on trial is lowered, before all that was found leaves.
@@ -199,12 +199,11 @@ impl Search<'_> {
         searched: &[f64],
     ) -> Result<(), IdentificationError> {
         let own = design.effect_parameters(place);
-        let is_material = |effect: &Box<dyn Effect>| {
-            effect
-                .logged_factor()
-                .is_some_and(|(_, factor)| (factor - 1.0).abs() >= self.options.thresholds.least_size)
-        };
-        match design.effects()[place].with_logged_factor(&searched[own.clone()]).filter(is_material) {
+        let least = self.options.thresholds.least_size;
+        let in_force = design.effects()[place].with_logged_factor(&searched[own.clone()]);
+        let factor = in_force.as_ref().and_then(|in_force| in_force.logged_factor());
+        let is_material = factor.is_some_and(|(_, factor)| (factor - 1.0).abs() >= least);
+        match in_force.filter(|_| is_material) {
             Some(in_force) => {
                 self.specs[place] = in_force.spec();
                 self.parameters[own].fill(0.0);
