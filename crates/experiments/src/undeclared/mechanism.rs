@@ -17,8 +17,8 @@ pub enum Mechanism {
     Balancer { zero: f64, arm: f64, rest: f64 },
     /// Cogging, with a second harmonic.
     Ripple { cycles: f64, phase: f64, second: f64, second_phase: f64 },
-    /// Friction of what turns with the first of two joints and `ratio` times the second, felt by both: viscous
-    /// over a speed, and Coulomb.
+    /// Friction of what turns with the first of two joints and `ratio` times the second, felt by both:
+    /// viscous over a speed, and Coulomb.
     SumFriction { viscous: f64, coulomb: f64, ratio: f64 },
     /// Each of two joints feels the other's acceleration (a rotor geared to both).
     AccelerationCoupling,
