@@ -16,7 +16,7 @@ use phiw_identification::effect::Sample;
 ///
 /// t counts from `cold_at`, a time of the session, whose logs were recorded one after the other; it is no
 /// less than zero. Where `from_log_start` is one it counts from the start of each log: the robot was cold
-/// again before each.
+/// again before each. `part` says which of the two frictions it is that falls, or both.
 pub struct ThermalDrift;
 
 /// Which of the two frictions falls.

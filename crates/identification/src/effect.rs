@@ -216,7 +216,11 @@ pub trait EffectCatalogue: Sync {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EffectError {
     /// No such kind.
-    #[error("there is no effect `{kind}`{}; known are: {}", nearest.as_ref().map(|name| format!(" (did you mean `{name}`?)")).unwrap_or_default(), known.join(", "))]
+    #[error(
+        "there is no effect `{kind}`{}; known are: {}",
+        nearest.as_ref().map(|name| format!(" (did you mean `{name}`?)")).unwrap_or_default(),
+        known.join(", ")
+    )]
     UnknownKind {
         /// What was asked for.
         kind: String,
@@ -234,7 +238,12 @@ pub enum EffectError {
         kind: String,
     },
     /// No such joint.
-    #[error("effect `{kind}` names the joint `{joint}`, which the robot does not have or which does not move{}; moving joints are: {}", nearest.as_ref().map(|name| format!(" (did you mean `{name}`?)")).unwrap_or_default(), known.join(", "))]
+    #[error(
+        "effect `{kind}` names the joint `{joint}`, which the robot does not have or which does not move{}; \
+         moving joints are: {}",
+        nearest.as_ref().map(|name| format!(" (did you mean `{name}`?)")).unwrap_or_default(),
+        known.join(", ")
+    )]
     UnknownJoint {
         /// The effect.
         kind: String,

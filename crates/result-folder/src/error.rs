@@ -15,7 +15,11 @@ pub enum ResultError {
         holder: String,
     },
     /// A result would overwrite an input.
-    #[error("{}: this result would overwrite the input {}; copy that file elsewhere, or name another place for the results", output.display(), input.display())]
+    #[error(
+        "{}: this result would overwrite the input {}; copy that file elsewhere, or name another place for the results",
+        output.display(),
+        input.display()
+    )]
     IsInput {
         /// The result.
         output: PathBuf,
