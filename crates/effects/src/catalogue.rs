@@ -3,7 +3,9 @@
 use crate::declaration::{cannot_act, joint_indices, nearest};
 use crate::{Constants, EffectKind, FittedEffect, Mechanisms, Refinement, ServoFriction, SignalRanges};
 use crate::{coupling, drift, drive, efficiency, elasticity, external, friction, friction_over_position};
-use crate::{hysteresis, logged_torque, position, position_map, sensing, torque_gain, torque_zero};
+use crate::{
+    hysteresis, load_friction, logged_torque, position, position_map, sensing, torque_gain, torque_zero,
+};
 use phiw_codegen::JointTorque;
 use phiw_dynamics::Tree;
 use phiw_identification::effect::{EffectError, EffectParameter, JointProperty};
@@ -27,7 +29,7 @@ impl Default for Catalogue {
                 Box::new(friction::Asymmetric),
                 Box::new(friction::Quadratic),
                 Box::new(friction::Stribeck),
-                Box::new(friction::LoadDependent),
+                Box::new(load_friction::LoadDependent),
                 Box::new(position::JointSpring),
                 Box::new(position::GravityBalancer),
                 Box::new(position::TorqueRipple),

@@ -22,6 +22,8 @@ pub enum ParameterKind {
     Stiffness,
     /// Without dimension.
     Ratio,
+    /// One over velocity \[s/rad, s/m\].
+    RatioPerVelocity,
 }
 
 impl ParameterKind {
@@ -40,6 +42,8 @@ impl ParameterKind {
             (Self::Stiffness, false) => "N·m/rad",
             (Self::Stiffness, true) => "N/m",
             (Self::Ratio, _) => "1",
+            (Self::RatioPerVelocity, false) => "s/rad",
+            (Self::RatioPerVelocity, true) => "s/m",
         }
     }
 }

@@ -15,6 +15,9 @@ use phiw_identification::{Effect, EffectSpec};
 
 /// Torque at one joint from the motion of another, both ways or one way.
 ///
+/// What is stretched by both joints (a hose, a tendon, a spring over an elbow and a wrist) is a spring of
+/// each of them (`joint_spring`) and a stiffness that crosses over.
+///
 /// Motors that turn with the sum q_i + q_j feel viscous friction, Coulomb friction and inertia of the sum;
 /// what the joints' own friction and rotor inertia do not take up is the part that crosses over. Gears
 /// between them make it q_i + `ratio`·q_j, which Coulomb friction alone tells from a sum: of viscous friction
@@ -43,6 +46,7 @@ struct Term {
 }
 
 struct Motion {
+    position: [f64; 2],
     velocity: [f64; 2],
     acceleration: [f64; 2],
     width: f64,
@@ -58,7 +62,7 @@ impl Motion {
     }
 }
 
-const TERMS: [Term; 8] = [
+const TERMS: [Term; 9] = [
     Term {
         name: "fv_cross",
         dimension: ParameterKind::PerVelocity,
@@ -110,14 +114,21 @@ const TERMS: [Term; 8] = [
         lower: f64::NEG_INFINITY,
         columns: [None, Some(|motion| smooth_sign(motion.velocity[0], motion.width))],
     },
+    Term {
+        name: "k_cross",
+        dimension: ParameterKind::Stiffness,
+        lower: f64::NEG_INFINITY,
+        columns: [Some(|motion| motion.position[1]), Some(|motion| motion.position[0])],
+    },
 ];
 
 /// How each term is said, the most telling first.
-const SAID: [(&str, &str); 8] = [
+const SAID: [(&str, &str); 9] = [
     ("fv_cross", "of coupled viscous friction"),
     ("fc_sum", "of friction with the sign of the sum of their speeds"),
     ("fc_difference", "of friction with the sign of the difference of their speeds"),
     ("Ia_cross", "of coupled inertia"),
+    ("k_cross", "of coupled stiffness"),
     ("fv_of_second_on_first", "of viscous friction of the second on the first"),
     ("fv_of_first_on_second", "of viscous friction of the first on the second"),
     ("fc_of_second_on_first", "of Coulomb friction of the second on the first"),
@@ -125,8 +136,8 @@ const SAID: [(&str, &str); 8] = [
 ];
 
 /// Sets of terms to try, simplest first: single terms, then the differential's.
-const COMBINATIONS: [u32; 14] =
-    [1, 2, 4, 8, 16, 32, 64, 128, 1 | 4, 1 | 8, 1 | 2 | 4, 1 | 2 | 8, 16 | 64, 32 | 128];
+const COMBINATIONS: [u32; 15] =
+    [1, 2, 4, 8, 16, 32, 64, 128, 256, 1 | 4, 1 | 8, 1 | 2 | 4, 1 | 2 | 8, 16 | 64, 32 | 128];
 
 impl EffectKind for TransmissionCoupling {
     fn name(&self) -> &str {
@@ -206,12 +217,13 @@ impl EffectKind for TransmissionCoupling {
     }
     fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
         let [first, second] = found.joint_names() else { return Vec::new() };
-        let (v, a) = (Expression::velocity, Expression::acceleration);
+        let (q, v, a) = (Expression::position, Expression::velocity, Expression::acceleration);
         let ratio = ratio(found.constants());
         let sign = |factor: f64| (v(first) + factor * v(second)).sign(found.constant(WIDTH));
         let of_term = |name: &str| match name {
             "fv_cross" => [Some(v(second)), Some(v(first))],
             "Ia_cross" => [Some(a(second)), Some(a(first))],
+            "k_cross" => [Some(q(second)), Some(q(first))],
             "fc_sum" => [Some(sign(ratio)), Some(ratio * sign(ratio))],
             "fc_difference" => [Some(sign(-ratio)), Some(-ratio * sign(-ratio))],
             "fv_of_second_on_first" => [Some(v(second)), None],
@@ -293,9 +305,10 @@ impl Effect for Coupling {
         };
         self.terms.iter().enumerate().flat_map(of_term).collect()
     }
-    /// Terms with a sign, whose parameters are torques, are not.
+    /// Terms with a sign are not, and a stiffness does not change with the motion at all.
     fn is_linear_in_motion(&self, parameter: usize) -> bool {
-        self.terms.get(parameter).is_some_and(|term| term.dimension != ParameterKind::Torque)
+        let dimension = self.terms.get(parameter).map(|term| term.dimension);
+        matches!(dimension, Some(ParameterKind::PerVelocity | ParameterKind::Inertia))
     }
     /// Friction of the shaft that turns with the sum or with the difference.
     fn turns_with(&self, parameter: usize) -> Option<VelocitySum> {
@@ -343,6 +356,7 @@ impl Evaluator for CouplingColumns {
     fn evaluate(&mut self, sample: &Sample<'_>, columns: &mut [f64]) {
         let both = |values: &[f64]| self.site.map(|joint| values[joint]);
         let motion = Motion {
+            position: both(sample.q()),
             velocity: both(sample.qd()),
             acceleration: both(sample.qdd()),
             width: self.width,
@@ -365,7 +379,7 @@ mod tests {
     fn a_geared_shaft_brakes_the_speed_that_it_turns_with() {
         let velocity = [0.7, -1.3];
         for ratio in [-0.6, 0.4, 1.0, 1.7] {
-            let motion = Motion { velocity, acceleration: [0.0; 2], width: 0.1, ratio };
+            let motion = Motion { position: [0.0; 2], velocity, acceleration: [0.0; 2], width: 0.1, ratio };
             for (name, of_second) in [("fc_sum", ratio), ("fc_difference", -ratio)] {
                 let speed = velocity[0] + of_second * velocity[1];
                 let term = TERMS.iter().find(|term| term.name == name).unwrap();
@@ -381,7 +395,8 @@ mod tests {
     #[test]
     fn the_quadratic_form_of_a_coupling_is_the_power_of_its_columns() {
         let speeds = [0.7, -1.3];
-        let motion = Motion { velocity: speeds, acceleration: speeds, width: 0.1, ratio: 0.6 };
+        let motion =
+            Motion { position: speeds, velocity: speeds, acceleration: speeds, width: 0.1, ratio: 0.6 };
         let mut counted = 0;
         for term in TERMS {
             let effect = Coupling {

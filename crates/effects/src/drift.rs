@@ -1,12 +1,13 @@
 //! Friction that changes with time or temperature.
 
 use crate::bristles::{Bristles, DEFLECTION, bristles_near, with_bristles};
-use crate::columns::{Formula, OwnTorque, ParameterKind};
+use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{
     Constants, EffectKind, Refinement, Signal, SignalRanges, SpecialCase, around, constant, product, values,
 };
 use crate::sign::Sign;
+use crate::viscous_and_dry::{BOTH, DRY, PART, VISCOUS, ViscousAndDry, of_part};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
 use phiw_identification::effect::Sample;
@@ -18,12 +19,6 @@ use phiw_identification::effect::Sample;
 /// less than zero. Where `from_log_start` is one it counts from the start of each log: the robot was cold
 /// again before each. `part` says which of the two frictions it is that falls, or both.
 pub struct ThermalDrift;
-
-/// Which of the two frictions falls.
-const PART: &str = "part";
-const VISCOUS: f64 = 0.0;
-const DRY: f64 = 1.0;
-const BOTH: f64 = 2.0;
 
 const TIME_CONSTANT: &str = "time_constant";
 const COLD_AT: &str = "cold_at";
@@ -129,14 +124,9 @@ impl EffectKind for ThermalDrift {
         let dry = Bristles { joint, deflection: constant(constants, DEFLECTION, 0.0), steady };
         let viscous = move |sample: &Sample<'_>| falling(sample) * sample.qd()[joint];
         let part = constant(constants, PART, BOTH);
-        let columns = FallingFriction { part, viscous, dry };
+        let columns = ViscousAndDry { part, viscous, dry };
         let both = [("fv_cold", ParameterKind::PerVelocity, 0.0), ("fc_cold", ParameterKind::Torque, 0.0)];
-        let parameters = match part {
-            VISCOUS => &both[..1],
-            DRY => &both[1..],
-            _ => &both[..],
-        };
-        Box::new(OwnTorque::new(self.name(), tree, joint, constants, parameters, columns))
+        Box::new(OwnTorque::new(self.name(), tree, joint, constants, of_part(part, &both), columns))
     }
 }
 
@@ -152,31 +142,6 @@ fn is_warming(constants: &Constants, ranges: &SignalRanges) -> bool {
 
 fn counts_from_log_start(constants: &Constants) -> bool {
     constant(constants, FROM_LOG_START, 0.0) == 1.0
-}
-
-/// A viscous and a dry friction, each in a column of its own, or one of them.
-struct FallingFriction<V, D> {
-    part: f64,
-    viscous: V,
-    dry: Bristles<D>,
-}
-
-impl<V, D> Formula for FallingFriction<V, D>
-where
-    V: Fn(&Sample<'_>) -> f64 + Send + Sync,
-    D: Fn(&Sample<'_>) -> f64 + Send + Sync,
-{
-    type Memory = <Bristles<D> as Formula>::Memory;
-
-    fn columns(&self, memory: &mut Self::Memory, sample: &Sample<'_>, columns: &mut [f64]) {
-        if self.part == VISCOUS || self.part == BOTH {
-            columns[0] = (self.viscous)(sample);
-        }
-        if self.part == DRY || self.part == BOTH {
-            let place = columns.len() - 1;
-            self.dry.columns(memory, sample, &mut columns[place..]);
-        }
-    }
 }
 
 #[cfg(test)]

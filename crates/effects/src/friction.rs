@@ -1,17 +1,17 @@
-//! Friction that depends on the velocity alone, or on the load.
+//! Friction that depends on the velocity alone.
 
 use crate::bristles::{Bristles, DEFLECTION, bristles_near, with_bristles};
 use crate::columns::{OwnTorque, ParameterKind};
 use crate::fitted::FittedEffect;
 use crate::kind::{
-    Constants, EffectKind, Refinement, Signal, SignalRanges, SpecialCase, around, constant, product, values,
+    Constants, EffectKind, Refinement, SignalRanges, SpecialCase, around, constant, product, values,
 };
 use crate::mechanism::ServoFriction;
 use crate::sign::{LEAD, POWER, Sign, WIDTH, few_sign_widths, sign_widths, signs_near};
 use phiw_codegen::{Expression, Function, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
-use phiw_identification::effect::{JointProperty, Needs, QuadraticForm, Sample};
+use phiw_identification::effect::{JointProperty, QuadraticForm, Sample};
 
 const VISCOUS: &str = "viscous_friction";
 
@@ -300,54 +300,5 @@ impl EffectKind for Stribeck {
         let parameters = [("fs", ParameterKind::Torque, 0.0)];
         let effect = OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns);
         Box::new(effect.turning_with_velocity(turns_at_once))
-    }
-}
-
-/// μ·|τ of the rigid body|·sign(q̇).
-pub struct LoadDependent;
-
-impl EffectKind for LoadDependent {
-    fn name(&self) -> &str {
-        "load_dependent_friction"
-    }
-    fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
-        few_sign_widths(site[0], ranges)
-    }
-    fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
-        around(found, WIDTH, step).into_iter().chain(bristles_near(found, step)).collect()
-    }
-    fn turned_over_a_way(&self, found: &Constants, way: Option<f64>) -> Option<Constants> {
-        Some(with_bristles(found, way))
-    }
-    fn telling_motion(&self) -> &'static str {
-        "the same motion with the arm stretched out and folded, or with a load"
-    }
-    fn sentence(&self, found: &FittedEffect<'_>) -> String {
-        let (joint, share) = (found.joints(), found.value(0));
-        format!("The friction of {joint} grows with its load: {share:.3} of the torque that it carries.")
-    }
-    fn servo_friction(&self, found: &FittedEffect<'_>) -> Option<ServoFriction> {
-        Some(ServoFriction::Load { share: found.value(0) })
-    }
-    fn formulas(&self, found: &FittedEffect<'_>) -> Vec<JointTorque> {
-        let load = |joint: &str| Expression::BodyTorque(joint.to_owned()).magnitude();
-        found.own_torque(|joint| found.value(0) * (load(joint) * found.sign_of_velocity(joint)))
-    }
-    fn seen_against(&self) -> Signal {
-        Signal::Torque
-    }
-    fn dissipates(&self) -> bool {
-        true
-    }
-    fn build(&self, tree: &Tree, site: &[usize], constants: &Constants) -> Box<dyn Effect> {
-        let (joint, sign) = (site[0], Sign::of(constants));
-        let steady = move |sample: &Sample<'_>| {
-            let load = sample.reference_torque().get(joint).copied().unwrap_or_default();
-            load.abs() * sign.of_joint(sample, joint)
-        };
-        let columns = Bristles { joint, deflection: constant(constants, DEFLECTION, 0.0), steady };
-        let parameters = [("mu", ParameterKind::Ratio, 0.0)];
-        let needs = Needs { torque: true, ..Needs::default() };
-        Box::new(OwnTorque::new(self.name(), tree, joint, constants, &parameters, columns).needing(needs))
     }
 }

@@ -15,6 +15,7 @@ mod friction;
 mod friction_over_position;
 mod hysteresis;
 mod kind;
+mod load_friction;
 mod logged_torque;
 mod mechanism;
 mod position;
@@ -24,6 +25,7 @@ mod sign;
 mod torque_gain;
 mod torque_zero;
 mod trigonometric_spline;
+mod viscous_and_dry;
 
 pub use bristles::{BRISTLE_WAYS, LONGEST_BRISTLES};
 pub use catalogue::{Catalogue, sentence};

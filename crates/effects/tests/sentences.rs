@@ -32,7 +32,7 @@ const SENTENCES: &[(&str, &str)] = &[
     ),
     (
         "load_dependent_friction",
-        "The friction of shoulder grows with its load: 0.500 of the torque that it carries.",
+        "The friction of shoulder grows with its load: 0.500 for each rad/s and 0.250 of the torque that it carries.",
     ),
     ("joint_spring", "A spring pulls shoulder back: 0.500 N·m/rad."),
     (

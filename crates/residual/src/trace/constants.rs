@@ -50,6 +50,33 @@ impl Search<'_> {
         way.ends(self)
     }
 
+    /// Chooses constants, among those that its kind tries first, for those effects that have none.
+    pub(super) fn scan_those(
+        &mut self,
+        are_those: impl Fn(&EffectSpec) -> bool,
+    ) -> Result<(), IdentificationError> {
+        let present = Present { specs: &self.specs, declared: self.declared };
+        let mut candidates = Candidates::of_model(self.fixed, present);
+        for (place, spec) in self.specs.iter().enumerate() {
+            if self.is_held(place) || !spec.constants.is_empty() || !are_those(spec) {
+                continue;
+            }
+            let scanned = self.fixed.catalogue.scanned(spec, self.fixed.tree, &self.input.ranges)?;
+            let specs = scanned.into_iter().map(|constants| EffectSpec { constants, ..spec.clone() });
+            candidates.add_variants(self.fixed, present, place, specs.collect())?;
+        }
+        let effects = std::mem::take(&mut candidates.effects);
+        if effects.is_empty() {
+            return Ok(());
+        }
+        let stage = self.pass(effects, Keep::Always)?;
+        let mut problem = self.fixed.problem(stage, &mut candidates)?;
+        problem.hypotheses.iter_mut().for_each(|hypothesis| hypothesis.declared = true);
+        let outcome = choose_variants(&problem, candidates.present.clone(), self.policy());
+        self.take(&problem, &candidates, &outcome.members, &outcome.fit.values);
+        Ok(())
+    }
+
     /// The model's effects, those that are asked for each with constants near its own.
     fn near(
         &self,
@@ -65,9 +92,7 @@ impl Search<'_> {
             let (catalogue, tree) = (self.fixed.catalogue, self.fixed.tree);
             let mut near = catalogue.refined(spec, tree, &self.input.ranges, step)?;
             if step == 0 && place < self.declared && !spec.constants.is_empty() {
-                let site: Vec<usize> =
-                    spec.joints.iter().filter_map(|joint| tree.joint_index(joint)).collect();
-                near.extend(catalogue.kind(&spec.kind)?.scan(&site, &self.input.ranges));
+                near.extend(catalogue.scanned(spec, tree, &self.input.ranges)?);
             }
             near.extend(self.as_the_joint_turns(spec)?);
             let specs = near.into_iter().map(|constants| EffectSpec { constants, ..spec.clone() });

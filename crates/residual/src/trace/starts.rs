@@ -265,6 +265,32 @@ mod tests {
         });
     }
 
+    /// A filter of all torques stood for how their frictions turn, in ten of 29 logs: beside it the width of
+    /// each was never looked for, and without it and without that the criterion was larger.
+    #[test]
+    fn a_filter_of_all_torques_does_not_stand_for_how_frictions_turn() {
+        let tree = random_tree(5, &RandomTreeOptions { joints: 2, ..Default::default() }).unwrap();
+        let log = moved(&tree, |qd, torque| {
+            (0..2).for_each(|joint| torque[joint] += 40.0 * (qd[joint] / 0.08).tanh());
+        });
+        searching(&log, &tree, &[], &TraceOptions::default(), |declared| {
+            let mut search = declared.textbook_start().unwrap().unwrap();
+            let joints: Vec<&str> = tree.joint_names().collect();
+            search.chosen.rows = vec![1000.0; 2];
+            search.add(EffectSpec::new("torque_smoothing", &joints)).unwrap();
+            search.refine().unwrap();
+            let smoothing = search.specs.last().unwrap().constants["time_constant_squared"];
+            assert!(smoothing > 5e-6, "{smoothing}");
+            search.leave_out_what_is_not_realised().unwrap();
+            let widths: Vec<_> = search.specs.iter().filter(|spec| spec.kind == "coulomb_friction").collect();
+            assert!(search.specs.iter().all(|spec| spec.kind != "torque_smoothing"), "{:?}", search.specs);
+            assert!(
+                widths.iter().all(|spec| (0.04..0.16).contains(&spec.constants["sign_width"])),
+                "{widths:?}"
+            );
+        });
+    }
+
     /// Where nothing was found, an end that what was declared had yet to join was taken for the declared
     /// model: it had effects that nothing counted, and the trace of a right model ended in a panic.
     #[test]
