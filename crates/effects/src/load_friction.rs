@@ -43,7 +43,8 @@ impl EffectKind for LoadDependent {
         "the same motion with the arm stretched out and folded, or with a load"
     }
     fn sentence(&self, found: &FittedEffect<'_>) -> String {
-        let unit = found.unit_of_position();
+        // The viscous share comes first, in s/rad or s/m.
+        let unit = found.unit(0).strip_prefix("s/").unwrap_or("rad");
         let share = |(name, value): (&str, f64)| match name {
             VISCOUS_SHARE => format!("{value:.3} for each {unit}/s"),
             _ => format!("{value:.3}"),

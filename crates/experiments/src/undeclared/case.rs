@@ -143,10 +143,13 @@ impl<'a> Case<'a> {
             Name::Catalogue(kind) => catalogue(kind, joint, survey, rng)?,
             Name::Outside(stranger) => outside(stranger, joint, survey, rng)?,
         };
-        let form = match self.spec.new_form() {
-            Some(new) if self.secrets.is_empty() => renewed(form, new, rng)?,
-            _ => form,
+        let new_form = self.spec.new_form().filter(|_| self.secrets.is_empty());
+        let form = match new_form {
+            Some(new) => renewed(form, new, rng)?,
+            None => form,
         };
+        // A coupling may drive; a spring does not push away.
+        let scale: f64 = if new_form == Some(NewForm::OverTwoJoints) { scale.abs() } else { scale };
         joints.sort_unstable();
         let wanted = rng.log_uniform(SIZES[0], SIZES[1]);
         let mut secret = Secret { name, joints, form, scale };

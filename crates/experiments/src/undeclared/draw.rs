@@ -378,6 +378,10 @@ pub fn renewed(form: Form, new: NewForm, rng: &mut CaseRng) -> Option<Form> {
             let coulomb = coulomb.max(LEAST_OF_GEARED);
             Some(Form::Mechanism(Mechanism::SumFriction { viscous, coulomb, ratio }))
         }
+        (NewForm::LoadAndSpeed, _) => Some(Form::Friction(Friction::LoadAndSpeed)),
+        (NewForm::OverTwoJoints, _) => {
+            Some(Form::Mechanism(Mechanism::PositionCoupling { center: rng.uniform(-0.5, 0.5) }))
+        }
         _ => None,
     }
 }

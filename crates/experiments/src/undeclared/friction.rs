@@ -48,6 +48,8 @@ pub enum Friction {
     Quadratic,
     /// |τ of the rigid body|·sign(q̇).
     LoadDependent,
+    /// |τ of the rigid body|·q̇.
+    LoadAndSpeed,
     /// The torque of the rigid body over the one efficiency where it drives, times the other where it is
     /// driven, less that torque itself; of one unit the losses are as they are.
     Efficiency { driving: f64, driven: f64 },
@@ -97,6 +99,7 @@ impl Friction {
                         }
                         Friction::Quadratic => v * v.abs(),
                         Friction::LoadDependent => scene.rigid(sample, joint).abs() * sign(v),
+                        Friction::LoadAndSpeed => scene.rigid(sample, joint).abs() * v,
                         Friction::Efficiency { driving, driven } => {
                             let load = scene.rigid(sample, joint);
                             let motor = if load * v > 0.0 { load / driving } else { load * driven };

@@ -47,7 +47,7 @@ pub enum Kind {
 pub enum Stranger {
     /// A sinusoid in time that has nothing to do with the motion.
     TimeSinusoid,
-    /// A spring between two joints: k·(qᵢ + qⱼ) on both.
+    /// A spring between two joints: k·(qᵢ + qⱼ) on both. The catalogue's coupling has had this form since.
     PositionCoupling,
     /// A cubic spring with a dead zone in mid-range.
     DeadZoneSpring,

@@ -50,16 +50,27 @@ pub enum NewForm {
     LongSince,
     /// A friction of a shaft that turns with one joint and a multiple of the other.
     GearedSum,
+    /// A friction that grows with the load and with the speed.
+    LoadAndSpeed,
+    /// A spring that is stretched by two joints.
+    OverTwoJoints,
 }
 
 impl NewForm {
     /// All of them.
-    pub const ALL: [NewForm; 3] = [NewForm::ColdAgain, NewForm::LongSince, NewForm::GearedSum];
+    pub const ALL: [NewForm; 5] = [
+        NewForm::ColdAgain,
+        NewForm::LongSince,
+        NewForm::GearedSum,
+        NewForm::LoadAndSpeed,
+        NewForm::OverTwoJoints,
+    ];
 
     fn kind(self) -> Kind {
         match self {
             NewForm::ColdAgain | NewForm::LongSince => Kind::ThermalDrift,
-            NewForm::GearedSum => Kind::TransmissionCoupling,
+            NewForm::GearedSum | NewForm::OverTwoJoints => Kind::TransmissionCoupling,
+            NewForm::LoadAndSpeed => Kind::LoadDependentFriction,
         }
     }
 }

@@ -78,7 +78,7 @@ fn every_kind_is_drawn_in_its_size() {
     check(Suite::LargeGains, 0..4);
     check(Suite::NewStrangers, 0..6);
     check(Suite::LaterStrangers, 0..4);
-    check(Suite::NewForms, 0..6);
+    check(Suite::NewForms, 0..5);
 }
 
 /// Stamps of all other cases count from the start of the session.

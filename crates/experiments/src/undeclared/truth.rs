@@ -8,6 +8,7 @@ use super::kind::{Kind, Name};
 use super::mechanism::Mechanism;
 use super::secret::{Form, Secret};
 use super::situation::Situation;
+use super::suite::NewForm;
 use phiw_dynamics::{JointType, Tree, Vec3};
 use serde::Serialize;
 
@@ -104,6 +105,10 @@ fn allowed(case: &Case) -> Vec<Kind> {
     }
     if case.spec.situation == Some(Situation::ShiftingZeros) {
         allowed.push(Kind::TorqueOffset);
+    }
+    // A spring over two joints is one of each of them, and a stiffness that crosses over.
+    if case.spec.new_form() == Some(NewForm::OverTwoJoints) {
+        allowed.extend([Kind::JointSpring, Kind::TorqueOffset]);
     }
     // Bristles are presliding: their torque depends on the way since the last reversal. Where all friction is
     // of long ones that is what is asked: a friction with its way, and nothing beside it.

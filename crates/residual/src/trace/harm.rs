@@ -1,8 +1,10 @@
 //! Which of the chosen effects do harm, and leave the model.
 
 use super::search::Search;
+use super::tracing::Tracing;
 use super::trial::Trial;
 use crate::selection::{Member, Products};
+use phiw_effects::Constants;
 use phiw_identification::fitting::{OwnTorqueFit, TorqueError, torque_error};
 use phiw_identification::{EffectSpec, IdentificationError};
 use rayon::prelude::*;
@@ -123,6 +125,35 @@ impl Search<'_> {
     /// most first. But where an effect makes the errors on training motion that is foretold smaller by more,
     /// motion held out is foretold badly for another reason.
     fn misleading(&self, trial: &Trial) -> Vec<usize> {
+        let mut grown = self.grown_on_motion_held_out(trial);
+        let foretelling = trial.foretelling(&trial.fit);
+        let foretold = foretelling.squares();
+        let trained: f64 = (0..foretold.len()).map(|torque| trial.torque(torque).rows()).sum();
+        grown.retain(|(growth, member, _)| {
+            growth * trained > trial.gain(&foretelling.squares_without(*member), &foretold)
+        });
+        grown.into_iter().map(|(.., place)| place).collect()
+    }
+
+    /// Of the effects that an end has kept that which makes the error on motion held out larger by most, if
+    /// any does: whatever it does on training motion, another may do that better, and this as well.
+    pub(super) fn suspect(&self, end: &Tracing) -> Result<Option<EffectSpec>, IdentificationError> {
+        let trial = self.trial()?;
+        let grown = self.grown_on_motion_held_out(&trial).into_iter();
+        let bare = |(.., place): (f64, Member, usize)| EffectSpec {
+            constants: Constants::new(),
+            ..self.specs[place].clone()
+        };
+        let is_kept = |own: &EffectSpec| {
+            end.specs.iter().any(|kept| kept.kind == own.kind && kept.joints == own.joints)
+        };
+        Ok(grown.map(bare).find(is_kept))
+    }
+
+    /// The effects with which the errors on motion held out are larger on trial, as members and by their
+    /// places, each with the logarithm of what they grow by: in the mean of the torques, or all together. That
+    /// which they grow by most with comes first.
+    fn grown_on_motion_held_out(&self, trial: &Trial) -> Vec<(f64, Member, usize)> {
         let present = trial.held_out_squares(&trial.fit);
         let rows: f64 = trial.held_out.iter().map(Products::rows).sum();
         let together = |squares: &[f64]| self.counted_squares(trial, squares);
@@ -140,13 +171,7 @@ impl Search<'_> {
         let least = 2.0 * self.least_growth();
         let mut grown: Vec<(f64, Member, usize)> = growth.filter(|(growth, ..)| *growth > least).collect();
         grown.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.2.cmp(&b.2)));
-        let foretelling = trial.foretelling(&trial.fit);
-        let foretold = foretelling.squares();
-        let trained: f64 = (0..foretold.len()).map(|torque| trial.torque(torque).rows()).sum();
-        grown.retain(|(growth, member, _)| {
-            growth * trained > trial.gain(&foretelling.squares_without(*member), &foretold)
-        });
-        grown.into_iter().map(|(.., place)| place).collect()
+        grown
     }
 
     /// By how much, as a logarithm, an error on motion held out must grow with an effect that is to leave

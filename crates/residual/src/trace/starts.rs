@@ -20,10 +20,13 @@ impl Search<'_> {
     ///   effects would stand for it.
     /// - Where the end leaves structure, it is searched again from there, with nothing refuted any more: what
     ///   was refuted beside all that was still missing may be right beside what was found since.
-    /// - Where that leaves structure, too, another search from the same start seeks what makes frictions vary
-    ///   at once (`variation.rs`): many effects together had stood for that, and left it no work. Whether
-    ///   there is structure is asked of all logs, which end is the better one of the training logs alone,
-    ///   unless it leaves more of the motion held out.
+    /// - Where that leaves more than noise, and an effect makes the error on motion held out larger, there is a
+    ///   search from the same start without it: what is chosen early may keep out to the end what would do its
+    ///   work better.
+    /// - Where there is structure and that leads nowhere, another search from the same start seeks what makes
+    ///   frictions vary at once (`variation.rs`): many effects together had stood for that, and left it no
+    ///   work. Whether there is structure is asked of all logs, which end is the better one of the training
+    ///   logs alone, unless it leaves more of the motion held out.
     pub(super) fn run(self) -> Result<Tracing, IdentificationError> {
         let start = if self.fixed.prior.is_none() { self.textbook_start()? } else { None };
         let joins = start.is_some() && self.declared > 0;
@@ -43,12 +46,21 @@ impl Search<'_> {
             }
         }
         let mut tracing = best.clone().finish()?;
-        if tracing.remaining.joints.is_empty() {
-            return Ok((best, tracing));
+        if !tracing.remaining.joints.is_empty() {
+            let mut again = Search { refuted: Vec::new(), ..best.clone() }.searched()?;
+            again.forget_what_came_back();
+            (best, tracing) = best.or_better((tracing, again))?;
         }
-        let mut again = Search { refuted: Vec::new(), ..best.clone() }.searched()?;
-        again.forget_what_came_back();
-        (best, tracing) = best.or_better((tracing, again))?;
+        if !tracing.remaining.is_noise()
+            && let Some(suspect) = best.suspect(&tracing)?
+        {
+            let without = Search { refuted: vec![suspect], ..self.clone() }.searched()?;
+            let names = best.names();
+            (best, tracing) = best.or_better_as_ended((tracing, without))?;
+            if best.names() != names {
+                return Ok((best, tracing));
+            }
+        }
         if tracing.remaining.joints.is_empty() || !self.may_vary() {
             return Ok((best, tracing));
         }
@@ -66,13 +78,36 @@ impl Search<'_> {
             return Ok((self, tracing));
         }
         let of_other = other.clone().finish()?;
-        let [own, before] = [&of_other, &tracing].map(|end| self.counted(&end.model.held_out));
-        Ok(if own <= before * self.options.thresholds.same_error {
-            (other, of_other)
-        } else {
-            let end = Search { held_out_had_a_say: true, ..self };
-            (end, Tracing { held_out_had_a_say: true, ..tracing })
-        })
+        Ok(self.or_if_no_worse_held_out(tracing, (other, of_other)))
+    }
+
+    /// The same, where the criterion is smaller of what came of the other end: once what does harm has left
+    /// both.
+    fn or_better_as_ended(
+        self,
+        (tracing, other): (Tracing, Self),
+    ) -> Result<(Self, Tracing), IdentificationError> {
+        let of_other = other.clone().finish()?;
+        let as_ended = |tracing: &Tracing| {
+            let (specs, parameters) = (tracing.specs.clone(), tracing.model.fit.parameters.clone());
+            Search { specs, parameters, ..self.clone() }.value(&self.chosen.rows)
+        };
+        if as_ended(&of_other)? >= as_ended(&tracing)? - LEAST_STEP {
+            return Ok((self, tracing));
+        }
+        let (end, tracing) = self.or_if_no_worse_held_out(tracing, (other, of_other));
+        // What was suspected, was so for motion held out.
+        Ok((Search { held_out_had_a_say: true, ..end }, Tracing { held_out_had_a_say: true, ..tracing }))
+    }
+
+    /// This end and what came of it, or the other, where that leaves no more of the motion held out.
+    fn or_if_no_worse_held_out(self, tracing: Tracing, other: (Self, Tracing)) -> (Self, Tracing) {
+        let [own, before] = [&other.1, &tracing].map(|end| self.counted(&end.model.held_out));
+        if own <= before * self.options.thresholds.same_error {
+            return other;
+        }
+        let end = Search { held_out_had_a_say: true, ..self };
+        (end, Tracing { held_out_had_a_say: true, ..tracing })
     }
 
     /// The start that has what the textbook has of every joint and limits of drives, all of it declared by

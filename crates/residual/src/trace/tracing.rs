@@ -98,6 +98,13 @@ pub struct Remaining {
     pub unidentifiable: Vec<EffectSpec>,
 }
 
+impl Remaining {
+    /// Whether what is left is white noise: no structure, and nothing else that is larger.
+    pub fn is_noise(&self) -> bool {
+        self.joints.is_empty() && self.disturbances.is_empty()
+    }
+}
+
 /// A declared effect that the logs refute: a constant of it is certain to be one that no such effect has.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Withdrawn {
