@@ -33,6 +33,9 @@ impl EffectKind for LoadDependent {
         let few: Vec<Constants> = widths.iter().step_by(2).cloned().collect();
         [widths, values(PART, [VISCOUS]), product(&values(PART, [BOTH]), &few)].concat()
     }
+    fn declared_constants(&self) -> Option<Constants> {
+        Some(Constants::from([(PART.to_owned(), DRY)]))
+    }
     fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
         around(found, WIDTH, step).into_iter().chain(bristles_near(found, step)).collect()
     }

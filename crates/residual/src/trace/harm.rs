@@ -135,19 +135,21 @@ impl Search<'_> {
         grown.into_iter().map(|(.., place)| place).collect()
     }
 
-    /// Of the effects that an end has kept that which makes the error on motion held out larger by most, if
-    /// any does: whatever it does on training motion, another may do that better, and this as well.
-    pub(super) fn suspect(&self, end: &Tracing) -> Result<Option<EffectSpec>, IdentificationError> {
+    /// This end without the effect, of those that what came of it has kept, which makes the error on motion
+    /// held out larger by most, and with nothing else refuted; none where no effect does. Whatever it does on
+    /// training motion, others may do that better, and this as well.
+    pub(super) fn without_suspect(&self, end: &Tracing) -> Result<Option<Self>, IdentificationError> {
         let trial = self.trial()?;
-        let grown = self.grown_on_motion_held_out(&trial).into_iter();
-        let bare = |(.., place): (f64, Member, usize)| EffectSpec {
-            constants: Constants::new(),
-            ..self.specs[place].clone()
-        };
         let is_kept = |own: &EffectSpec| {
             end.specs.iter().any(|kept| kept.kind == own.kind && kept.joints == own.joints)
         };
-        Ok(grown.map(bare).find(is_kept))
+        let grown = self.grown_on_motion_held_out(&trial).into_iter();
+        let mut kept = grown.map(|(.., place)| place).filter(|&place| is_kept(&self.specs[place]));
+        let Some(place) = kept.next() else { return Ok(None) };
+        let mut without = self.clone();
+        without.remove(place)?;
+        without.refuted = vec![EffectSpec { constants: Constants::new(), ..self.specs[place].clone() }];
+        Ok(Some(without))
     }
 
     /// The effects with which the errors on motion held out are larger on trial, as members and by their

@@ -18,15 +18,15 @@ impl Search<'_> {
     /// - Where the torques agree better once one of them is a multiple of what is logged, and still do in the
     ///   end, another start has that in force, too: to first order a factor of two is no factor, and other
     ///   effects would stand for it.
-    /// - Where the end leaves structure, it is searched again from there, with nothing refuted any more: what
-    ///   was refuted beside all that was still missing may be right beside what was found since.
-    /// - Where that leaves more than noise, and an effect makes the error on motion held out larger, there is a
-    ///   search from the same start without it: what is chosen early may keep out to the end what would do its
-    ///   work better.
-    /// - Where there is structure and that leads nowhere, another search from the same start seeks what makes
-    ///   frictions vary at once (`variation.rs`): many effects together had stood for that, and left it no
-    ///   work. Whether there is structure is asked of all logs, which end is the better one of the training
-    ///   logs alone, unless it leaves more of the motion held out.
+    /// - Where the end leaves more than noise, and an effect makes the error on motion held out larger, it is
+    ///   searched again from there without that: what is chosen early may keep out to the end what would do
+    ///   its work better.
+    /// - Where it leaves structure, and that led nowhere, it is searched again from there with nothing refuted
+    ///   any more: what was refuted beside all that was still missing may be right beside what was found since.
+    /// - Where there is still structure, another search from the same start seeks what makes frictions vary at
+    ///   once (`variation.rs`): many effects together had stood for that, and left it no work. Whether there is
+    ///   structure is asked of all logs, which end is the better one of the training logs alone, unless it
+    ///   leaves more of the motion held out.
     pub(super) fn run(self) -> Result<Tracing, IdentificationError> {
         let start = if self.fixed.prior.is_none() { self.textbook_start()? } else { None };
         let joins = start.is_some() && self.declared > 0;
@@ -46,20 +46,21 @@ impl Search<'_> {
             }
         }
         let mut tracing = best.clone().finish()?;
-        if !tracing.remaining.joints.is_empty() {
+        let mut is_another = false;
+        if !tracing.remaining.is_noise()
+            && let Some(without) = best.without_suspect(&tracing)?
+        {
+            let names = best.names();
+            (best, tracing) = best.or_better_as_ended((tracing, without.searched()?))?;
+            is_another = best.names() != names;
+        }
+        if tracing.remaining.joints.is_empty() {
+            return Ok((best, tracing));
+        }
+        if !is_another {
             let mut again = Search { refuted: Vec::new(), ..best.clone() }.searched()?;
             again.forget_what_came_back();
             (best, tracing) = best.or_better((tracing, again))?;
-        }
-        if !tracing.remaining.is_noise()
-            && let Some(suspect) = best.suspect(&tracing)?
-        {
-            let without = Search { refuted: vec![suspect], ..self.clone() }.searched()?;
-            let names = best.names();
-            (best, tracing) = best.or_better_as_ended((tracing, without))?;
-            if best.names() != names {
-                return Ok((best, tracing));
-            }
         }
         if tracing.remaining.joints.is_empty() || !self.may_vary() {
             return Ok((best, tracing));
