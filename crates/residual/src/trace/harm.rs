@@ -153,8 +153,8 @@ impl Search<'_> {
     }
 
     /// The effects with which the errors on motion held out are larger on trial, as members and by their
-    /// places, each with the logarithm of what they grow by: in the mean of the torques, or all together. That
-    /// which they grow by most with comes first.
+    /// places, each with the logarithm of what they grow by: in the mean of the torques, or all together.
+    /// That which they grow by most with comes first.
     fn grown_on_motion_held_out(&self, trial: &Trial) -> Vec<(f64, Member, usize)> {
         let present = trial.held_out_squares(&trial.fit);
         let rows: f64 = trial.held_out.iter().map(Products::rows).sum();

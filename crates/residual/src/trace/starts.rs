@@ -21,12 +21,13 @@ impl Search<'_> {
     /// - Where the end leaves more than noise, and an effect makes the error on motion held out larger, it is
     ///   searched again from there without that: what is chosen early may keep out to the end what would do
     ///   its work better.
-    /// - Where it leaves structure, and that led nowhere, it is searched again from there with nothing refuted
-    ///   any more: what was refuted beside all that was still missing may be right beside what was found since.
-    /// - Where there is still structure, another search from the same start seeks what makes frictions vary at
-    ///   once (`variation.rs`): many effects together had stood for that, and left it no work. Whether there is
-    ///   structure is asked of all logs, which end is the better one of the training logs alone, unless it
-    ///   leaves more of the motion held out.
+    /// - Where it leaves structure, and that led nowhere, it is searched again from there with nothing
+    ///   refuted any more: what was refuted beside all that was still missing may be right beside what was
+    ///   found since.
+    /// - Where there is still structure, another search from the same start seeks what makes frictions vary
+    ///   at once (`variation.rs`): many effects together had stood for that, and left it no work. Whether
+    ///   there is structure is asked of all logs, which end is the better one of the training logs alone,
+    ///   unless it leaves more of the motion held out.
     pub(super) fn run(self) -> Result<Tracing, IdentificationError> {
         let start = if self.fixed.prior.is_none() { self.textbook_start()? } else { None };
         let joins = start.is_some() && self.declared > 0;
