@@ -302,7 +302,7 @@ mod tests {
         });
     }
 
-    /// A filter of all torques stood for how their frictions turn, in ten of 29 logs: beside it the width of
+    /// A filter of all torques stood for how their frictions turn, in 12 of 28 logs: beside it the width of
     /// each was never looked for, and without it and without that the criterion was larger.
     #[test]
     fn a_filter_of_all_torques_does_not_stand_for_how_frictions_turn() {
