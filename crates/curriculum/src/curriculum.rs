@@ -270,7 +270,7 @@ impl<'a> Curriculum<'a> {
     fn misfit(&self, learning: &Learning) -> Result<Vec<TorqueMisfit>, CurriculumError> {
         let design = self.robot.design_of(&learning.model)?;
         let Learning { evidence, estimate, .. } = learning;
-        Ok(self.estimator.misfit(&design, evidence, &estimate.parameters)?.unwrap_or_default())
+        Ok(self.estimator.misfit(&design, evidence, estimate)?.unwrap_or_default())
     }
 
     /// The same with other `effects` beside the declared ones, fitted to all logs again from a model on.

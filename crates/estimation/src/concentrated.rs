@@ -9,6 +9,7 @@ use super::own_friction::OwnFriction;
 use super::profile::{Curvature, Minimum, Profile};
 use super::sensitivity::Sensitivity;
 use super::smoothing::{Belief, Smoothed};
+use super::smoothing_path::{self, Believing, Path};
 use super::turning::Believed;
 use super::{Estimate, Estimator, Evidence};
 use crate::{EstimationError, MotionLog, RobotModel};
@@ -70,6 +71,12 @@ impl TorqueNoise {
         let Colour { correlation, felt } = *colour;
         TorqueNoise { std: std / (1.0 - correlation * correlation).sqrt(), correlation, felt }
     }
+
+    /// How it is counted, and the standard deviation of what is news in it.
+    fn news(&self) -> (Colour, f64) {
+        let TorqueNoise { std, correlation, felt } = *self;
+        (Colour { correlation, felt }, std * (1.0 - correlation * correlation).sqrt())
+    }
 }
 
 impl ConcentratedLikelihood {
@@ -93,9 +100,22 @@ impl ConcentratedLikelihood {
         evidence: &Evidence,
         parameters: &[f64],
     ) -> Result<Vec<TorqueNoise>, EstimationError> {
-        self.looked_at(design, evidence, parameters, |_, colours, std| {
-            Ok(colours.iter().zip(std).map(TorqueNoise::of_news).collect())
-        })
+        let under = evidence.under(design, parameters, &self.standing_on)?;
+        let evidence = under.as_ref().unwrap_or(evidence);
+        let noise_of = |own: &Parts<'_>| -> Result<_, EstimationError> {
+            let colours = own.colours(self, parameters);
+            let profile = own.profile(self, &colours)?;
+            let (std, rows) = (profile.noise(&column(parameters)), profile.rows);
+            Ok((Believing { x: Mat::zeros(0, 1), colours, std }, rows))
+        };
+        let (start, _) = noise_of(&self.parts(design, evidence)?)?;
+        let no_parameters = Mat::zeros(0, 0);
+        let next = |own: &Parts<'_>, _: Believing| {
+            let (believing, rows) = noise_of(own)?;
+            Ok((believing, Some(smoothing_path::scales(&no_parameters, &rows))))
+        };
+        let settled = self.settled((design, evidence), start, |_| parameters.to_vec(), next, |_| true)?;
+        Ok(settled.colours.iter().zip(&settled.std).map(TorqueNoise::of_news).collect())
     }
 
     /// The least standard deviation of each parameter at the truth that any estimate without a prior can
@@ -112,10 +132,7 @@ impl ConcentratedLikelihood {
         noise: &[TorqueNoise],
     ) -> Result<Vec<f64>, EstimationError> {
         let parts = self.parts(design, evidence)?;
-        let colour = |noise: &TorqueNoise| Colour { correlation: noise.correlation, felt: noise.felt };
-        let colours: Vec<Colour> = noise.iter().map(colour).collect();
-        let news = |noise: &TorqueNoise| noise.std * (1.0 - noise.correlation * noise.correlation).sqrt();
-        let std: Vec<f64> = noise.iter().map(news).collect();
+        let (colours, std): (Vec<Colour>, Vec<f64>) = noise.iter().map(TorqueNoise::news).unzip();
         let information = parts.profile(self, &colours)?.information(&column(truth), &std);
         let unknown = vec![f64::NAN; truth.len()];
         let Ok(factor) = information.llt(Side::Lower) else { return Ok(unknown) };
@@ -182,7 +199,7 @@ impl ConcentratedLikelihood {
                 None => spread = Some(Spread { factors, noise }),
                 Some(known) => {
                     for (known, own) in known.factors.iter_mut().zip(&factors) {
-                        known.merge(own)?;
+                        *known = known.merge(own)?;
                     }
                     known.noise.iter_mut().flatten().zip(noise.iter().flatten()).for_each(|(a, b)| *a += b);
                 }
@@ -191,29 +208,39 @@ impl ConcentratedLikelihood {
         Ok(spread.map(|spread| (again, spread)))
     }
 
-    /// What the tests of an estimate look at: the evidence, or where it is of encoders alone, a motion that
-    /// their readings leave possible; and the noise under parameters `w`.
-    fn looked_at<T>(
+    /// Finds the motion of encoders anew under what is believed, and what is believed under that, until it
+    /// stays; what is believed at the `start` where the evidence is not of encoders alone.
+    ///
+    /// `w` are the parameters of the design at a place of the path. `next` says what is believed under a
+    /// motion, and the standard deviations of its place; without these the path ends. A place has to be
+    /// possible.
+    fn settled(
         &self,
-        design: &Design,
-        evidence: &Evidence,
-        w: &[f64],
-        look: impl Fn(&Parts<'_>, &[Colour], &[f64]) -> Result<T, EstimationError>,
-    ) -> Result<T, EstimationError> {
-        let mut own = evidence.under(design, w, &self.standing_on)?;
-        for _ in 0..DRAWS {
-            let parts = self.parts(design, own.as_ref().unwrap_or(evidence))?;
-            let colours = parts.colours(self, w);
-            let std = parts.profile(self, &colours)?.noise(&column(w));
-            let from = own.as_ref().unwrap_or(evidence);
-            let drawn = self.smoothed(design, from, (w, &colours, &std), Which::Drawn)?;
-            let Some((drawn, _)) = drawn else { break };
-            own = Some(drawn);
+        (design, evidence): (&Design, &Evidence),
+        start: Believing,
+        w: impl Fn(&Mat<f64>) -> Vec<f64>,
+        mut next: impl FnMut(&Parts<'_>, Believing) -> Result<(Believing, Option<Vec<f64>>), EstimationError>,
+        is_possible: impl Fn(&Believing) -> bool,
+    ) -> Result<Believing, EstimationError> {
+        let mut path = Path::from(&start);
+        let mut believing = start;
+        let mut last: Option<Evidence> = None;
+        for _ in 0..self.settings.smoothings {
+            let parameters = w(&believing.x);
+            let under = (parameters.as_slice(), believing.colours.as_slice(), believing.std.as_slice());
+            let from = last.as_ref().unwrap_or(evidence);
+            let Some((again, spread)) = self.smoothed(design, from, under, Which::MostLikely)? else { break };
+            let own = Parts { spread: Some(spread), ..self.parts(design, &again)? };
+            let (reached, scales) = next(&own, believing)?;
+            let Some(scales) = scales else { return Ok(reached) };
+            let (further, moved) = path.on(reached.clone(), &scales, &is_possible);
+            if moved < self.settings.smoothing_settled {
+                return Ok(reached);
+            }
+            believing = further;
+            last = Some(again);
         }
-        let parts = self.parts(design, own.as_ref().unwrap_or(evidence))?;
-        let colours = parts.colours(self, w);
-        let std = parts.profile(self, &colours)?.noise(&column(w));
-        look(&parts, &colours, &std)
+        Ok(believing)
     }
 }
 
@@ -224,8 +251,8 @@ enum Which {
     Drawn,
 }
 
-/// Times that a motion is drawn anew under the noise of the last, before it is looked at.
-const DRAWS: usize = 3;
+/// Times that a motion is found anew under a belief, before it is looked at.
+const LOOKED_AT: usize = 3;
 
 /// What the spread of motions that encoders leave possible adds to the squares of each torque.
 struct Spread {
@@ -283,32 +310,6 @@ impl Parts<'_> {
     }
 }
 
-/// Where a path of steps that shrink slowly leads, from three points of it (SQUAREM: Varadhan & Roland 2008),
-/// distances counted in standard deviations; the last point where bodies would not be possible there.
-fn extrapolated(
-    [first, second, third]: [&Mat<f64>; 3],
-    covariance: &Mat<f64>,
-    prior: &BodyPrior,
-) -> Mat<f64> {
-    let (step, bend) = (second - first, third - second - (second - first));
-    let length = |along: &Mat<f64>| {
-        let square = |k: usize| along[(k, 0)].powi(2) / covariance[(k, k)].max(f64::MIN_POSITIVE);
-        (0..along.nrows()).map(square).sum::<f64>().sqrt()
-    };
-    let mut share = (length(&step) / length(&bend)).clamp(1.0, LONGEST_SHARE);
-    while share > 1.0 {
-        let trial = first + &step * faer::Scale(2.0 * share) + &bend * faer::Scale(share * share);
-        if prior.divergence(&trial).is_finite() {
-            return trial;
-        }
-        share = if share > 1.1 { 0.5 * (share + 1.0) } else { 1.0 };
-    }
-    third.clone()
-}
-
-/// Longest extrapolation, in steps.
-const LONGEST_SHARE: f64 = 4.0;
-
 /// Gives all torques the median correlation.
 fn in_common(colours: &mut [Colour]) {
     let mut all: Vec<f64> = colours.iter().map(|colour| colour.correlation).collect();
@@ -347,11 +348,24 @@ impl Estimator for ConcentratedLikelihood {
         &self,
         design: &Design,
         evidence: &Evidence,
-        parameters: &[f64],
+        estimate: &Estimate,
     ) -> Result<Option<Vec<TorqueMisfit>>, EstimationError> {
-        self.looked_at(design, evidence, parameters, |parts, colours, _| {
-            misfits(parts.in_order, parameters, colours).map(Some)
-        })
+        let w = estimate.parameters.as_slice();
+        let noise = match &estimate.noise {
+            Some(noise) => noise.clone(),
+            None => self.noise(design, evidence, w)?,
+        };
+        let (colours, std): (Vec<Colour>, Vec<f64>) = noise.iter().map(TorqueNoise::news).unzip();
+        let mut own = evidence.under(design, w, &self.standing_on)?;
+        // Of encoders a motion that their readings leave possible: the most likely one has too little noise.
+        for time in 1..=LOOKED_AT {
+            let which = if time < LOOKED_AT { Which::MostLikely } else { Which::Drawn };
+            let from = own.as_ref().unwrap_or(evidence);
+            let Some((again, _)) = self.smoothed(design, from, (w, &colours, &std), which)? else { break };
+            own = Some(again);
+        }
+        let parts = self.parts(design, own.as_ref().unwrap_or(evidence))?;
+        misfits(parts.in_order, w, &parts.colours(self, w)).map(Some)
     }
 
     /// At the colours that the parameters themselves leave, so that models are compared each at its best.
@@ -391,7 +405,6 @@ impl ConcentratedLikelihood {
         let mut x = parts.prior.start(&present.standard, &present_parameters[rigid..]);
         let mut colours = vec![Colour { correlation: 0.0, felt: 0.0 }; design.rows().len()];
         let (mut covariance, mut curvature) = (None, Curvature::unknown());
-        let mut std_of_noise = Vec::new();
         let settings = &self.settings;
         let common = settings.tempered_rounds + settings.rounds_in_common;
         let rounds = common + settings.rounds.max(1);
@@ -423,35 +436,24 @@ impl ConcentratedLikelihood {
             }
             colours = next;
         }
-        let mut last: Option<Evidence> = None;
-        let mut path = vec![x.clone()];
-        for _ in 0..settings.smoothings {
-            let w = &parts.map * &x;
-            let w = w.col_as_slice(0);
-            let std = match &last {
-                None => parts.profile(self, &colours)?.noise(&column(w)),
-                Some(_) => std_of_noise.clone(),
-            };
-            let present = last.as_ref().unwrap_or(evidence);
-            let smoothed = self.smoothed(design, present, (w, &colours, &std), Which::MostLikely)?;
-            let Some((again, spread)) = smoothed else { break };
-            let own = Parts { spread: Some(spread), ..self.parts(design, &again)? };
-            let found = own.profile(self, &colours)?.minimum(x, settings.newton.most_steps, &mut curvature);
-            (x, covariance) = (found.x, found.covariance);
-            path.push(x.clone());
-            if let ([first, second, third], Some(covariance)) = (path.as_slice(), &covariance) {
-                x = extrapolated([first, second, third], covariance, &own.prior);
-                path = vec![x.clone()];
-            }
-            let w = &own.map * &x;
-            colours = own.colours(self, w.col_as_slice(0));
-            std_of_noise = own.profile(self, &colours)?.noise(&w);
-            last = Some(again);
-        }
         let w = &parts.map * &x;
-        if last.is_none() {
-            std_of_noise = parts.profile(self, &colours)?.noise(&w);
-        }
+        let std = parts.profile(self, &colours)?.noise(&w);
+        let start = Believing { x, colours, std };
+        let next = |own: &Parts<'_>, believing: Believing| {
+            let profile = own.profile(self, &believing.colours)?;
+            let found = profile.minimum(believing.x, settings.newton.most_steps, &mut curvature);
+            covariance = found.covariance;
+            let w = &own.map * &found.x;
+            let colours = own.colours(self, w.col_as_slice(0));
+            let std = own.profile(self, &colours)?.noise(&w);
+            let scales = covariance.as_ref().map(|own| smoothing_path::scales(own, &profile.rows));
+            Ok((Believing { x: found.x, colours, std }, scales))
+        };
+        let w_of = |x: &Mat<f64>| (&parts.map * x).col_as_slice(0).to_vec();
+        let is_possible = |own: &Believing| parts.prior.divergence(&own.x).is_finite();
+        let believing = self.settled((design, evidence), start, w_of, next, is_possible)?;
+        let Believing { x, colours, std: std_of_noise } = believing;
+        let w = &parts.map * &x;
         let covariance = covariance.map(|own: Mat<f64>| &parts.map * own * parts.map.transpose());
         let deviation = |k: usize| covariance.as_ref().map_or(f64::NAN, |own| own[(k, k)].max(0.0).sqrt());
         Ok(Estimate {

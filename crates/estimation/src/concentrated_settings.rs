@@ -33,9 +33,12 @@ pub struct ConcentratedSettings {
     /// delivers its command better than to some thousandths, and without a floor a log without noise would
     /// leave no digits for the bodies.
     pub least_noise: f64,
-    /// Times that the motion of encoders is found anew under the estimate, and the estimate after it
-    /// (`smoothing.rs`); after two of them the estimate is carried on along their path. Default: 5.
+    /// Times at most that the motion of encoders is found anew under the estimate, and the estimate after it
+    /// (`smoothing.rs`, `smoothing_path.rs`). Default: 60.
     pub smoothings: usize,
+    /// RMS change of the parameters and of the noise, in their standard deviations, from which on another time is worth it.
+    /// Default: 0.02; no command calibrates it.
+    pub smoothing_settled: f64,
     /// What is left of how an acceleration decays within a period, as a torque over the noise's: the belief's
     /// friction and inertia are not exact. Default: 0.1.
     pub decay_error: f64,
@@ -60,7 +63,8 @@ impl Default for ConcentratedSettings {
             settled: 0.005,
             largest_correlation: 0.98,
             least_noise: 3e-3,
-            smoothings: 5,
+            smoothings: 60,
+            smoothing_settled: 0.02,
             decay_error: 0.1,
             reading_error: 1.0,
             smoothing_instant_s: 0.1,

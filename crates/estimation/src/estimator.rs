@@ -48,8 +48,8 @@ pub trait Estimator: Send + Sync {
         None
     }
 
-    /// Whether the estimator's story of the noise holds at `parameters`, torque by torque; none from an
-    /// estimator that has no test.
+    /// Whether the estimator's story of the noise holds at an estimate of these logs, torque by torque; none
+    /// from an estimator that has no test.
     ///
     /// # Errors
     /// The evidence is not of this design.
@@ -57,7 +57,7 @@ pub trait Estimator: Send + Sync {
         &self,
         _design: &Design,
         _evidence: &Evidence,
-        _parameters: &[f64],
+        _estimate: &Estimate,
     ) -> Result<Option<Vec<TorqueMisfit>>, EstimationError> {
         Ok(None)
     }

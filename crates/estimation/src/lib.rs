@@ -31,6 +31,7 @@ mod score;
 mod sensitivity;
 mod settings;
 mod smoothing;
+mod smoothing_path;
 mod stored;
 mod torques;
 mod turning;

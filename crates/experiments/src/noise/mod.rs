@@ -56,7 +56,7 @@ pub struct Arguments {
     /// Weight of the prior of the estimator that finds the noise out.
     #[arg(long)]
     prior_weight: Option<f64>,
-    /// Times that its encoders' motion is found anew under the estimate.
+    /// Times at most that its encoders' motion is found anew under the estimate.
     #[arg(long)]
     smoothings: Option<usize>,
     /// What is left of how accelerations decay within a period, over the noise.

@@ -68,7 +68,7 @@ impl ControlledLogs {
                 evidence.add(&design, &asked_of(motion, robot, &model)?)?;
             }
             let estimate = estimator.estimate(&design, &evidence, &model, &parameters)?;
-            let misfit = estimator.misfit(&design, &evidence, &estimate.parameters)?;
+            let misfit = estimator.misfit(&design, &evidence, &estimate)?;
             model = model.with_parameters(robot, &model.specs(), &estimate.parameters)?;
             after_each.push(evidence.clone());
             last = Some((estimate, misfit));

@@ -10,6 +10,7 @@ use phiw_dynamics::check::{check_index, check_size};
 /// The first non-zero entry of each row is positive, so that equal rows give equal factors in whatever order
 /// they came.
 #[derive(Clone, Debug, PartialEq)]
+#[must_use = "merging makes a new factor, and leaves both as they are"]
 pub struct Factor {
     columns: usize,
     rows: u64,

@@ -20,6 +20,7 @@ pub struct Group {
 
 /// The factors of all torques.
 #[derive(Clone, Debug)]
+#[must_use = "merging makes a new factor, and leaves both as they are"]
 pub struct GroupedFactor {
     parameter_count: usize,
     groups: Vec<Group>,
