@@ -8,6 +8,7 @@ use crate::kind::{
 };
 use crate::mechanism::ServoFriction;
 use crate::sign::{LEAD, POWER, Sign, WIDTH, few_sign_widths, sign_widths, signs_near};
+use crate::viscous_and_dry::{BOTH, DRY, PART, VISCOUS as VISCOUS_PART, of_part};
 use phiw_codegen::{Expression, Function, JointTorque};
 use phiw_dynamics::Tree;
 use phiw_identification::Effect;
@@ -107,12 +108,12 @@ impl EffectKind for Asymmetric {
     }
     fn scan(&self, site: &[usize], ranges: &SignalRanges) -> Vec<Constants> {
         let widths = few_sign_widths(site[0], ranges);
-        let mut variants = values("part", [0.0]);
-        variants.extend(product(&values("part", [1.0, 2.0]), &widths));
+        let mut variants = values(PART, [VISCOUS_PART]);
+        variants.extend(product(&values(PART, [DRY, BOTH]), &widths));
         variants
     }
     fn declared_constants(&self) -> Option<Constants> {
-        Some(Constants::from([("part".to_owned(), 2.0)]))
+        Some(Constants::from([(PART.to_owned(), BOTH)]))
     }
     fn refine(&self, &Refinement { found, step, .. }: &Refinement<'_>) -> Vec<Constants> {
         around(found, WIDTH, step)
@@ -140,24 +141,19 @@ impl EffectKind for Asymmetric {
         let (joint, sign) = (site[0], Sign::of(constants));
         let viscous = ("fv_difference", ParameterKind::PerVelocity, f64::NEG_INFINITY);
         let coulomb = ("fc_difference", ParameterKind::Torque, f64::NEG_INFINITY);
-        let part = constant(constants, "part", 2.0);
-        let viscous_column = move |sample: &Sample<'_>| sample.qd()[joint].abs();
-        let coulomb_column = move |sample: &Sample<'_>| sign.of_joint(sample, joint).abs();
-        let kind = self.name();
-        if part == 0.0 {
-            let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = viscous_column(sample);
-            Box::new(OwnTorque::new(kind, tree, joint, constants, &[viscous], columns))
-        } else if part == 1.0 {
-            let columns = move |sample: &Sample<'_>, out: &mut [f64]| out[0] = coulomb_column(sample);
-            let effect = OwnTorque::new(kind, tree, joint, constants, &[coulomb], columns);
-            Box::new(effect.turning_with_velocity(sign.lead == 0.0))
-        } else {
-            let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
-                out[0] = viscous_column(sample);
-                out[1] = coulomb_column(sample);
-            };
-            Box::new(OwnTorque::new(kind, tree, joint, constants, &[viscous, coulomb], columns))
-        }
+        let part = constant(constants, PART, BOTH);
+        let columns = move |sample: &Sample<'_>, out: &mut [f64]| {
+            if part != DRY {
+                out[0] = sample.qd()[joint].abs();
+            }
+            if part != VISCOUS_PART {
+                out[out.len() - 1] = sign.of_joint(sample, joint).abs();
+            }
+        };
+        let parameters = [viscous, coulomb];
+        let parameters = of_part(part, &parameters);
+        let effect = OwnTorque::new(self.name(), tree, joint, constants, parameters, columns);
+        Box::new(effect.turning_with_velocity(part == DRY && sign.lead == 0.0))
     }
 }
 

@@ -71,6 +71,16 @@ impl Banded {
 }
 
 impl BandedFactor {
+    /// x → L⁻¹x.
+    pub fn solve_lower(&self, x: &mut [f64]) {
+        for row in 0..x.len() {
+            let reach = row.min(self.width - 1);
+            let end = (row + 1) * self.width - 1;
+            let shares = &self.lower[end - reach..end];
+            x[row] = (x[row] - dot(shares, &x[row - reach..row])) / self.lower[end];
+        }
+    }
+
     /// x → L⁻ᵀx. Of white noise it makes one with the inverse of the matrix as its covariance.
     pub fn solve_upper(&self, x: &mut [f64]) {
         for row in (0..x.len()).rev() {
@@ -124,9 +134,14 @@ mod tests {
             .collect();
         let inverse = matrix.llt(Side::Lower)?.solve(Mat::<f64>::identity(size, size));
         for a in 0..size {
+            let mut unit = vec![0.0; size];
+            unit[a] = 1.0;
+            factor.solve_lower(&mut unit);
+            factor.solve_upper(&mut unit);
             for b in 0..size {
                 let own: f64 = columns.iter().map(|column| column[a] * column[b]).sum();
                 assert!((own - inverse[(a, b)]).abs() < 1e-9, "{a}, {b}");
+                assert!((unit[b] - inverse[(a, b)]).abs() < 1e-9, "{a}, {b}");
             }
         }
         Ok(())

@@ -5,6 +5,7 @@ use super::concentrated_settings::ConcentratedSettings;
 use super::in_order::{Colour, InOrder};
 use super::likelihood::column;
 use super::misfit::{TorqueMisfit, misfits};
+use super::missing_information;
 use super::own_friction::OwnFriction;
 use super::profile::{Curvature, Minimum, Profile};
 use super::sensitivity::Sensitivity;
@@ -114,7 +115,8 @@ impl ConcentratedLikelihood {
             let (believing, rows) = noise_of(own)?;
             Ok((believing, Some(smoothing_path::scales(&no_parameters, &rows))))
         };
-        let settled = self.settled((design, evidence), start, |_| parameters.to_vec(), next, |_| true)?;
+        let (settled, _) =
+            self.settled((design, evidence), start, |_| parameters.to_vec(), next, |_| true)?;
         Ok(settled.colours.iter().zip(&settled.std).map(TorqueNoise::of_news).collect())
     }
 
@@ -162,6 +164,39 @@ impl ConcentratedLikelihood {
         Ok(Parts { in_order, prior, map, sensitivities, least_variance, spread: None })
     }
 
+    fn belief<'a>(
+        &self,
+        design: &'a Design,
+        evidence: &'a Evidence,
+        (w, colours, std): (&'a [f64], &'a [Colour], &'a [f64]),
+    ) -> Belief<'a> {
+        Belief {
+            design,
+            foreseen: &evidence.foreseen,
+            w,
+            colours,
+            std,
+            instant_every_s: self.settings.smoothing_instant_s,
+            decay_error: self.settings.decay_error,
+            reading_error: self.settings.reading_error,
+        }
+    }
+
+    /// The information of the design's parameters that logs of encoders lack, since their motion is not
+    /// known.
+    fn missing_information(
+        &self,
+        design: &Design,
+        evidence: &Evidence,
+        under: (&[f64], &[Colour], &[f64]),
+    ) -> Result<Mat<f64>, EstimationError> {
+        let belief = self.belief(design, evidence, under);
+        let all: Result<Vec<_>, EstimationError> =
+            evidence.encoder_logs.par_iter().map(|log| belief.missing_information(log)).collect();
+        let none = Mat::zeros(design.parameter_count(), design.parameter_count());
+        Ok(all?.into_iter().flatten().fold(none, |sum, own| sum + own))
+    }
+
     /// What evidence of encoders is of once their motion is as it most likely was under parameters `w`, or as
     /// it may have been; none where it is not of encoders alone.
     fn smoothed(
@@ -174,16 +209,7 @@ impl ConcentratedLikelihood {
         if evidence.encoder_logs.is_empty() || !self.standing_on.is_empty() {
             return Ok(None);
         }
-        let belief = Belief {
-            design,
-            foreseen: &evidence.foreseen,
-            w,
-            colours,
-            std,
-            instant_every_s: self.settings.smoothing_instant_s,
-            decay_error: self.settings.decay_error,
-            reading_error: self.settings.reading_error,
-        };
+        let belief = self.belief(design, evidence, (w, colours, std));
         let smooth = |(index, log): (usize, &MotionLog)| belief.smoothed(log, index as u64);
         let smoothed: Result<Vec<_>, EstimationError> =
             evidence.encoder_logs.par_iter().enumerate().map(smooth).collect();
@@ -209,7 +235,8 @@ impl ConcentratedLikelihood {
     }
 
     /// Finds the motion of encoders anew under what is believed, and what is believed under that, until it
-    /// stays; what is believed at the `start` where the evidence is not of encoders alone.
+    /// stays, and the evidence of that motion; what is believed at the `start`, and none, where the evidence
+    /// is not of encoders alone.
     ///
     /// `w` are the parameters of the design at a place of the path. `next` says what is believed under a
     /// motion, and the standard deviations of its place; without these the path ends. A place has to be
@@ -221,7 +248,7 @@ impl ConcentratedLikelihood {
         w: impl Fn(&Mat<f64>) -> Vec<f64>,
         mut next: impl FnMut(&Parts<'_>, Believing) -> Result<(Believing, Option<Vec<f64>>), EstimationError>,
         is_possible: impl Fn(&Believing) -> bool,
-    ) -> Result<Believing, EstimationError> {
+    ) -> Result<(Believing, Option<Evidence>), EstimationError> {
         let mut path = Path::from(&start);
         let mut believing = start;
         let mut last: Option<Evidence> = None;
@@ -232,15 +259,15 @@ impl ConcentratedLikelihood {
             let Some((again, spread)) = self.smoothed(design, from, under, Which::MostLikely)? else { break };
             let own = Parts { spread: Some(spread), ..self.parts(design, &again)? };
             let (reached, scales) = next(&own, believing)?;
-            let Some(scales) = scales else { return Ok(reached) };
+            let Some(scales) = scales else { return Ok((reached, Some(again))) };
             let (further, moved) = path.on(reached.clone(), &scales, &is_possible);
             if moved < self.settings.smoothing_settled {
-                return Ok(reached);
+                return Ok((reached, Some(again)));
             }
             believing = further;
             last = Some(again);
         }
-        Ok(believing)
+        Ok((believing, last))
     }
 }
 
@@ -451,7 +478,14 @@ impl ConcentratedLikelihood {
         };
         let w_of = |x: &Mat<f64>| (&parts.map * x).col_as_slice(0).to_vec();
         let is_possible = |own: &Believing| parts.prior.divergence(&own.x).is_finite();
-        let believing = self.settled((design, evidence), start, w_of, next, is_possible)?;
+        let (believing, motion) = self.settled((design, evidence), start, w_of, next, is_possible)?;
+        if let (Some(own), Some(motion)) = (&covariance, &motion) {
+            let w = w_of(&believing.x);
+            let under = (w.as_slice(), believing.colours.as_slice(), believing.std.as_slice());
+            let missing = self.missing_information(design, motion, under)?;
+            covariance =
+                Some(missing_information::without(own, &(parts.map.transpose() * missing * &parts.map)));
+        }
         let Believing { x, colours, std: std_of_noise } = believing;
         let w = &parts.map * &x;
         let covariance = covariance.map(|own: Mat<f64>| &parts.map * own * parts.map.transpose());

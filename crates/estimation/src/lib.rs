@@ -20,6 +20,7 @@ mod least_squares;
 mod likelihood;
 mod logged;
 mod misfit;
+mod missing_information;
 mod motion_log;
 mod own_friction;
 mod prior;

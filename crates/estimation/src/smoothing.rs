@@ -16,7 +16,7 @@ use super::banded::Banded;
 use super::evidence::instants;
 use super::foresight;
 use super::in_order::Colour;
-use super::readings::CUBIC;
+use super::readings::{CUBIC, Readings};
 use super::sensitivity::{Sensitivity, element};
 use super::turning::{Believed, Turned};
 use crate::{EstimationError, MotionLog};
@@ -69,12 +69,31 @@ fn moved_by(motion: &MotionLog, away: &[f64]) -> MotionLog {
     log
 }
 
+/// Shares of the unknowns of three knots, each an angle and a speed times the period of every joint, in what
+/// is new in the noise of a torque: the period's own two come last. `row` is that of the torque in the mass
+/// and damping matrices, and the period \[s\]; inertias change little from one period to the next.
+pub(super) fn noise_shares(row: (&[f64], &[f64], f64), correlation: f64, shares: &mut [f64]) {
+    let (inertia, damping, t) = row;
+    let n = inertia.len();
+    shares.fill(0.0);
+    for joint in 0..n {
+        let (by_speed, by_way) = (inertia[joint] / (t * t), damping[joint] / (t * t));
+        let at = 2 * joint;
+        for (first, share) in [(2 * n, 1.0), (0, -correlation)] {
+            shares[first + at] -= share * by_way;
+            shares[first + 2 * n + at] += share * by_way;
+            shares[first + at + 1] -= share * by_speed;
+            shares[first + 2 * n + at + 1] += share * by_speed;
+        }
+    }
+}
+
 /// Mass and damping matrices that stand for a stretch of periods.
-struct Stretch {
-    periods: std::ops::Range<usize>,
+pub(super) struct Stretch {
+    pub periods: std::ops::Range<usize>,
     sensitivity: Sensitivity,
-    inertia: Vec<f64>,
-    damping: Vec<f64>,
+    pub inertia: Vec<f64>,
+    pub damping: Vec<f64>,
 }
 
 impl Belief<'_> {
@@ -94,6 +113,34 @@ impl Belief<'_> {
         }
         let stretches = self.stretches(measured)?;
         let asked = self.asked(measured)?;
+        let (t, n) = (measured.period_s, joints);
+        let unknown = |knot: usize, joint: usize| 2 * (knot * n + joint);
+        let system = self.system(measured, readings, (&stretches, &asked));
+        let (factor, moved) = system.solve();
+        let most_likely = moved_by(measured, &moved);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut drawn: Vec<f64> = (0..moved.len()).map(|_| StandardNormal.sample(&mut rng)).collect();
+        factor.solve_upper(&mut drawn);
+        // How far the accelerations of the one that was drawn are from the most likely ones.
+        let acceleration = |period: usize, joint: usize| {
+            let speed = |knot: usize| drawn[unknown(knot, joint) + 1];
+            (speed(period + 1) - speed(period)) / (t * t)
+        };
+        let away: Vec<f64> = (0..periods * n).map(|index| acceleration(index / n, index % n)).collect();
+        let (spread, noise) = self.spread(&stretches, &away, n)?;
+        let drawn = moved_by(&most_likely, &drawn);
+        Ok(Some(Smoothed { most_likely, drawn, spread, noise }))
+    }
+
+    /// The normal equations of the angles and speeds (times the period) at all commands: what they are beside
+    /// those of the log.
+    pub(super) fn system(
+        &self,
+        measured: &MotionLog,
+        readings: &Readings,
+        (stretches, asked): (&[Stretch], &[f64]),
+    ) -> Banded {
+        let (joints, periods) = (measured.joints, measured.rows() - 1);
         let (t, n) = (measured.period_s, joints);
         let unknown = |knot: usize, joint: usize| 2 * (knot * n + joint);
         let value = |knot: usize, joint: usize| {
@@ -116,9 +163,8 @@ impl Belief<'_> {
                 }
             }
         }
-        // Shares of the unknowns of three knots: the period's own two come last.
         let mut shares = vec![0.0; 6 * n];
-        for stretch in &stretches {
+        for stretch in stretches {
             for period in stretch.periods.clone() {
                 let cubic = |joint: usize| {
                     let ([q0, v0], [q1, v1]) = (value(period, joint), value(period + 1, joint));
@@ -128,30 +174,13 @@ impl Belief<'_> {
                     let row = torque * n..(torque + 1) * n;
                     let (inertia, damping) = (&stretch.inertia[row.clone()], &stretch.damping[row]);
                     let Colour { correlation, .. } = self.colours[torque];
-                    let own = asked[period * n + torque];
-                    // The noise of the period, less what it has of the one before. Inertias change little
-                    // from one to the next.
-                    shares.fill(0.0);
-                    let mut left = -own;
-                    let mut weight = self.std[torque].powi(-2);
-                    let begins = period == 0;
-                    match begins {
-                        true => weight *= 1.0 - correlation * correlation,
-                        false => left += correlation * asked[(period - 1) * n + torque],
-                    }
-                    for joint in 0..n {
-                        let (by_speed, by_way) = (inertia[joint] / (t * t), damping[joint] / (t * t));
-                        let at = 2 * joint;
-                        for (first, share) in [(2 * n, 1.0), (0, if begins { 0.0 } else { -correlation })] {
-                            shares[first + at] -= share * by_way;
-                            shares[first + 2 * n + at] += share * by_way;
-                            shares[first + at + 1] -= share * by_speed;
-                            shares[first + 2 * n + at + 1] += share * by_speed;
-                        }
-                    }
-                    match begins {
-                        true => system.add(0, &shares[2 * n..], left, weight),
-                        false => system.add(unknown(period - 1, 0), &shares, left, weight),
+                    let left = -asked[period * n + torque]
+                        + if period == 0 { 0.0 } else { correlation * asked[(period - 1) * n + torque] };
+                    let weight = self.weight(torque, period);
+                    noise_shares((inertia, damping, t), self.correlation(torque, period), &mut shares);
+                    match period {
+                        0 => system.add(0, &shares[2 * n..], left, weight),
+                        _ => system.add(unknown(period - 1, 0), &shares, left, weight),
                     }
                     // How the acceleration decays within the period.
                     shares.fill(0.0);
@@ -172,23 +201,22 @@ impl Belief<'_> {
                 }
             }
         }
-        let (factor, moved) = system.solve();
-        let most_likely = moved_by(measured, &moved);
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut drawn: Vec<f64> = (0..moved.len()).map(|_| StandardNormal.sample(&mut rng)).collect();
-        factor.solve_upper(&mut drawn);
-        // How far the accelerations of the one that was drawn are from the most likely ones.
-        let acceleration = |period: usize, joint: usize| {
-            let speed = |knot: usize| drawn[unknown(knot, joint) + 1];
-            (speed(period + 1) - speed(period)) / (t * t)
-        };
-        let away: Vec<f64> = (0..periods * n).map(|index| acceleration(index / n, index % n)).collect();
-        let (spread, noise) = self.spread(&stretches, &away, n)?;
-        let drawn = moved_by(&most_likely, &drawn);
-        Ok(Some(Smoothed { most_likely, drawn, spread, noise }))
+        system
     }
 
-    fn stretches(&self, measured: &MotionLog) -> Result<Vec<Stretch>, EstimationError> {
+    /// Correlation with the period before, of which the first has none.
+    pub(super) fn correlation(&self, torque: usize, period: usize) -> f64 {
+        if period == 0 { 0.0 } else { self.colours[torque].correlation }
+    }
+
+    /// Weight of what is new in the noise of a period; of the first all of it is.
+    pub(super) fn weight(&self, torque: usize, period: usize) -> f64 {
+        let correlation = self.colours[torque].correlation;
+        let of_first = if period == 0 { 1.0 - correlation * correlation } else { 1.0 };
+        of_first * self.std[torque].powi(-2)
+    }
+
+    pub(super) fn stretches(&self, measured: &MotionLog) -> Result<Vec<Stretch>, EstimationError> {
         let block = measured.over_periods();
         let foreseen = |parameter: usize| self.foreseen.get(parameter).copied().unwrap_or(false);
         let w = super::likelihood::column(self.w);
@@ -211,17 +239,20 @@ impl Belief<'_> {
         Ok(stretches)
     }
 
+    pub(super) fn believed(&self) -> Believed {
+        Believed { parameters: self.w.to_vec(), standing_on: Vec::new() }
+    }
+
     /// The noise that the log's own motion asks for: the model's torque less what was commanded, and the
     /// share that was felt of what the log has beside, `[period × torque]`.
-    fn asked(&self, measured: &MotionLog) -> Result<Vec<f64>, EstimationError> {
+    pub(super) fn asked(&self, measured: &MotionLog) -> Result<Vec<f64>, EstimationError> {
         let tree = self.design.tree();
         let limits: Vec<f64> = (0..measured.joints).map(|joint| tree.joint(joint).limits.effort).collect();
         let commands = measured.commands(&limits);
         let nothing = vec![false; self.w.len()];
         let foreseen = if self.foreseen.is_empty() { &nothing } else { self.foreseen };
         let mut asked = Vec::with_capacity(commands.len());
-        let believed = Believed { parameters: self.w.to_vec(), standing_on: Vec::new() };
-        foresight::rows(self.design, foreseen, (measured, Some(&believed)), |row| {
+        foresight::rows(self.design, foreseen, (measured, Some(&self.believed())), |row| {
             for (layout, colour) in self.design.rows().iter().zip(self.colours) {
                 let logged = row[layout.range.end - 1];
                 let command = commands[asked.len()];
