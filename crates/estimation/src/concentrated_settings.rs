@@ -36,8 +36,8 @@ pub struct ConcentratedSettings {
     /// Times at most that the motion of encoders is found anew under the estimate, and the estimate after it
     /// (`smoothing.rs`, `smoothing_path.rs`). Default: 60.
     pub smoothings: usize,
-    /// RMS change of the parameters and of the noise, in their standard deviations, from which on another time is worth it.
-    /// Default: 0.02; no command calibrates it.
+    /// RMS change of the parameters and of the noise, in their standard deviations, from which on another
+    /// time is worth it. Default: 0.02; no command calibrates it.
     pub smoothing_settled: f64,
     /// What is left of how an acceleration decays within a period, as a torque over the noise's: the belief's
     /// friction and inertia are not exact. Default: 0.1.

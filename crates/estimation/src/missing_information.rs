@@ -1,10 +1,10 @@
 //! What encoders that leave a motion open take from what its log tells of the parameters.
 //!
 //! The curvature of the likelihood of a motion is that of a motion that is known. Where it is not, the
-//! information of the readings is less by what is missing (Louis 1982; Dempster, Laird & Rubin 1977): by the
-//! covariance, over all motions that the readings leave possible, of the slope of that likelihood in the
-//! parameters. To first order the slope changes with a motion by Σ φ·δε/σ², φ the columns of a row and δε what
-//! the change of the motion asks for beside as noise, which is linear in it.
+//! information of the readings is less by what is missing (Louis 1982; Dempster, Laird & Rubin 1977): by
+//! the covariance, over all motions that the readings leave possible, of the slope of that likelihood in
+//! the parameters. To first order the slope changes with a motion by Σ φ·δε/σ², φ the columns of a row and
+//! δε what the change of the motion asks for beside as noise, which is linear in it.
 
 use super::smoothing::{Belief, noise_shares};
 use crate::{EstimationError, MotionLog, foresight};
@@ -12,8 +12,8 @@ use faer::linalg::solvers::SelfAdjointEigen;
 use faer::{Mat, Side};
 use phiw_identification::Design;
 
-/// Largest share of a direction's information that counts as missing: what is left is never nothing, since the
-/// first order says more than there is to lose.
+/// Largest share of a direction's information that counts as missing: something is always left, and the
+/// first order may say that more is missing than there is.
 const MOST_MISSING: f64 = 0.99;
 
 impl Belief<'_> {
