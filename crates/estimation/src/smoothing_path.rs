@@ -105,7 +105,7 @@ impl Path {
                 along.map(|((step, bend), scale)| (2.0 * share * step + share * share * bend) * scale);
             let place: Vec<f64> = origin.iter().zip(along).map(|(origin, along)| origin + along).collect();
             let trial = reached.at(&place);
-            if is_possible(&trial) {
+            if trial.std.iter().all(|std| std.is_normal()) && is_possible(&trial) {
                 next = trial;
                 break;
             }
